@@ -110,6 +110,8 @@ image_errors! {
     Binarise = 29, "binarization lacks one of its four arrays, or its thresholds are reversed";
     /// A smoothing coefficient is not above 0 and at most 1.
     Smoothing = 30, "a smoothing coefficient is not above 0 and at most 1";
+    /// Sizes, indices, rows or limits of an operation around the network do not fit each other.
+    Around = 31, "sizes, indices or limits of an operation around the network do not fit";
 }
 
 impl ImageError {
@@ -366,6 +368,7 @@ mod tests {
             "Playback",
             "Binarise",
             "Smoothing",
+            "Around",
         ];
         assert_eq!(codes, (1..).zip(expected.map(Into::into)).collect::<std::vec::Vec<_>>());
         assert_eq!(HeadError::ScratchTooSmall { needed: 1, given: 0 }.code(), 64);

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use actq::data::Recording;
 use actq::import::{Importer, PolicyFolder};
 use actq::policy::Policy;
+use actq_deploy::DeployFolder;
 use actq_onnx::Onnx;
 use anyhow::Result;
 
 /// All importers. The first that accepts a path reads it; [`PolicyFolder`] reports a path that none accepts.
-static IMPORTERS: [&dyn Importer; 2] = [&Onnx, &PolicyFolder];
+static IMPORTERS: [&dyn Importer; 3] = [&Onnx, &DeployFolder, &PolicyFolder];
 
 fn importer(path: &Path) -> &'static dyn Importer {
     IMPORTERS.into_iter().find(|importer| importer.accepts(path)).unwrap_or(&PolicyFolder)

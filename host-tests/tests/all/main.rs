@@ -8,6 +8,7 @@ mod compare;
 mod constants;
 mod controller;
 mod denoising;
+mod deployed;
 mod digests;
 mod distill;
 mod docs;

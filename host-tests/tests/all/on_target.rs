@@ -4,6 +4,7 @@
 pub(crate) mod application;
 mod cost;
 mod counting;
+mod deployed;
 mod firmware;
 mod foc;
 mod functions;

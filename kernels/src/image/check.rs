@@ -178,6 +178,8 @@ impl<'a> Image<'a> {
             if i != 0 {
                 return Err(ImageError::Denoising);
             }
+        } else if op.kind.is_around() {
+            check_around(op, front)?;
         } else if *constants > 0 {
             let [constants, arrays] = [*constants, *arrays].map(usize::from);
             for constant in front.constants(op.data(), constants)? {
@@ -229,6 +231,46 @@ impl<'a> Image<'a> {
         }
         front.take_finite(op.data() + h::DENOISE_WORDS, steps * h::COEFFICIENTS)
     }
+}
+
+/// Checks the data of an operation around a network.
+#[inline(never)]
+fn check_around(op: &Op<'_>, front: &mut Front<'_>) -> Result<(), ImageError> {
+    let n = op.dst().len;
+    let valid = match op.kind {
+        OpKind::Select => {
+            front.take(op.data(), 1 + n.div_ceil(2))?;
+            op.half(1) == 0 && (0..n).all(|i| op.half(2 + i) < op.half(0))
+        }
+        OpKind::Constant | OpKind::Start => {
+            front.take_finite(op.data(), n)?;
+            true
+        }
+        OpKind::Row => {
+            let rows = op.half(0);
+            front.take(op.data(), 2)?;
+            front.take_finite(op.data() + 2, rows * n)?;
+            op.half(1) < rows && op.half(2) < rows && op.half(3) == 0
+        }
+        OpKind::Stand => {
+            let groups = op.half(1);
+            front.take(op.data(), 2)?;
+            front.take_finite(op.data() + 2, n)?;
+            front.take(op.data() + 2 + n, groups.div_ceil(2))?;
+            let sum: usize = (0..groups).map(|group| op.half(2 * (2 + n) + group)).sum();
+            sum == op.half(0) && is_positive(op.constant(1))
+        }
+        OpKind::History => {
+            front.take(op.data(), 3)?;
+            let [frame, slots, length, stride, newest, flags] = [0, 1, 2, 3, 4, 5].map(|i| op.half(i));
+            // The ring has the oldest frame. The products of two u16 and their sum fit 32 bits.
+            let oldest = length.saturating_sub(1) * stride + newest;
+            n == frame * length && stride > 0 && newest < 2 && flags < 4 && slots == oldest.max(1)
+        }
+        // A clip has no data.
+        _ => true,
+    };
+    if valid { Ok(()) } else { Err(ImageError::Around) }
 }
 
 /// Takes sections in their order in the image. No two share a word. Constants that several operations have in common

@@ -54,12 +54,37 @@ pub enum OpKind {
     /// network's next input. Constants: the limit of the predicted sample, infinite for none; the arena offset of the
     /// first step's noise, or 0; the coefficients of each step.
     Denoise,
+    /// `dst[i] = src[index[i]]`. Data: the length of `src`, the indices.
+    Select,
+    /// `dst = clamp(dst, src, third)`, element by element.
+    Clip,
+    /// `dst` = an array of constants.
+    Constant,
+    /// `dst` = the array in the first step after a reset; in later ones it keeps its values. `third` is one word.
+    Start,
+    /// `dst` = the next row of a table, once in each step. `third` is one word. Data: the rows, the one of the first
+    /// step, the one after the last.
+    Row,
+    /// `dst` = an array if the norm of each group of `src` is below a limit. Then [`Self::Row`] with the same `third`
+    /// continues at row 0. Data: the groups, the limit's square.
+    Stand,
+    /// `dst` = frames of several steps, of which `src` is the newest; `third` keeps the others in a ring. Data: its
+    /// sizes.
+    History,
 }
 
 impl OpKind {
     /// Returns `true` if the operation differs between denoising steps.
     pub(super) fn is_of_step(self) -> bool {
         matches!(self, Self::Table | Self::Denoise)
+    }
+
+    /// Returns `true` for the operations around a network ([`crate::ops::around`]).
+    pub(crate) fn is_around(self) -> bool {
+        matches!(
+            self,
+            Self::Select | Self::Clip | Self::Constant | Self::Start | Self::Row | Self::Stand | Self::History
+        )
     }
 
     #[cfg(feature = "writer")]
@@ -117,7 +142,7 @@ pub(super) struct Uses {
     /// Lengths of `src` and of the third region; 0 for none. (Linear has its own length.)
     src: u8,
     third: u8,
-    /// Single constants, and arrays after them. (A table has one array for each denoising step.)
+    /// Single constants, and arrays after them. (A table has one array for each denoising step, a row one for each row.)
     pub(super) constants: u8,
     pub(super) arrays: u8,
     /// Passes over the elements; a slice may end inside each of them.
@@ -197,6 +222,20 @@ operations! {
     TABLE = 12 "table": OpKind::Table, Uses { arrays: 1, ..Uses::NONE };
     /// [`OpKind::Denoise`]
     DENOISE = 13 "denoise": OpKind::Denoise, Uses { src: 1, third: 1, constants: h::DENOISE_WORDS as u8, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::Select`], whose data has the length of `src`.
+    SELECT = 14 "select": OpKind::Select, Uses { src: 1, arrays: 1, ..Uses::NONE };
+    /// [`OpKind::Clip`]
+    CLIP = 15 "clip" "high": OpKind::Clip, Uses { src: 1, third: 1, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::Constant`]
+    CONSTANT = 16 "constant": OpKind::Constant, Uses { arrays: 1, ..Uses::NONE };
+    /// [`OpKind::Start`], whose third region is one word.
+    START = 17 "start": OpKind::Start, Uses { third: 1, arrays: 1, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::Row`], whose third region is one word.
+    ROW = 18 "row": OpKind::Row, Uses { third: 1, constants: 2, arrays: 1, ..Uses::NONE };
+    /// [`OpKind::Stand`], whose data has the length of `src`, and whose third region is one word.
+    STAND = 19 "stand": OpKind::Stand, Uses { src: 1, third: 1, constants: 2, arrays: 1, reads_dst: true, ..Uses::NONE };
+    /// [`OpKind::History`], whose data has the lengths of `src` and of the third region.
+    HISTORY = 20 "history": OpKind::History, Uses { src: 1, third: 1, constants: 3, ..Uses::NONE };
 }
 
 /// The fields of an operation's record, for a writer.
@@ -310,9 +349,17 @@ impl<'a> Op<'a> {
         self.form.code
     }
 
-    /// Returns the units that slices can cut the operation into: its elements, for each pass over them.
+    /// Returns u16 `i` of the data of an operation around a network.
+    pub(crate) fn half(&self, i: usize) -> usize {
+        let word = word(self.image, self.data().wrapping_add(i / 2));
+        if i.is_multiple_of(2) { low(word) } else { high(word) }
+    }
+
+    /// Returns the units that slices can cut the operation into: its elements, for each pass over them. A history also
+    /// keeps those of the new frame.
     pub(crate) fn units(&self) -> usize {
-        self.dst().len * usize::from(self.form.uses.passes)
+        let kept = if self.kind == OpKind::History { self.src().len } else { 0 };
+        self.dst().len * usize::from(self.form.uses.passes) + kept
     }
 
     /// Returns a range of array `i`; empty if the image does not have it.
@@ -377,6 +424,16 @@ impl<'a> Image<'a> {
             }
             OpKind::Normalize { .. } => OpKind::Normalize { added: detail == 1 },
             OpKind::Function(_) => OpKind::Function(Function::from_code(detail).ok_or(ImageError::Op)?),
+            kind if kind.is_around() && kind != OpKind::Clip => {
+                // Lengths in the data's first word: of a frame, or of all of `src`; of a history's slots.
+                let sizes = self.word(data as usize);
+                src = if src > 0 { low(sizes) } else { 0 };
+                third.len = match kind {
+                    OpKind::History => low(sizes) * high(sizes) + 1,
+                    _ => usize::from(form.uses.third),
+                };
+                kind
+            }
             kind => kind,
         };
         let dst = Region { offset: low(places), len };

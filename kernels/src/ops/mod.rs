@@ -1,5 +1,6 @@
 //! The operations of an image: each in its file, and here their list and the executor, which runs one of them.
 
+mod around;
 #[cfg(feature = "writer")]
 pub mod cells;
 pub mod denoise;
@@ -67,6 +68,10 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         denoise(&by, op.constant(0), v, z, x, y);
         return Ok(units.end == len);
     }
+    if op.kind.is_around() {
+        around::run(op, arena, &units)?;
+        return Ok(units.end == len);
+    }
     let is_norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
     let range = if is_norm { 0..dst.len } else { units.clone() };
     let [mut dst, mut src, third, _] = match op.src().len {
@@ -96,13 +101,20 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         OpKind::GruCell => {
             arch::gru_elements(range.clone(), f(src), f(third), f(dst));
         }
-        // The match has no wildcard: it does not compile without an arm for every operation. `Linear` and `Denoise`
-        // have returned above.
+        // The match has no wildcard: it does not compile without an arm for every operation. `Linear`, `Denoise` and
+        // the operations around a network have returned above.
         kind @ (OpKind::LayerNorm
         | OpKind::RmsNorm
         | OpKind::Normalize { .. }
         | OpKind::Linear { .. }
-        | OpKind::Denoise) => {
+        | OpKind::Denoise
+        | OpKind::Select
+        | OpKind::Clip
+        | OpKind::Constant
+        | OpKind::Start
+        | OpKind::Row
+        | OpKind::Stand
+        | OpKind::History) => {
             let (first, second) = (op.part(0, &range), op.part(1, &range));
             if (if kind == OpKind::RmsNorm { first } else { second }).is_empty() {
                 return Err(Fault::Damaged);

@@ -213,7 +213,11 @@ pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
         OpKind::Function(function) => Feature::function(function),
         _ => Feature::value(op.code()),
     };
-    let values = if let OpKind::Linear { .. } = op.kind { 0 } else { op.dst().len };
+    let values = match op.kind {
+        OpKind::Linear { .. } => 0,
+        OpKind::History => op.units(),
+        _ => op.dst().len,
+    };
     (Feature::operation(op.code()), value, values)
 }
 

@@ -4,6 +4,7 @@
 //! Each operation is defined one time, in its file in [`ops`]; everything else uses it through
 //! [`operation::Operation`].
 
+mod append;
 pub mod arrays;
 mod builder;
 mod denoising;

@@ -12,6 +12,7 @@
 #[cfg(test)]
 extern crate self as actq;
 
+pub mod around;
 pub mod budget;
 pub mod calibrate;
 pub mod contract;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use actq_kernels::image::Kind;
 
+use crate::around::Around;
 use crate::contract::ActionContract;
 use crate::error::{Result, ensure};
 use crate::graph::Graph;
@@ -29,6 +30,8 @@ pub struct Policy {
     pub contract: ActionContract,
     /// The network.
     pub graph: Graph,
+    /// What is around the network in an image; then its observations and actions are not those of the image.
+    pub around: Option<Around>,
     /// Weights of all its matrices as they were trained; the divisor of bits per weight.
     pub weights: usize,
     /// Trained values ([`Graph::parameters`]), counted before what depends on the time alone became tables.
@@ -53,6 +56,7 @@ impl Policy {
             weights: graph.weights(),
             parameters: graph.parameters(),
             graph,
+            around: None,
             digest: [0; 32],
         }
     }

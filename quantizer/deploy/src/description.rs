@@ -54,6 +54,20 @@ pub struct Description {
     pub gains: Option<Gains>,
 }
 
+impl Description {
+    /// Returns the files that it names: networks, then motions; each one time.
+    pub fn files(&self) -> Vec<&str> {
+        let networks = self.networks.iter().map(|network| network.file.as_str());
+        let mut files = Vec::new();
+        for file in networks.chain(self.motions.iter().map(|motion| motion.file.as_str())) {
+            if !files.contains(&file) {
+                files.push(file);
+            }
+        }
+        files
+    }
+}
+
 /// A raw input.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -3,6 +3,7 @@
 
 mod bundle;
 mod clock;
+mod compile;
 mod conventions;
 pub mod description;
 mod document;
@@ -10,6 +11,7 @@ mod facts;
 mod families;
 mod family;
 mod history;
+mod importer;
 mod label;
 mod network;
 mod plan;
@@ -22,12 +24,14 @@ mod text;
 mod yaml;
 
 pub use bundle::Bundle;
+pub use compile::Deployment;
 pub use conventions::{Variant, variants};
 pub use facts::{Answers, Question};
+pub use importer::DeployFolder;
 pub use label::Label;
 pub use plan::Plan;
 pub use reading::{DESCRIPTION, Reading, read};
 pub use reference::{Comparison, Difference, Raw, Reference, TOLERANCE, explain};
 pub use report::Row;
 pub use run::{Runner, Tick};
-pub use sources::{Array, Compute, Sources};
+pub use sources::{Array, Compute, Part, Sources};

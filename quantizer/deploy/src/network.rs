@@ -9,7 +9,7 @@ use actq::graph::{Network, State, Weights, zero_state};
 use actq::policy::Policy;
 use actq_onnx::{Choice, Signature, import};
 
-use crate::sources::Compute;
+use crate::sources::{Compute, Part};
 
 /// An ONNX file's graph, one policy for each of its outputs. Clones share the weights and not the recurrent state.
 #[derive(Clone, Debug)]
@@ -70,6 +70,11 @@ impl Compute for OnnxNetwork {
 
     fn outputs(&self) -> &[usize] {
         &self.lens
+    }
+
+    fn part(&self, output: usize) -> Option<Part<'_>> {
+        let output = self.outputs.get(output)?;
+        Some(Part { policy: &output.policy, reads: &output.reads })
     }
 
     fn reset(&mut self) {

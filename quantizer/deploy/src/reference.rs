@@ -43,7 +43,11 @@ impl Raw {
     }
 
     /// Returns the raw inputs of each tick, in the plan's order.
-    fn frames(&self, plan: &Plan) -> Result<Vec<Vec<Vec<f64>>>> {
+    ///
+    /// # Errors
+    ///
+    /// If an input has no array, or one of another length.
+    pub fn frames(&self, plan: &Plan) -> Result<Vec<Vec<Vec<f64>>>> {
         let mut frames = vec![Vec::with_capacity(plan.inputs.len()); self.ticks];
         for (name, len) in &plan.inputs {
             let array = self.arrays.get(name).with_context(|| {
@@ -126,6 +130,11 @@ impl Reference {
     /// Returns the raw inputs.
     pub fn raw(&self) -> &Raw {
         &self.raw
+    }
+
+    /// Returns an expected array `[tick, value]`: "observation", "action" or "target".
+    pub fn array(&self, kind: &str) -> Option<&Array> {
+        self.expected.get(kind)
     }
 
     /// Runs a plan on the raw inputs and compares the results.

@@ -2,6 +2,7 @@
 
 use actq::error::{Context as _, Result};
 use actq::import::values::Tensor;
+use actq::policy::Policy;
 
 use crate::description::Network;
 
@@ -13,11 +14,25 @@ pub trait Compute {
     /// Returns the lengths of the outputs that were asked for.
     fn outputs(&self) -> &[usize];
 
+    /// Returns the part that computes an output; `None` if it cannot become an image.
+    fn part(&self, _output: usize) -> Option<Part<'_>> {
+        None
+    }
+
     /// Forgets the recurrent state.
     fn reset(&mut self);
 
     /// Computes the outputs of a tick from the inputs.
     fn step(&mut self, inputs: &[Vec<f32>]) -> Vec<Vec<f32>>;
+}
+
+/// The part of a network that computes one of its outputs.
+#[derive(Clone, Copy, Debug)]
+pub struct Part<'a> {
+    /// Its graph, and a contract of scales, offsets and limits after it.
+    pub policy: &'a Policy,
+    /// Numbers of the inputs that make its observation, one after the other.
+    pub reads: &'a [usize],
 }
 
 /// An array of numbers.

@@ -10,16 +10,7 @@ use actq::error::{Result, ensure};
 use actq_deploy::{Answers, Bundle, Plan, Reading, read};
 
 /// Answers for the Booster T1.
-const T1: &str = "\
-rate_hz = 50
-gait_period = 1.0
-action_scale = 0.25
-gravity = \"rpy\"
-scales.base_ang_vel = 1.0
-scales.dof_vel = 0.1
-default = [0.0, 0.0, 0.2, -1.35, 0.0, -0.5, 0.0, 0.0, 0.0, 0.2, 1.35, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0,
-  -0.2, 0.0, 0.0, 0.4, -0.25, 0.0, -0.2, 0.0, 0.0, 0.4, -0.25, 0.0]
-";
+const T1: &str = include_str!("holosoma.toml");
 
 #[test]
 fn holosoma_agrees_with_its_deploy_code() -> Result<()> {

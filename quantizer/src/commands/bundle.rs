@@ -7,10 +7,8 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use actq::data::NpzWriter;
-use actq::import::FILES;
 use actq_deploy::description::Description;
-use actq_deploy::{Answers, Bundle, DESCRIPTION, Plan, Raw, Reading, Reference, Tick, explain, read};
-use actq_onnx::{Choice, import};
+use actq_deploy::{Answers, Bundle, DESCRIPTION, Deployment, Plan, Raw, Reading, Reference, explain, read};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::import::refuse_existing;
@@ -53,7 +51,9 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     for (name, path) in copies.into_values().zip(&inputs) {
         files.push((name, fs::read(path).with_context(|| path.display().to_string())?));
     }
-    files.extend(policy_folder(&reading.description, &bundle, args.calib.as_deref())?);
+    if let Some(raw) = &args.calib {
+        files.push(("calib.npz".to_owned(), calibration(&reading.description, &bundle, raw)?));
+    }
     let (names, contents): (Vec<PathBuf>, Vec<Vec<u8>>) =
         files.into_iter().map(|(name, content)| (args.out.join(name), content)).unzip();
     let names: Vec<&Path> = names.iter().map(PathBuf::as_path).collect();
@@ -124,42 +124,13 @@ fn gathered(description: &Description) -> Result<(Description, BTreeMap<String, 
     Ok((description, copies))
 }
 
-/// Returns the files of a policy folder for the network alone, and, of raw inputs, the recording that it learns from.
-/// There are none if the description has several networks, outputs or states of a graph.
-fn policy_folder(description: &Description, bundle: &Bundle, raw: Option<&Path>) -> Result<Vec<(String, Vec<u8>)>> {
-    let action = description.action.split_once('.');
-    let alone = match (&description.networks[..], action) {
-        ([network], Some((name, output))) if network.name == name && network.states.is_empty() => {
-            Some((network, output))
-        }
-        _ => None,
-    };
-    let Some((network, output)) = alone else {
-        ensure!(
-            raw.is_none(),
-            "--calib: a policy folder of several networks, or of one with states, is not supported yet"
-        );
-        return Ok(Vec::new());
-    };
-    let choice = Choice { output: Some(output.to_owned()), states: Vec::new() };
-    let imported = import(&bundle.path(&network.file)?, &choice)?;
-    let mut json: serde_json::Map<String, serde_json::Value> = serde_json::from_slice(&imported.json)?;
-    json.insert("control_hz".to_owned(), description.rate_hz.into());
-    let [json_name, weights_name] = FILES;
-    let mut files =
-        vec![(json_name.to_owned(), serde_json::to_vec_pretty(&json)?), (weights_name.to_owned(), imported.weights)];
-    if let Some(raw) = raw {
-        let ticks = Raw::read(raw)?.run(Plan::new(description, bundle).context(DESCRIPTION)?)?;
-        let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
-        fn of(tick: &Tick) -> [&[f64]; 2] {
-            [&tick.observation, &tick.action]
-        }
-        for (i, name) in ["obs", "action"].into_iter().enumerate() {
-            let rows: Vec<&[f64]> = ticks.iter().map(|tick| of(tick)[i]).collect();
-            let shape = [1, rows.len(), rows.first().map_or(0, |row| row.len())];
-            npz.array(name, &shape, rows.concat().into_iter().map(|value| value as f32))?;
-        }
-        files.push(("calib.npz".to_owned(), npz.finish()?.into_inner()));
-    }
-    Ok(files)
+/// Returns a recording of what the networks read, made of raw inputs: what they learn from.
+fn calibration(description: &Description, bundle: &Bundle, raw: &Path) -> Result<Vec<u8>> {
+    let plan = Plan::new(description, bundle).context(DESCRIPTION)?;
+    let Deployment { columns, .. } = Deployment::new(&description.name, description.rate_hz as f32, &plan)?;
+    let ticks = Raw::read(raw)?.run(plan)?;
+    let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
+    let values = ticks.iter().flat_map(|tick| columns.iter().map(|column| tick.observation[*column] as f32));
+    npz.array("obs", &[1, ticks.len(), columns.len()], values)?;
+    Ok(npz.finish()?.into_inner())
 }

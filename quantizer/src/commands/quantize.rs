@@ -53,7 +53,10 @@ pub fn run(
     })?;
     note(notes::mixed_units(quantizer.method().mixed_units()));
     progress.begin("choosing codes");
-    let found = quantizer.quantize(&options, |work: &str, share: f64| progress.set(work, share))?;
+    let mut found = quantizer.quantize(&options, |work: &str, share: f64| progress.set(work, share))?;
+    // The error is that of the network alone, on what it reads.
+    let alone = found.buffer();
+    found.image = found.whole_image()?;
     let mut contents = vec![found.image.clone()];
     if args.save_stats.is_some() {
         contents.push(Stats::new(&quantizer, &options, &found)?.json()?.into_bytes());
@@ -79,8 +82,7 @@ pub fn run(
         started.elapsed().as_secs_f64(),
     ))?;
     note(notes::unused_budget(&found, &options));
-    let buffer = found.buffer();
-    let image = buffer.image(&args.out)?;
+    let image = alone.image(&args.out)?;
     match check::check(&source, image, &recordings) {
         Ok(Some(check)) => {
             print(&format!("\n{}", notes::errors(&check)))?;

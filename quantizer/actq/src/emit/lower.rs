@@ -9,9 +9,10 @@
 use actq_kernels::image::{OpKind, Region, kept_words};
 use actq_kernels::x::max_prepared_words;
 
+use crate::around::{Around, OUTPUT};
 use crate::error::{Result, ensure};
-use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, Step, StepData};
-use crate::graph::{Node, ValueId};
+use crate::graph::lowering::{Buffer, BufferId, Lifetime, Lowering, Slice, Step, StepData};
+use crate::graph::{Graph, Node, ValueId};
 use crate::policy::Policy;
 
 /// The arena and the operations in it.
@@ -35,15 +36,20 @@ pub struct Program {
     pub words: usize,
 }
 
-/// Lowers the policy's graph for weights with scale groups of `group` columns.
-pub fn lower(policy: &Policy, group: usize) -> Result<Program> {
+/// Lowers the policy's graph for weights with scale groups of `group` columns, and what is `around` it.
+pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<Program> {
     let graph = &policy.graph;
-    let mut readers = vec![0; graph.nodes.len() + 1];
-    readers[graph.output()] = 1;
-    for &value in graph.nodes.iter().flat_map(|node| &node.inputs) {
-        readers[value] += 1;
-    }
-    let mut lowering = Lowering::new(graph.obs_len, readers);
+    let mut readers = readers(graph);
+    let mut lowering = match around {
+        Some(around) => {
+            let read =
+                |step: &Step<Slice>| [step.src, step.third].iter().flatten().any(|s| s.buffer == around.observation);
+            // The network must not overwrite what is read after it.
+            readers[0] += usize::from(around.after.iter().any(read));
+            Lowering::inside(around.before.clone(), around.buffers.clone(), around.observation, readers)
+        }
+        None => Lowering::new(graph.obs_len, readers),
+    };
     let work_len = graph.matrices.iter().map(|m| max_prepared_words(m.cols, group)).max().unwrap_or(0);
     let (contract, act_len) = (&policy.contract, policy.act_len);
     let horizon = contract.playback.ensemble.map_or(0, |ensemble| ensemble.horizon);
@@ -51,6 +57,12 @@ pub fn lower(policy: &Policy, group: usize) -> Result<Program> {
     let kept_len = kept + if contract.binarise.is_some() { act_len } else { 0 };
     let Some(denoising) = &graph.denoising else {
         nodes(&graph.nodes, &mut lowering);
+        if let Some(around) = around {
+            let output = lowering.place(graph.output());
+            lowering.steps.extend(around.after.iter().map(|step| after(step, output)));
+            let action = lowering.whole(around.action);
+            return Arena { lowering, kept_len, work_len }.assign(OBSERVATION, 0, action, act_len);
+        }
         let output = lowering.private(graph.output());
         lowering.buffers[output].lifetime = Lifetime::Output;
         let output = lowering.whole(output);
@@ -70,6 +82,34 @@ pub fn lower(policy: &Policy, group: usize) -> Result<Program> {
         StepData::Denoise { constants, noise: denoising.draws().then_some(Slice { offset: denoising.len, ..iterate }) };
     lowering.emit(OpKind::Denoise, iterate, Some(velocity), Some(read_next), data);
     Arena { lowering, kept_len, work_len }.assign(OBSERVATION, once, iterate, act_len)
+}
+
+/// Returns how many nodes read each value; the network's output counts as one more.
+fn readers(graph: &Graph) -> Vec<usize> {
+    let mut readers = vec![0; graph.nodes.len() + 1];
+    readers[graph.output()] = 1;
+    for &value in graph.nodes.iter().flat_map(|node| &node.inputs) {
+        readers[value] += 1;
+    }
+    readers
+}
+
+/// Returns an operation after the network, whose output has its place now.
+fn after(step: &Step<Slice>, output: Slice) -> Step<Slice> {
+    let placed = |s: Slice| match s.buffer {
+        OUTPUT => Slice { buffer: output.buffer, offset: output.offset + s.offset, ..s },
+        _ => s,
+    };
+    Step { dst: placed(step.dst), src: step.src.map(placed), third: step.third.map(placed), ..step.clone() }
+}
+
+/// Returns the operations of a network without matrices, its buffers, of which the first is the observation, and the
+/// place of its output.
+pub fn operations(graph: &Graph) -> (Vec<Step<Slice>>, Vec<Buffer>, Slice) {
+    let mut lowering = Lowering::new(graph.obs_len, readers(graph));
+    nodes(&graph.nodes, &mut lowering);
+    let output = lowering.place(graph.output());
+    (lowering.steps, lowering.buffers, output)
 }
 
 /// Lowers nodes in order.

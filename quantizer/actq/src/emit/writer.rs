@@ -3,11 +3,14 @@
 use std::path::Path;
 
 use actq_kernels::image::{
-    BlockRecord, Header, MatrixRecord, OpKind, OpRecord, Records, Region, half_words, header as h, quarter_words, seal,
+    BlockRecord, Header, Kind, MatrixRecord, OpKind, OpRecord, Records, Region, half_words, header as h, quarter_words,
+    seal,
 };
 use actq_kernels::layout::{self, BlockShape};
 
 use super::lower::lower;
+use crate::around::Around;
+use crate::contract::ActionContract;
 use crate::error::{Context, Result, ensure};
 use crate::graph::lowering::{Step, StepData};
 use crate::graph::{Graph, NodeKind};
@@ -19,7 +22,7 @@ use crate::runtime::{ImageBuffer, with_head};
 /// Most bytes of a self-test of more than one step.
 const SELF_TEST_BYTES: usize = 64 << 10;
 
-/// Writes the image of a policy with its quantized matrices, one per matrix of the graph. The executor itself computes
+/// Writes the image of a policy's network with its quantized matrices, one per matrix of the graph. The executor itself computes
 /// the self-test's actions.
 ///
 /// # Errors
@@ -27,13 +30,34 @@ const SELF_TEST_BYTES: usize = 64 << 10;
 /// If a size of the policy exceeds the format, if the kernels refuse the image, or if the network leaves f32's range on
 /// the self-test's observations.
 pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
+    emit(policy, matrices, None)
+}
+
+/// Writes the image of a network with everything around it: its observation is the raw values, its action what `around`
+/// makes of the network's. The policy's own contract does not apply.
+///
+/// # Errors
+///
+/// As [`image`].
+pub fn image_around(policy: &Policy, matrices: &[Outcome], around: &Around) -> Result<Vec<u8>> {
+    emit(&outside(policy, around)?, matrices, Some(around))
+}
+
+/// Returns the policy as it is seen from outside.
+fn outside(policy: &Policy, around: &Around) -> Result<Policy> {
+    ensure!(policy.kind == Kind::Step, "only a policy of kind step can have operations around its network");
+    Ok(Policy { act_len: around.action_len(), contract: ActionContract::default(), ..policy.clone() })
+}
+
+fn emit(policy: &Policy, matrices: &[Outcome], around: Option<&Around>) -> Result<Vec<u8>> {
     let group = matrices.first().map_or(0, |m| m.quantized.group);
     let mut writer = Writer::new();
     let records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
-    let Draft { mut words, self_test, observations } = writer.finish(policy, group, &records)?;
+    let Draft { mut words, self_test, observations } = writer.finish(policy, group, &records, around)?;
     let actions = self_test_actions(&sealed(&words)?, &observations)?;
+    let obs_len = obs_len(policy, around);
     for (step, action) in actions.iter().enumerate() {
-        let at = self_test + step * (policy.graph.obs_len + policy.act_len) + policy.graph.obs_len;
+        let at = self_test + step * (obs_len + policy.act_len) + obs_len;
         for (word, value) in words[at..].iter_mut().zip(action) {
             *word = value.to_bits();
         }
@@ -41,10 +65,19 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
     sealed(&words)
 }
 
-/// Returns the bytes of an image of `policy` without its matrices' blocks. Values of its matrices do not count.
+/// Returns the bytes of an image of `policy` without its matrices' blocks, and with what is around its network. Values
+/// of its matrices do not count.
 pub fn bytes_beside_blocks(policy: &Policy) -> Result<usize> {
     let records = vec![[0; h::MATRIX_WORDS]; policy.graph.matrices.len()];
-    Ok(4 * Writer::new().finish(policy, 0, &records)?.words.len())
+    let draft = match &policy.around {
+        Some(around) => Writer::new().finish(&outside(policy, around)?, 0, &records, Some(around))?,
+        None => Writer::new().finish(policy, 0, &records, None)?,
+    };
+    Ok(4 * draft.words.len())
+}
+
+fn obs_len(policy: &Policy, around: Option<&Around>) -> usize {
+    around.map_or(policy.graph.obs_len, Around::raw_len)
 }
 
 /// An image without the actions of its self-test, its length and its checksum.
@@ -101,8 +134,15 @@ impl Writer {
     }
 
     /// Appends everything after the matrices' blocks; `matrices` are their records.
-    fn finish(mut self, policy: &Policy, group: usize, matrices: &[[u32; h::MATRIX_WORDS]]) -> Result<Draft> {
-        let program = lower(policy, group)?;
+    fn finish(
+        mut self,
+        policy: &Policy,
+        group: usize,
+        matrices: &[[u32; h::MATRIX_WORDS]],
+        around: Option<&Around>,
+    ) -> Result<Draft> {
+        let program = lower(policy, group, around)?;
+        let obs_len = obs_len(policy, around);
         self.matrices = self.push(matrices.iter().flatten().copied());
         self.finite = self.words.len();
         let records = program.steps.iter().map(|step| self.op(step)).collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
@@ -122,9 +162,12 @@ impl Writer {
         }
         let name = self.push_bytes(policy.name.as_bytes());
         // If observations are long, use fewer than those of a chunk and the next.
-        let room = SELF_TEST_BYTES / (4 * (policy.graph.obs_len + policy.act_len));
+        let room = SELF_TEST_BYTES / (4 * (obs_len + policy.act_len));
         let steps = (policy.execute.max(horizon) + 2).min(room.max(1));
-        let observations = self_test_observations(&policy.graph, steps);
+        let observations = match around {
+            Some(_) => self_test_observations(&Graph::new(obs_len), steps),
+            None => self_test_observations(&policy.graph, steps),
+        };
         let self_test = self.words.len() as u32;
         for observation in &observations {
             self.push_floats(observation);
@@ -132,7 +175,7 @@ impl Writer {
         }
         let header = Header {
             kind: policy.kind,
-            obs_len: policy.graph.obs_len,
+            obs_len,
             act_len: policy.act_len,
             chunk: policy.chunk,
             execute: policy.execute,
@@ -230,6 +273,11 @@ impl Writer {
             // Its first words are not only f32 constants, so later operations must not share any words up to here.
             StepData::Constants(values) if step.kind == OpKind::Denoise => {
                 let data = self.push_floats(values);
+                self.finite = self.words.len();
+                (0, data)
+            }
+            StepData::Words(words) => {
+                let data = self.push(words.iter().copied());
                 self.finite = self.words.len();
                 (0, data)
             }

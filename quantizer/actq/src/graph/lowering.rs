@@ -31,6 +31,8 @@ pub enum StepData {
     None,
     /// Single constants, then arrays, in the order of [`OpKind`]'s description.
     Constants(Vec<f32>),
+    /// Words in the order of docs/FORMAT.md.
+    Words(Vec<u32>),
     /// Constants of a denoising step; the second becomes the arena offset of its noise.
     Denoise {
         /// Constants in the order of [`OpKind::Denoise`].
@@ -101,6 +103,11 @@ impl Lowering {
     pub fn new(obs_len: usize, readers: Vec<usize>) -> Self {
         let observation = Buffer { len: obs_len, lifetime: Lifetime::Observation };
         Self { steps: Vec::new(), buffers: vec![observation], places: vec![0], readers, iterate: 0 }
+    }
+
+    /// Starts with buffers and operations around a network, whose observation is in `observation`.
+    pub fn inside(steps: Vec<Step<Slice>>, buffers: Vec<Buffer>, observation: BufferId, readers: Vec<usize>) -> Self {
+        Self { steps, buffers, places: vec![observation], readers, iterate: 0 }
     }
 
     /// Adds a buffer.

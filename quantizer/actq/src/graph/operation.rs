@@ -59,6 +59,11 @@ pub trait Operation {
         Vec::new()
     }
 
+    /// Returns the indices of its matrices, for a graph that has others before them.
+    fn matrices_mut(&mut self) -> Vec<&mut usize> {
+        Vec::new()
+    }
+
     /// Returns the values that can be learned beside the matrices.
     fn vectors(&self) -> Vec<&Vec<f32>> {
         Vec::new()

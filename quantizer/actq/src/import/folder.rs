@@ -119,6 +119,7 @@ fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) 
         weights,
         parameters,
         graph,
+        around: None,
         digest,
     };
     policy.check()?;

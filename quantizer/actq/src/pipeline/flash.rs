@@ -44,7 +44,7 @@ pub(super) fn within(
         None => error,
     };
     let found = quantizer.at(Rate::Bytes(bytes.saturating_sub(fixed)), options, progress).map_err(in_image)?;
-    let len = found.image.len();
+    let len = found.whole_image()?.len();
     // Equal constants share storage, and learned ones may be equal or different by chance.
     ensure!(len <= bytes, "the image takes {len} bytes, but {bytes} are allowed; allow {len} bytes or more");
     Ok(found)

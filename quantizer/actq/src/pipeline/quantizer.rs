@@ -25,7 +25,7 @@ pub struct QuantizedPolicy {
     pub policy: Policy,
     /// Result for each matrix.
     pub outcomes: Vec<Outcome>,
-    /// The image.
+    /// The image of the network; [`Self::whole_image`] has what is around it, too.
     pub image: Vec<u8>,
     /// Rate that the weights were quantized to.
     pub rate: Rate,
@@ -74,6 +74,18 @@ impl QuantizedPolicy {
     /// Returns the steps of distillation; 0 for methods that do not learn.
     pub fn steps(&self) -> usize {
         self.learning.as_ref().map_or(0, |learning| learning.steps)
+    }
+
+    /// Returns the image with what is around the network: what a robot runs. Without that, it is [`Self::image`].
+    ///
+    /// # Errors
+    ///
+    /// As [`emit::image_around`].
+    pub fn whole_image(&self) -> Result<Vec<u8>> {
+        match &self.policy.around {
+            Some(around) => emit::image_around(&self.policy, &self.outcomes, around),
+            None => Ok(self.image.clone()),
+        }
     }
 
     /// Returns the image in a buffer for the executor.

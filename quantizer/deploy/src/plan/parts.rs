@@ -119,3 +119,15 @@ pub(crate) enum Step {
     Norm,
     History(History),
 }
+
+impl Step {
+    /// Returns the values that it reads beside the one that it changes.
+    pub(crate) fn slots(&self) -> Vec<Slot> {
+        let args: &[Arg] = match self {
+            Self::Add(arg) | Self::Subtract(arg) | Self::Scale(arg) | Self::Divide(arg) => std::slice::from_ref(arg),
+            Self::Clip(both) => both,
+            _ => &[],
+        };
+        args.iter().filter_map(|arg| if let Arg::Slot(slot) = arg { Some(*slot) } else { None }).collect()
+    }
+}

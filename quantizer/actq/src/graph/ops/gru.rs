@@ -53,6 +53,10 @@ impl Operation for Gru {
         ]
     }
 
+    fn matrices_mut(&mut self) -> Vec<&mut usize> {
+        vec![&mut self.input, &mut self.state]
+    }
+
     fn vectors(&self) -> Vec<&Vec<f32>> {
         vec![&self.input_bias, &self.state_bias]
     }

@@ -37,6 +37,10 @@ impl Operation for Linear {
         vec![Product { matrix: self.matrix, bias: 0, operand: Operand::Input }]
     }
 
+    fn matrices_mut(&mut self) -> Vec<&mut usize> {
+        vec![&mut self.matrix]
+    }
+
     fn vectors(&self) -> Vec<&Vec<f32>> {
         vec![&self.bias]
     }

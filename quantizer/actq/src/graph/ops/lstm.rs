@@ -52,6 +52,10 @@ impl Operation for Lstm {
         ]
     }
 
+    fn matrices_mut(&mut self) -> Vec<&mut usize> {
+        vec![&mut self.input, &mut self.state]
+    }
+
     fn vectors(&self) -> Vec<&Vec<f32>> {
         vec![&self.bias]
     }

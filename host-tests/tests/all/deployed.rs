@@ -1,0 +1,407 @@
+//! Descriptions as images: every operation of the image in f32, with the network's weights as they were trained,
+//! against the description's own execution and against published references. [`crate::on_target::deployed`] compares
+//! the bits of host and target. Published bundles run where `ACTQ_SHARED` names their folder.
+
+use std::path::{Path, PathBuf};
+use std::task::Poll;
+
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::error::Error;
+use actq::graph::ops::Linear;
+use actq::graph::{Graph, WeightMatrix};
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
+use actq::policy::Policy;
+use actq::random::Random;
+use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::bits;
+use actq_deploy::description::{Description, Network};
+use actq_deploy::{Answers, Array, Bundle, Compute, Deployment, Part, Plan, Reference, Runner, Sources, read};
+use actq_kernels::image::OpKind;
+use actq_kernels::ops::run_whole;
+use actq_kernels::{Image, Width};
+use anyhow::{Context as _, Result, ensure};
+
+/// Published bundles with the answers that they need.
+pub(crate) const PUBLISHED: [(&str, &str); 5] = [
+    ("unitree_lab_g1_velocity", ""),
+    ("limx_tron1_pf_isaaclab", ""),
+    ("kinfer_zbot_walking", ""),
+    ("falcon_g1", "action_scale = 0.25\nrate_hz = 50"),
+    ("holosoma_t1_fastsac", include_str!("../../../quantizer/deploy/tests/holosoma.toml")),
+];
+
+/// An image whose matrices are those of the policy.
+struct Exact<'a> {
+    image: Image<'a>,
+    /// Matrix of each linear operation, in order.
+    matrices: Vec<&'a WeightMatrix>,
+    arena: Vec<u32>,
+}
+
+impl Exact<'_> {
+    fn step(&mut self, raw: &[f32]) -> Result<Vec<f32>> {
+        let arena = &mut self.arena;
+        arena[self.image.observation().range()].copy_from_slice(&raw.iter().map(|x| x.to_bits()).collect::<Vec<_>>());
+        let mut matrices = self.matrices.iter();
+        for op in self.image.ops() {
+            let (OpKind::Linear { accumulate: false }, Some(packed)) = (op.kind, op.matrix()) else {
+                run_whole(&op, 0, arena)?;
+                continue;
+            };
+            let matrix = matrices.next().context("a linear operation without its matrix")?;
+            let x: Vec<f32> = arena[op.src().range()].iter().map(|word| f32::from_bits(*word)).collect();
+            for (row, weights) in matrix.data.chunks_exact(matrix.cols).enumerate() {
+                let sum: f32 = weights.iter().zip(&x).map(|(w, x)| w * x).sum();
+                arena[op.dst().offset + row] = (sum + packed.bias(row)).to_bits();
+            }
+        }
+        Ok(arena[self.image.output().range()].iter().map(|word| f32::from_bits(*word)).collect())
+    }
+}
+
+impl<'a> Exact<'a> {
+    fn new(image: Image<'a>, graph: &'a Graph) -> Self {
+        let products = graph.nodes.iter().flat_map(|node| node.kind.products());
+        let matrices = products.map(|product| &graph.matrices[product.matrix]).collect();
+        Self { image, matrices, arena: vec![0; image.scratch_words()] }
+    }
+}
+
+/// Returns the image of a policy with what is around it, at 4 bits.
+pub(crate) fn four_bits(policy: &Policy) -> Result<Vec<u8>> {
+    let options = Options::new(Method::Rtn, Budget::Width(Width::W4));
+    Ok(quantize(policy, &Recordings::default(), &options, ())?.whole_image()?)
+}
+
+/// A published bundle: its plan, its compiled form and its reference. `None` without the shared folder.
+pub(crate) fn published(name: &str, answers: &str) -> Result<Option<(Plan, Deployment, Reference)>> {
+    let Some(shared) = std::env::var_os("ACTQ_SHARED") else {
+        println!("not run: ACTQ_SHARED does not name the shared folder");
+        return Ok(None);
+    };
+    let folder = PathBuf::from(shared).join("bundles").join(name);
+    let bundle = Bundle::open(&folder.join("bundle"))?;
+    let reading = read(&bundle, true, Answers::parse(answers)?)?;
+    let plan = Plan::new(&reading.description, &bundle)?;
+    let deployment = Deployment::new(name, reading.description.rate_hz as f32, &plan)?;
+    let reference = Reference::read(&folder.join("raw.npz"), &folder.join("expect.npz"))?;
+    Ok(Some((plan, deployment, reference)))
+}
+
+/// Requires that an image gives targets to 1e-5 of the largest.
+fn gives(deployment: &Deployment, raw: &[Vec<Vec<f64>>], targets: &[f64]) -> Result<()> {
+    let policy = &deployment.policy;
+    let bytes = four_bits(policy)?;
+    let buffer = ImageBuffer::new(&bytes);
+    let mut exact = Exact::new(buffer.image(Path::new("new"))?, &policy.graph);
+    let largest = targets.iter().fold(0f64, |most, x| most.max(x.abs()));
+    let mut worst = 0f64;
+    let rows = targets.chunks(exact.image.act_len());
+    ensure!(rows.len() == raw.len() && deployment.columns.len() == policy.graph.obs_len);
+    for (raw, expected) in raw.iter().zip(rows) {
+        let raw: Vec<f32> = raw.iter().flatten().map(|x| *x as f32).collect();
+        for (found, expected) in exact.step(&raw)?.iter().zip(expected) {
+            worst = worst.max((f64::from(*found) - expected).abs() / largest);
+        }
+    }
+    println!("{}: {} bytes, largest difference {worst:.1e} of the largest target", policy.name, bytes.len());
+    ensure!(worst < 1e-5, "{}: {worst}", policy.name);
+    Ok(())
+}
+
+#[test]
+fn published_bundles_in_an_image_give_the_targets_of_their_deploy_code() -> Result<()> {
+    for (name, answers) in PUBLISHED {
+        let Some((plan, deployment, reference)) = published(name, answers)? else { return Ok(()) };
+        let targets = reference.array("target").context("no targets")?;
+        gives(&deployment, &reference.raw().frames(&plan)?, &targets.values)?;
+    }
+    Ok(())
+}
+
+/// A description with every operation, and its files.
+pub(crate) struct Made;
+
+const MADE: &str = r#"
+schema = 1
+name = "every operation"
+rate_hz = 50
+action = "second.out"
+joints = { robot = ["a", "b", "c"], policy = ["c", "a", "b"] }
+constants = { default = [0.1, -0.2, 0.3] }
+
+[[input]]
+name = "q"
+joints = "robot"
+[[input]]
+name = "quaternion"
+len = 4
+[[input]]
+name = "angles"
+len = 3
+[[input]]
+name = "command"
+len = 2
+
+[[state]]
+name = "last"
+len = 3
+start = [0.5, 0.0, -0.5]
+next = "limited"
+[[state]]
+name = "before_last"
+len = 3
+next = "last"
+
+[[clock]]
+name = "gait"
+start = [0.0, 0.5]
+advance = 0.07
+when = "before"
+restart_above = 1.0
+standing = { of = ["command", "speed"], below = 0.6, at = [0.25, 0.75] }
+[[clock]]
+name = "wave"
+start = [0.0]
+advance = 0.3
+wrap = [-1.5, 1.5]
+[[clock]]
+name = "time"
+start = [0.25]
+advance = 0.02
+
+[[motion]]
+name = "hold"
+file = "motion.npz"
+array = "rows"
+lag = 2
+[[motion]]
+name = "repeat"
+file = "motion.npz"
+array = "rows"
+lag = 1
+end = "repeat"
+
+[[value]]
+name = "relative"
+from = "q"
+do = [{ subtract = "default" }, { scale = 2.0 }, { select = "policy" }, { add = [0.1, 0.2, 0.3] }]
+[[value]]
+name = "gravity"
+from = "quaternion"
+do = [{ gravity = "xyzw" }]
+[[value]]
+name = "tilt"
+from = "angles"
+do = [{ gravity = "rpy" }]
+[[value]]
+name = "wrapped"
+from = "angles"
+do = [{ scale = 5.0 }, "wrap"]
+[[value]]
+name = "speed"
+from = "command"
+do = ["norm"]
+[[value]]
+name = "sines"
+from = ["gait", "wave"]
+do = [{ scale = 6.2 }, "sin"]
+[[value]]
+name = "cosines"
+from = "time"
+do = [{ divide = 0.5 }, "cos"]
+[[value]]
+name = "mixed"
+from = "relative"
+do = [{ scale = "hold" }, { subtract = "speed" }, { clip = [-1.0, 1.0] }, { add = "tilt" }]
+[[value]]
+name = "frame"
+from = ["relative", "speed"]
+[[value]]
+name = "frames"
+from = "frame"
+do = [{ history = { length = 3, stride = 2, first = "newest", fill = "first" } }]
+[[value]]
+name = "zero_filled"
+from = "gravity"
+do = [{ history = { length = 2, current = false } }]
+[[value]]
+name = "lasts"
+from = "last"
+do = [{ history = { length = 4 } }]
+[[value]]
+name = "read"
+from = ["first.out", "gravity", "wrapped", "mixed", "sines", "cosines", "repeat", "zero_filled", "lasts", "before_last"]
+
+[[network]]
+name = "first"
+file = "first"
+inputs = { frames = "frames" }
+[[network]]
+name = "second"
+file = "second"
+inputs = { read = "read" }
+states = { kept = "state" }
+
+[[value]]
+name = "ordered"
+from = "second.out"
+do = [{ place = [2, 0, 1] }]
+[[value]]
+name = "highest"
+from = "q"
+do = [{ add = 1.0 }]
+[[value]]
+name = "limited"
+from = "ordered"
+do = [{ clip = [[-0.5, -0.6, -0.7], "highest"] }]
+[[value]]
+name = "target"
+from = "limited"
+do = [{ scale = 0.25 }, { add = "default" }, { add = "q" }]
+
+[[target]]
+kind = "position"
+value = "target"
+[[target]]
+kind = "velocity"
+value = "mixed"
+"#;
+
+/// Networks with random weights, by the names of their files: one linear function for each output.
+#[derive(Debug)]
+struct Networks {
+    inputs: Vec<(String, usize)>,
+    lens: Vec<usize>,
+    outputs: Vec<(Policy, Vec<usize>)>,
+}
+
+impl Networks {
+    fn new(inputs: &[(&str, usize)], outputs: &[(usize, &[usize])]) -> Result<Self> {
+        let mut random = Random::new(3);
+        let mut parts = Vec::new();
+        for (n, (rows, reads)) in outputs.iter().enumerate() {
+            let cols = reads.iter().map(|read| inputs[*read].1).sum();
+            let mut graph = Graph::new(cols);
+            let data = (0..rows * cols).map(|_| 0.3 * random.unit()).collect();
+            let name = format!("{}.{n}", inputs[0].0);
+            let matrix = graph.add_matrix(WeightMatrix { name, rows: *rows, cols, data })?;
+            graph.add(Linear { matrix, bias: vec![0.1; *rows] }, &[0])?;
+            parts.push((Policy::of("made", graph), reads.to_vec()));
+        }
+        let inputs = inputs.iter().map(|(name, len)| ((*name).to_owned(), *len)).collect();
+        Ok(Self { inputs, lens: outputs.iter().map(|(rows, _)| *rows).collect(), outputs: parts })
+    }
+}
+
+impl Compute for Networks {
+    fn inputs(&self) -> &[(String, usize)] {
+        &self.inputs
+    }
+
+    fn outputs(&self) -> &[usize] {
+        &self.lens
+    }
+
+    fn part(&self, output: usize) -> Option<Part<'_>> {
+        self.outputs.get(output).map(|(policy, reads)| Part { policy, reads })
+    }
+
+    fn reset(&mut self) {}
+
+    fn step(&mut self, inputs: &[Vec<f32>]) -> Vec<Vec<f32>> {
+        let compute = |(policy, reads): &(Policy, Vec<usize>)| {
+            let x: Vec<f32> = reads.iter().flat_map(|read| inputs[*read].clone()).collect();
+            let matrix = &policy.graph.matrices[0];
+            let dot = |row: &[f32]| row.iter().zip(&x).map(|(w, x)| w * x).sum::<f32>() + 0.1;
+            matrix.data.chunks_exact(matrix.cols).map(dot).collect()
+        };
+        self.outputs.iter().map(compute).collect()
+    }
+}
+
+impl Sources for Made {
+    fn network(&self, network: &Network, outputs: &[String]) -> actq::error::Result<Box<dyn Compute>> {
+        let made = match &*network.file {
+            "first" => Networks::new(&[("frames", 12)], &[(2, &[0])]),
+            _ => {
+                let all = [(3, &[0, 1][..]), (4, &[1, 0][..])];
+                let asked: Vec<_> = outputs.iter().map(|name| all[usize::from(name == "state")]).collect();
+                Networks::new(&[("read", 39), ("kept", 4)], &asked)
+            }
+        };
+        Ok(Box::new(made.map_err(|error| Error::input(error.to_string()))?))
+    }
+
+    fn array(&self, _: &str, _: &str) -> actq::error::Result<Array> {
+        let values = (0..15).map(|i| (f64::from(i) * 0.7).sin()).collect();
+        Ok(Array { shape: vec![5, 3], values })
+    }
+}
+
+impl Made {
+    pub(crate) fn deployment() -> Result<(Plan, Deployment)> {
+        let plan = Plan::new(&Description::parse(MADE)?, &Self)?;
+        let deployment = Deployment::new("every operation", 50.0, &plan)?;
+        Ok((plan, deployment))
+    }
+
+    /// Returns raw values of some ticks: the robot stands in some of them.
+    pub(crate) fn raw(ticks: usize) -> Vec<Vec<Vec<f64>>> {
+        let mut random = Random::new(5);
+        let mut values = |len: usize, scale: f32| (0..len).map(|_| f64::from(scale * random.unit())).collect();
+        (0..ticks)
+            .map(|tick| {
+                let command = if tick / 20 % 2 == 0 { 1.0 } else { 0.1 };
+                vec![values(3, 1.0), values(4, 1.0), values(3, 1.5), values(2, command)]
+            })
+            .collect()
+    }
+}
+
+#[test]
+fn every_operation_in_an_image_gives_what_the_description_says() -> Result<()> {
+    let (plan, deployment) = Made::deployment()?;
+    let raw = Made::raw(150);
+    let mut runner = Runner::new(plan);
+    let targets: Vec<f64> =
+        raw.iter().flat_map(|raw| runner.step(raw).targets.into_iter().flat_map(|(_, target)| target)).collect();
+    gives(&deployment, &raw, &targets)
+}
+
+#[test]
+fn slices_resets_and_restored_states_of_a_description_have_the_same_bits() -> Result<()> {
+    let bytes = four_bits(&Made::deployment()?.1.policy)?;
+    let buffer = ImageBuffer::new(&bytes);
+    let image = buffer.image(Path::new("new"))?;
+    let raw: Vec<Vec<f32>> = Made::raw(60).iter().map(|raw| raw.concat().iter().map(|x| *x as f32).collect()).collect();
+    let expected =
+        with_head(image, |head| raw.iter().map(|raw| Ok(bits(head.step(raw)?))).collect::<Result<Vec<_>>>())?;
+    with_head(image, |head| {
+        let mut saved = vec![0; head.saved_len()];
+        for (tick, (raw, expected)) in raw.iter().zip(&expected).enumerate() {
+            if tick == 30 {
+                // A head that was reset continues from the saved state.
+                head.save(&mut saved)?;
+                head.reset();
+                head.step(raw)?;
+                head.restore(&saved)?;
+            }
+            head.begin(raw)?;
+            let budget = head.least_budget();
+            let mut polls = 1;
+            let action = loop {
+                if let Poll::Ready(action) = head.poll(budget)? {
+                    break bits(action);
+                }
+                polls += 1;
+            };
+            ensure!(polls > 10 && action == *expected, "tick {tick}: {polls} polls");
+        }
+        head.reset();
+        ensure!(bits(head.step(&raw[0])?) == expected[0], "after a reset");
+        Ok(())
+    })
+}

@@ -1,0 +1,153 @@
+//! Operations around a network: they make its input of raw values, and targets of its output. What one keeps for the
+//! next step is in its third region, whose last word counts; a reset zeroes all of it.
+
+use core::ops::Range;
+
+use crate::arena::{part, regions};
+use crate::error::Fault;
+use crate::image::{Op, OpKind, Region};
+use crate::math::clamp;
+use crate::ops::elementwise::{copy, copy_le};
+
+/// Runs a range of an operation's units. Its state advances with the last of them.
+///
+/// # Errors
+///
+/// [`Fault::Damaged`] if the image does not have the operation's regions or data.
+#[inline(never)]
+pub(super) fn run(op: &Op<'_>, arena: &mut [u32], units: &Range<usize>) -> Result<(), Fault> {
+    let [dst, src, third, _] = regions(arena, &op.regions, Region::default());
+    let is_last = units.end == op.units();
+    if dst.is_empty() {
+        return Err(Fault::Damaged);
+    }
+    match op.kind {
+        OpKind::Select => {
+            for (to, i) in part(dst, units).iter_mut().zip(units.clone()) {
+                *to = *src.get(op.half(2 + i)).ok_or(Fault::Damaged)?;
+            }
+            return Ok(());
+        }
+        OpKind::Clip => {
+            for (x, (low, high)) in part(dst, units).iter_mut().zip(part(src, units).iter().zip(part(third, units))) {
+                *x = clamp(f32::from_bits(*x), f32::from_bits(*low), f32::from_bits(*high)).to_bits();
+            }
+            return Ok(());
+        }
+        OpKind::Constant => {
+            copy_le(op.part(0, units), part(dst, units));
+            return Ok(());
+        }
+        _ => {}
+    }
+    let Some((count, ring)) = third.split_last_mut() else { return Err(Fault::Damaged) };
+    let next = match op.kind {
+        OpKind::Start => {
+            if *count == 0 {
+                copy_le(op.part(0, units), part(dst, units));
+            }
+            1
+        }
+        OpKind::Row => {
+            let (rows, first) = (op.half(0), op.half(1));
+            let row = (*count as usize).checked_sub(1).unwrap_or(first).min(rows.saturating_sub(1));
+            copy_le(op.part(row, units), part(dst, units));
+            // 0 is for a step after a reset.
+            1 + if row + 1 < rows { row + 1 } else { op.half(2) } as u32
+        }
+        OpKind::Stand => {
+            if !stands(op, src) {
+                return Ok(());
+            }
+            copy_le(op.part(0, units), part(dst, units));
+            1
+        }
+        _ => {
+            let history = History::of(op, *count as usize);
+            history.run(units, src, ring, dst);
+            history.next()
+        }
+    };
+    if is_last {
+        *count = next;
+    }
+    Ok(())
+}
+
+/// Returns `true` if the squared norm of each group of `src` is below the limit.
+fn stands(op: &Op<'_>, src: &[u32]) -> bool {
+    let (limit, lens) = (op.constant(1), 2 * (2 + op.dst().len));
+    let mut rest = src;
+    (0..op.half(1)).all(|group| {
+        let (values, after) = rest.split_at_checked(op.half(lens + group)).unwrap_or_default();
+        rest = after;
+        let squares = values.iter().map(|x| f32::from_bits(*x) * f32::from_bits(*x));
+        squares.fold(0.0, |sum, square| sum + square) < limit
+    })
+}
+
+/// A history in a step. Frame t since the reset is in slot `t % slots` of the ring.
+struct History {
+    /// Values of a frame.
+    frame: usize,
+    /// Frames that are kept: as many steps as the oldest one of the result is back.
+    slots: usize,
+    /// Frames of the result.
+    length: usize,
+    /// Steps from a frame of the result to the next.
+    stride: usize,
+    /// Steps that the newest frame of the result is back.
+    newest: usize,
+    /// The newest frame comes first.
+    newest_first: bool,
+    /// Before the first step there is its frame, not zeros.
+    first_fills: bool,
+    /// Steps since the reset, below twice the slots: from there on slots are subtracted.
+    step: usize,
+}
+
+impl History {
+    fn of(op: &Op<'_>, step: usize) -> Self {
+        let [frame, slots, length, stride, newest, flags] = [0, 1, 2, 3, 4, 5].map(|i| op.half(i));
+        // No divisor is 0, whatever has become of the image.
+        let (frame, slots) = (frame.max(1), slots.max(1));
+        let (newest_first, first_fills) = (flags & 1 != 0, flags & 2 != 0);
+        Self { frame, slots, length, stride, newest, newest_first, first_fills, step }
+    }
+
+    fn run(&self, units: &Range<usize>, src: &[u32], ring: &mut [u32], dst: &mut [u32]) {
+        let mut at = units.start;
+        while at < units.end.min(dst.len()) {
+            let (k, from) = (at / self.frame, at % self.frame);
+            let end = (at - from + self.frame).min(units.end);
+            let to = part(dst, &(at..end));
+            let back = if self.newest_first { k } else { self.length.saturating_sub(k + 1) };
+            let age = back.wrapping_mul(self.stride).wrapping_add(self.newest);
+            let slot = match self.step.checked_sub(age) {
+                Some(step) => Some(step % self.slots),
+                None if self.first_fills => Some(0),
+                None => None,
+            };
+            let is_new = age == 0 || self.step == 0 && self.first_fills;
+            match slot {
+                _ if is_new => copy(src.get(from..).unwrap_or_default(), to),
+                Some(slot) => copy(ring.get(slot * self.frame + from..).unwrap_or_default(), to),
+                None => to.fill(0),
+            }
+            at = end;
+        }
+        // The oldest frame was read; the new one takes its slot.
+        let new = at.max(dst.len()) - dst.len()..units.end.max(dst.len()) - dst.len();
+        let slot = self.step % self.slots * self.frame;
+        copy(part_of(src, &new), part(ring, &(slot + new.start..slot + new.end)));
+    }
+
+    fn next(&self) -> u32 {
+        let next = self.step + 1;
+        (if next >= 2 * self.slots { self.slots } else { next }) as u32
+    }
+}
+
+fn part_of<'r>(region: &'r [u32], range: &Range<usize>) -> &'r [u32] {
+    region.get(range.clone()).unwrap_or_default()
+}

@@ -1,0 +1,33 @@
+//! What an image computes around its network.
+
+use crate::graph::lowering::{Buffer, BufferId, Slice, Step};
+
+/// The buffer that stands for the network's output in [`Around::after`].
+pub const OUTPUT: BufferId = BufferId::MAX;
+
+/// The operations around a network, over buffers. Buffer 0 holds the raw values, which the caller writes.
+#[derive(Clone, Debug)]
+pub struct Around {
+    /// The buffers: that of raw values, states, and values.
+    pub buffers: Vec<Buffer>,
+    /// Operations before the network.
+    pub before: Vec<Step<Slice>>,
+    /// Buffer of the network's observation.
+    pub observation: BufferId,
+    /// Operations after the network.
+    pub after: Vec<Step<Slice>>,
+    /// Buffer of the action, which the image returns.
+    pub action: BufferId,
+}
+
+impl Around {
+    /// Returns the number of raw values.
+    pub fn raw_len(&self) -> usize {
+        self.buffers[0].len
+    }
+
+    /// Returns the length of the action.
+    pub fn action_len(&self) -> usize {
+        self.buffers[self.action].len
+    }
+}

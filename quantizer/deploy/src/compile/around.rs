@@ -1,0 +1,291 @@
+//! The operations around the joined network, value by value.
+
+use actq::around::{Around, OUTPUT};
+use actq::error::{Context as _, Result, ensure};
+use actq::graph::lowering::{Lifetime, Slice, StepData};
+use actq_kernels::image::OpKind;
+
+use super::chain::Chain;
+use super::joined::{Joined, Source, has_weights, part};
+use super::operations::{Operations, words};
+use super::{Output, clock};
+use crate::description::{Clock, End, When};
+use crate::plan::{Feed, Maker, Plan, Slot, Step};
+use crate::sources::Array;
+
+/// Makes the operations.
+pub(super) fn around(plan: &Plan, joined: &Joined) -> Result<Around> {
+    let mut compiler = Compiler {
+        plan,
+        joined,
+        to: Operations::default(),
+        slots: vec![None; plan.values.len()],
+        states: Vec::new(),
+        before: Vec::new(),
+        outputs: Vec::new(),
+    };
+    compiler.compile()
+}
+
+struct Compiler<'a> {
+    plan: &'a Plan,
+    joined: &'a Joined,
+    to: Operations,
+    /// Place of each value.
+    slots: Vec<Option<Slice>>,
+    /// Place of each state.
+    states: Vec<Slice>,
+    /// Places of outputs of the tick before.
+    before: Vec<(Output, Slice)>,
+    /// Places of outputs of this tick, after their contract.
+    outputs: Vec<(Output, Slice)>,
+}
+
+impl Compiler<'_> {
+    fn compile(&mut self) -> Result<Around> {
+        let plan = self.plan;
+        let raw: usize = plan.inputs.iter().map(|(_, len)| len).sum();
+        ensure!(raw <= usize::from(u16::MAX), "there are {raw} raw values; an image takes at most 65535");
+        self.to.buffer(raw, Lifetime::Observation);
+        for state in &plan.states {
+            let place = self.to.state(state.start.len());
+            self.states.push(place);
+            if state.start.iter().any(|number| *number != 0.0) {
+                let count = self.to.state(1);
+                let start = state.start.iter().map(|number| *number as f32).collect();
+                self.to.emit(OpKind::Start, place, None, Some(count), StepData::Constants(start));
+            }
+        }
+        for (n, network) in plan.networks.iter().enumerate() {
+            for feed in &network.feeds {
+                if let Feed::Before(output, len) = feed
+                    && self.before.iter().all(|(known, _)| *known != (n, *output))
+                {
+                    let place = self.to.state(*len);
+                    self.before.push(((n, *output), place));
+                }
+            }
+        }
+        let mut sources = Vec::new();
+        for source in &self.joined.observation {
+            sources.push(match source {
+                Source::Value(slot) => self.place(*slot)?,
+                Source::Before(output) => find(&self.before, *output).context("a state has no place")?,
+            });
+        }
+        let observation = self.to.concatenated(&sources);
+        let is_whole = self.to.buffers[observation.buffer].len == observation.len;
+        let observation = if is_whole && self.to.buffers[observation.buffer].lifetime == Lifetime::Step {
+            observation
+        } else {
+            self.to.own(observation)
+        };
+        let targets = self.places(&plan.targets.iter().map(|(_, slot)| *slot).collect::<Vec<_>>())?;
+        self.to.phase = 1;
+        let action = self.to.value(targets.iter().map(|target| target.len).sum());
+        let mut offset = 0;
+        for target in targets {
+            self.to.copy(target, Slice { offset, len: target.len, ..action });
+            offset += target.len;
+        }
+        self.advance()?;
+        let [before, after] = std::mem::take(&mut self.to.steps);
+        let buffers = std::mem::take(&mut self.to.buffers);
+        Ok(Around { buffers, before, observation: observation.buffer, after, action: action.buffer })
+    }
+
+    /// Moves every state to its value of the next tick.
+    fn advance(&mut self) -> Result<()> {
+        let mut moves = Vec::new();
+        let plan = self.plan;
+        for (state, place) in plan.states.iter().zip(self.states.clone()) {
+            moves.push((self.place(state.next)?, place));
+        }
+        for (output, place) in self.before.clone() {
+            moves.push((self.output(output)?, place));
+        }
+        self.to.phase = 1;
+        moves.retain(|(from, to)| from.buffer != to.buffer);
+        // A state that another one takes must still have this tick's value then.
+        for (from, _) in &mut moves {
+            if self.to.buffers.get(from.buffer).is_some_and(|buffer| buffer.lifetime == Lifetime::State) {
+                *from = self.to.own(*from);
+            }
+        }
+        for (from, to) in moves {
+            self.to.copy(from, to);
+        }
+        Ok(())
+    }
+
+    /// Returns the place of a value; makes it, before the network if it does not depend on its output.
+    pub(super) fn place(&mut self, slot: Slot) -> Result<Slice> {
+        if let Some(place) = self.slots[slot] {
+            return Ok(place);
+        }
+        let phase = std::mem::replace(&mut self.to.phase, usize::from(self.joined.depends[slot]));
+        let name = || self.plan.values[slot].labels.first().map_or_else(String::new, |label| label.value.clone());
+        let place = self.make(slot).with_context(|| format!("value {:?}", name()))?;
+        self.to.phase = phase;
+        self.slots[slot] = Some(place);
+        Ok(place)
+    }
+
+    fn places(&mut self, slots: &[Slot]) -> Result<Vec<Slice>> {
+        slots.iter().map(|slot| self.place(*slot)).collect()
+    }
+
+    /// Returns the place of an output after its contract.
+    fn output(&mut self, output: Output) -> Result<Slice> {
+        if let Some(place) = find(&self.outputs, output) {
+            return Ok(place);
+        }
+        let part = part(self.plan, output)?;
+        let place = if has_weights(part) {
+            let found = self.joined.outputs.iter().find(|(known, _)| *known == output);
+            let span = found.context("an output of a network is not computed")?.1;
+            self.to.phase = 1;
+            Slice { buffer: OUTPUT, offset: span.from, len: span.len }
+        } else {
+            let feeds = &self.plan.networks[output.0].feeds;
+            let depends = |read: &usize| matches!(feeds[*read], Feed::Value(slot) if self.joined.depends[slot]);
+            self.to.phase = usize::from(part.reads.iter().any(depends));
+            let mut read = Vec::new();
+            for i in part.reads {
+                read.push(match feeds[*i] {
+                    Feed::Value(slot) => self.place(slot)?,
+                    Feed::Before(before, _) => {
+                        find(&self.before, (output.0, before)).context("a state has no place")?
+                    }
+                });
+            }
+            let observation = self.to.concatenated(&read);
+            self.to.network(&part.policy.graph, observation)
+        };
+        let contract = &part.policy.contract;
+        let len = place.len;
+        let of = |array: &Option<Vec<f32>>, neutral: f32| array.clone().unwrap_or_else(|| vec![neutral; len]);
+        let mut place = place;
+        if contract.scale.is_some() || contract.offset.is_some() {
+            let scaled = self.to.normalize(place, &vec![0.0; len], &of(&contract.scale, 1.0), f32::INFINITY);
+            place = match &contract.offset {
+                Some(offset) => {
+                    let mean: Vec<f32> = offset.iter().map(|offset| -offset).collect();
+                    self.to.normalize(scaled, &mean, &vec![1.0; len], f32::INFINITY)
+                }
+                None => scaled,
+            };
+        }
+        if contract.low.is_some() || contract.high.is_some() {
+            let low = self.to.constant(&of(&contract.low, f32::MIN));
+            let high = self.to.constant(&of(&contract.high, f32::MAX));
+            place = self.to.own(place);
+            self.to.emit(OpKind::Clip, place, Some(low), Some(high), StepData::None);
+        }
+        self.outputs.push((output, place));
+        Ok(place)
+    }
+
+    fn make(&mut self, slot: Slot) -> Result<Slice> {
+        let plan = self.plan;
+        match &plan.values[slot].maker {
+            Maker::Input(i) => {
+                let offset = plan.inputs[..*i].iter().map(|(_, len)| len).sum();
+                Ok(Slice { buffer: 0, offset, len: plan.inputs[*i].1 })
+            }
+            Maker::State(i) => Ok(self.states[*i]),
+            Maker::Clock(clock, of) => self.clock(clock, of),
+            Maker::Motion { rows, lag, end } => self.motion(rows, *lag, *end),
+            Maker::Output(network, output) => self.output((*network, *output)),
+            Maker::Value(from, steps) => {
+                let parts = self.places(from)?;
+                let mut chain = Chain::of(self.to.concatenated(&parts));
+                for step in steps {
+                    let operands = self.operands(step, chain.len())?;
+                    chain.step(&mut self.to, step, &operands)?;
+                }
+                Ok(chain.end(&mut self.to))
+            }
+        }
+    }
+
+    /// Emits a table's next row.
+    fn row(&mut self, rows: &[Vec<f32>], first: usize, next: usize) -> (Slice, Slice) {
+        let (value, count) = (self.to.value(rows[0].len()), self.to.state(1));
+        let mut data = words(&[rows.len(), first, next, 0]);
+        data.extend(rows.iter().flatten().map(|number| number.to_bits()));
+        self.to.emit(OpKind::Row, value, None, Some(count), StepData::Words(data));
+        (value, count)
+    }
+
+    fn clock(&mut self, clock: &Clock, of: &[Slot]) -> Result<Slice> {
+        if clock.wrap.is_none() && clock.restart_above.is_none() && clock.standing.is_none() {
+            return Ok(self.time(clock));
+        }
+        let clock::Rows { rows, first, next } = clock::rows(clock)?;
+        let rows: Vec<Vec<f32>> = rows.iter().map(|row| row.iter().map(|phase| *phase as f32).collect()).collect();
+        let (value, count) = self.row(&rows, first, next);
+        if let Some(standing) = &clock.standing {
+            let parts = self.places(of)?;
+            let read = self.to.concatenated(&parts);
+            let mut data = words(&[read.len, parts.len()]);
+            let squared = (standing.below * standing.below) as f32;
+            ensure!(
+                squared > 0.0 && squared.is_finite(),
+                "standing.below = {} is too small or too large",
+                standing.below
+            );
+            data.push(squared.to_bits());
+            data.extend(standing.at.iter().map(|phase| (*phase as f32).to_bits()));
+            data.extend(words(&parts.iter().map(|part| part.len).collect::<Vec<_>>()));
+            self.to.emit(OpKind::Stand, value, Some(read), Some(count), StepData::Words(data));
+        }
+        Ok(value)
+    }
+
+    /// Counts ticks, exactly up to 2^24, and multiplies them by the advance.
+    fn time(&mut self, clock: &Clock) -> Slice {
+        let (ticks, one) = (self.to.state(1), self.to.constant(&[1.0]));
+        let before = clock.when == When::Before;
+        if before {
+            self.to.with(OpKind::Add, ticks, one);
+        }
+        let all = self.to.select(ticks, &vec![0; clock.start.len()]);
+        let value = self.to.times(all, clock.advance as f32);
+        let mean: Vec<f32> = clock.start.iter().map(|phase| -phase as f32).collect();
+        let value = if mean.iter().any(|mean| *mean != 0.0) {
+            self.to.normalize(value, &mean, &vec![1.0; value.len], f32::INFINITY)
+        } else {
+            value
+        };
+        if !before {
+            self.to.with(OpKind::Add, ticks, one);
+        }
+        value
+    }
+
+    fn motion(&mut self, array: &Array, lag: usize, end: End) -> Result<Slice> {
+        let (count, len) = array.rows()?;
+        let rows: Vec<Vec<f32>> =
+            array.values.chunks_exact(len).map(|row| row.iter().map(|number| *number as f32).collect()).collect();
+        let late = lag.saturating_add(count);
+        ensure!(late <= usize::from(u16::MAX), "the motion has {count} rows and a lag of {lag}; 65535 are possible");
+        let rows: Vec<Vec<f32>> = (0..late).map(|tick| rows[tick.saturating_sub(lag)].clone()).collect();
+        let next = if end == End::Repeat { lag } else { rows.len() - 1 };
+        Ok(self.row(&rows, 0, next).0)
+    }
+
+    /// Returns the values that a step reads beside its own, each with `len` numbers.
+    fn operands(&mut self, step: &Step, len: usize) -> Result<Vec<Slice>> {
+        let mut operands = Vec::new();
+        for slot in step.slots() {
+            let place = self.place(slot)?;
+            operands.push(if place.len == len { place } else { self.to.select(place, &vec![0; len]) });
+        }
+        Ok(operands)
+    }
+}
+
+fn find(places: &[(Output, Slice)], output: Output) -> Option<Slice> {
+    places.iter().find(|(known, _)| *known == output).map(|(_, place)| *place)
+}

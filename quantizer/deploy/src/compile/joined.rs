@@ -1,0 +1,290 @@
+//! Networks joined to one.
+
+use actq::error::{Context as _, Result, bail, ensure};
+use actq::graph::ops::{Concat, Span};
+use actq::graph::{Graph, ValueId};
+use actq_kernels::Kind;
+
+use super::Output;
+use crate::plan::{Feed, Maker, Plan, Slot, Step, Work};
+use crate::sources::Part;
+
+/// What the joined network reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Source {
+    /// A value.
+    Value(Slot),
+    /// An output in the tick before.
+    Before(Output),
+}
+
+impl Source {
+    pub(super) fn len(self, plan: &Plan) -> usize {
+        match self {
+            Self::Value(slot) => plan.values[slot].labels.len(),
+            Self::Before((network, output)) => plan.networks[network].compute.outputs()[output],
+        }
+    }
+}
+
+/// The networks as one.
+#[derive(Debug)]
+pub(super) struct Joined {
+    pub(super) graph: Graph,
+    /// What its observation is made of, one after the other.
+    pub(super) observation: Vec<Source>,
+    /// Outputs with weights, and their places in the joined output.
+    pub(super) outputs: Vec<(Output, Span)>,
+    /// For each value, whether it depends on an output with weights.
+    pub(super) depends: Vec<bool>,
+}
+
+/// Returns the part that computes an output.
+pub(super) fn part(plan: &Plan, (network, output): Output) -> Result<Part<'_>> {
+    let part = plan.networks[network].compute.part(output).context("a network of this kind cannot become an image")?;
+    ensure!(
+        part.policy.kind == Kind::Step,
+        "a network that gives an action chunk cannot have operations around it yet"
+    );
+    Ok(part)
+}
+
+/// Returns `true` if an output depends on weights, which the quantizer changes.
+pub(super) fn has_weights(part: Part<'_>) -> bool {
+    !part.policy.graph.matrices.is_empty()
+}
+
+/// Returns what a network reads by a feed whose first value is at `from`: the feed, and the parts that it is made of.
+pub(super) fn sources(plan: &Plan, network: usize, feed: &Feed, from: usize) -> Vec<(Source, usize)> {
+    let slot = match feed {
+        Feed::Before(output, _) => return vec![(Source::Before((network, *output)), from)],
+        Feed::Value(slot) => *slot,
+    };
+    let mut found = vec![(Source::Value(slot), from)];
+    if let Maker::Value(parts, steps) = &plan.values[slot].maker
+        && steps.is_empty()
+    {
+        let mut at = from;
+        for part in parts {
+            found.extend(sources(plan, network, &Feed::Value(*part), at));
+            at += plan.values[*part].labels.len();
+        }
+    }
+    found
+}
+
+impl Joined {
+    pub(super) fn of(plan: &Plan) -> Result<Self> {
+        let mut builder = Builder { plan, depends: depends(plan)?, observation: Vec::new(), values: Vec::new() };
+        let outputs = builder.used()?;
+        ensure!(!outputs.is_empty(), "the targets depend on no network with weights");
+        // The observation first: a graph's length is fixed when it is made.
+        let mut all = Vec::new();
+        for output in &outputs {
+            builder.read(*output, &mut all)?;
+        }
+        let len = builder.observation.iter().map(|source| source.len(plan)).sum();
+        let mut graph = Graph::new(len);
+        let mut ids = Vec::new();
+        for output in &outputs {
+            ids.push(builder.append(&mut graph, *output)?);
+        }
+        let (mut spans, mut parts, mut from) = (Vec::new(), Vec::<(ValueId, Span)>::new(), 0);
+        for (output, id) in outputs.iter().zip(ids) {
+            let len = graph.len_of(id);
+            let known = parts.iter().position(|(other, _)| *other == id);
+            let place = match known {
+                Some(i) => Span { from: parts[..i].iter().map(|(_, span)| span.len).sum(), len },
+                None => {
+                    parts.push((id, Span { from: 0, len }));
+                    from += len;
+                    Span { from: from - len, len }
+                }
+            };
+            spans.push((*output, place));
+        }
+        if parts.len() > 1 || parts.iter().any(|(id, _)| *id != graph.output()) {
+            let (ids, whole): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+            graph.add(Concat(whole), &ids)?;
+        }
+        Ok(Self { graph, observation: builder.observation, outputs: spans, depends: builder.depends })
+    }
+}
+
+/// Returns for each value whether it depends on weights.
+fn depends(plan: &Plan) -> Result<Vec<bool>> {
+    let mut depends = vec![false; plan.values.len()];
+    for work in &plan.order {
+        let Work::Make(slot) = *work else { continue };
+        depends[slot] = match &plan.values[slot].maker {
+            Maker::Input(_) | Maker::State(_) | Maker::Motion { .. } => false,
+            Maker::Clock(_, of) => of.iter().any(|value| depends[*value]),
+            Maker::Value(from, steps) => {
+                from.iter().copied().chain(steps.iter().flat_map(Step::slots)).any(|value| depends[value])
+            }
+            Maker::Output(network, output) => {
+                let part = part(plan, (*network, *output))?;
+                let feeds = &plan.networks[*network].feeds;
+                has_weights(part)
+                    || part.reads.iter().any(|read| matches!(feeds[*read], Feed::Value(slot) if depends[slot]))
+            }
+        };
+    }
+    Ok(depends)
+}
+
+struct Builder<'a> {
+    plan: &'a Plan,
+    depends: Vec<bool>,
+    observation: Vec<Source>,
+    values: Vec<(Output, ValueId)>,
+}
+
+impl Builder<'_> {
+    /// Lists the outputs with weights that something outside of networks reads.
+    fn used(&self) -> Result<Vec<Output>> {
+        let plan = self.plan;
+        let mut read: Vec<Slot> = vec![plan.action];
+        read.extend(plan.targets.iter().map(|(_, slot)| *slot));
+        read.extend(plan.states.iter().map(|state| state.next));
+        let mut seen = vec![false; plan.values.len()];
+        let mut used = Vec::new();
+        let mut add = |output: Output| -> Result<()> {
+            if has_weights(part(plan, output)?) && !used.contains(&output) {
+                used.push(output);
+            }
+            Ok(())
+        };
+        while let Some(slot) = read.pop() {
+            if std::mem::replace(&mut seen[slot], true) {
+                continue;
+            }
+            match &plan.values[slot].maker {
+                Maker::Output(network, output) => {
+                    add((*network, *output))?;
+                    if !has_weights(part(plan, (*network, *output))?) {
+                        let feeds = plan.networks[*network].feeds.iter();
+                        read.extend(feeds.filter_map(|f| if let Feed::Value(slot) = f { Some(*slot) } else { None }));
+                    }
+                }
+                Maker::Clock(_, of) => read.extend(of),
+                Maker::Value(from, steps) => {
+                    read.extend(from.iter().copied().chain(steps.iter().flat_map(Step::slots)))
+                }
+                _ => {}
+            }
+        }
+        for (n, network) in plan.networks.iter().enumerate() {
+            for feed in &network.feeds {
+                if let Feed::Before(output, _) = feed {
+                    add((n, *output))?;
+                }
+            }
+        }
+        used.sort_unstable();
+        Ok(used)
+    }
+
+    /// Returns the parts of a value that a network reads.
+    fn parts(&self, slot: Slot) -> Result<Vec<Slot>> {
+        if !self.depends[slot] {
+            return Ok(vec![slot]);
+        }
+        match &self.plan.values[slot].maker {
+            Maker::Output(network, output) if has_weights(part(self.plan, (*network, *output))?) => Ok(vec![slot]),
+            Maker::Value(from, steps) if steps.is_empty() => {
+                let parts = from.iter().map(|slot| self.parts(*slot)).collect::<Result<Vec<_>>>()?;
+                Ok(parts.concat())
+            }
+            _ => bail!(
+                "{:?} lies between two networks; an image can only put outputs and values one after the other there",
+                self.plan.values[slot].labels.first().map_or_else(String::new, |label| label.to_string())
+            ),
+        }
+    }
+
+    /// Collects what an output's network, and those before it, read.
+    fn read(&mut self, output: Output, seen: &mut Vec<Output>) -> Result<()> {
+        if seen.contains(&output) {
+            return Ok(());
+        }
+        seen.push(output);
+        let plan = self.plan;
+        for read in part(plan, output)?.reads {
+            match &plan.networks[output.0].feeds[*read] {
+                Feed::Before(before, _) => self.add(Source::Before((output.0, *before))),
+                Feed::Value(slot) => {
+                    for slot in self.parts(*slot)? {
+                        match &plan.values[slot].maker {
+                            Maker::Output(network, output) if self.depends[slot] => {
+                                self.read((*network, *output), seen)?;
+                            }
+                            _ => self.add(Source::Value(slot)),
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, source: Source) {
+        if !self.observation.contains(&source) {
+            self.observation.push(source);
+        }
+    }
+
+    /// Returns the part of the observation that a source is.
+    fn span(&self, source: Source) -> (ValueId, Span) {
+        let before = self.observation.iter().take_while(|other| **other != source);
+        (0, Span { from: before.map(|other| other.len(self.plan)).sum(), len: source.len(self.plan) })
+    }
+
+    /// Appends the network of an output, after those that it reads; returns the output's value.
+    fn append(&mut self, graph: &mut Graph, output: Output) -> Result<ValueId> {
+        if let Some((_, value)) = self.values.iter().find(|(known, _)| *known == output) {
+            return Ok(*value);
+        }
+        let plan = self.plan;
+        let part = part(plan, output)?;
+        let mut parts = Vec::new();
+        for read in part.reads {
+            match &plan.networks[output.0].feeds[*read] {
+                Feed::Before(before, _) => parts.push(self.span(Source::Before((output.0, *before)))),
+                Feed::Value(slot) => {
+                    for slot in self.parts(*slot)? {
+                        match plan.values[slot].maker {
+                            Maker::Output(network, inner) if self.depends[slot] => {
+                                let contract = &self::part(plan, (network, inner))?.policy.contract;
+                                ensure!(
+                                    contract.arrays().iter().all(|(_, array)| array.is_none()),
+                                    "output {inner} of network {network} ends with a scale or a limit before another network; \
+                                     this is not supported"
+                                );
+                                let value = self.append(graph, (network, inner))?;
+                                parts.push((value, Span { from: 0, len: graph.len_of(value) }));
+                            }
+                            _ => parts.push(self.span(Source::Value(slot))),
+                        }
+                    }
+                }
+            }
+        }
+        let input = graph.join(merged(parts))?;
+        let value = graph.append(&part.policy.graph, input)?;
+        self.values.push((output, value));
+        Ok(value)
+    }
+}
+
+/// Merges parts of a value that follow each other in it.
+fn merged(parts: Vec<(ValueId, Span)>) -> Vec<(ValueId, Span)> {
+    let mut merged: Vec<(ValueId, Span)> = Vec::new();
+    for (value, span) in parts {
+        match merged.last_mut() {
+            Some((last, before)) if *last == value && before.from + before.len == span.from => before.len += span.len,
+            _ => merged.push((value, span)),
+        }
+    }
+    merged
+}

@@ -1,0 +1,124 @@
+//! Operations over buffers, one after the other.
+
+use actq::emit::operations;
+use actq::graph::Graph;
+use actq::graph::lowering::{Buffer, BufferId, Lifetime, Slice, Step, StepData};
+use actq_kernels::image::OpKind;
+
+/// Operations before or after the network, and the buffers of both.
+#[derive(Debug, Default)]
+pub(super) struct Operations {
+    pub(super) buffers: Vec<Buffer>,
+    /// Operations before the network, and those after it.
+    pub(super) steps: [Vec<Step<Slice>>; 2],
+    /// Where operations go now: 0 before the network, 1 after it.
+    pub(super) phase: usize,
+}
+
+impl Operations {
+    pub(super) fn buffer(&mut self, len: usize, lifetime: Lifetime) -> BufferId {
+        self.buffers.push(Buffer { len, lifetime });
+        self.buffers.len() - 1
+    }
+
+    /// Returns a new buffer for values of this tick.
+    pub(super) fn value(&mut self, len: usize) -> Slice {
+        Slice { buffer: self.buffer(len, Lifetime::Step), offset: 0, len }
+    }
+
+    /// Returns a new buffer that a reset zeroes.
+    pub(super) fn state(&mut self, len: usize) -> Slice {
+        Slice { buffer: self.buffer(len, Lifetime::State), offset: 0, len }
+    }
+
+    pub(super) fn emit(&mut self, kind: OpKind, dst: Slice, src: Option<Slice>, third: Option<Slice>, data: StepData) {
+        self.steps[self.phase].push(Step { kind, dst, src, third, data });
+    }
+
+    pub(super) fn copy(&mut self, src: Slice, dst: Slice) {
+        self.emit(OpKind::Copy, dst, Some(src), None, StepData::None);
+    }
+
+    /// Puts slices one after the other; a single one, or parts of a buffer in order, stay where they are.
+    pub(super) fn concatenated(&mut self, parts: &[Slice]) -> Slice {
+        let follows =
+            |pair: &[Slice]| pair[0].buffer == pair[1].buffer && pair[0].offset + pair[0].len == pair[1].offset;
+        let len = parts.iter().map(|part| part.len).sum();
+        if parts.windows(2).all(follows) {
+            return Slice { len, ..parts[0] };
+        }
+        let dst = self.value(len);
+        let mut offset = 0;
+        for part in parts {
+            self.copy(*part, Slice { offset, len: part.len, ..dst });
+            offset += part.len;
+        }
+        dst
+    }
+
+    /// Selects values by their places; places in order stay where they are.
+    pub(super) fn select(&mut self, src: Slice, places: &[usize]) -> Slice {
+        if let [first, ..] = *places
+            && places.iter().zip(first..).all(|(place, i)| *place == i)
+        {
+            return Slice { offset: src.offset + first, len: places.len(), ..src };
+        }
+        let halves: Vec<usize> = [src.len, 0].into_iter().chain(places.iter().copied()).collect();
+        let dst = self.value(places.len());
+        self.emit(OpKind::Select, dst, Some(src), None, StepData::Words(words(&halves)));
+        dst
+    }
+
+    /// Computes `clamp((src - mean) * scale, ±limit)`.
+    pub(super) fn normalize(&mut self, src: Slice, mean: &[f32], scale: &[f32], limit: f32) -> Slice {
+        let dst = self.value(src.len);
+        let constants = [f32::INFINITY, limit].iter().chain(mean).chain(scale).copied().collect();
+        self.emit(OpKind::Normalize { added: false }, dst, Some(src), None, StepData::Constants(constants));
+        dst
+    }
+
+    /// Multiplies every value by a number.
+    pub(super) fn times(&mut self, src: Slice, factor: f32) -> Slice {
+        self.normalize(src, &vec![0.0; src.len], &vec![factor; src.len], f32::INFINITY)
+    }
+
+    /// Returns constants as a value.
+    pub(super) fn constant(&mut self, numbers: &[f32]) -> Slice {
+        let dst = self.value(numbers.len());
+        self.emit(OpKind::Constant, dst, None, None, StepData::Constants(numbers.to_vec()));
+        dst
+    }
+
+    /// Copies a value that an operation in place will overwrite.
+    pub(super) fn own(&mut self, src: Slice) -> Slice {
+        let dst = self.value(src.len);
+        self.copy(src, dst);
+        dst
+    }
+
+    /// Computes an operation in place of `dst`, with a second operand.
+    pub(super) fn with(&mut self, kind: OpKind, dst: Slice, src: Slice) {
+        self.emit(kind, dst, Some(src), None, StepData::None);
+    }
+
+    /// Appends the operations of a network without weights.
+    pub(super) fn network(&mut self, graph: &Graph, observation: Slice) -> Slice {
+        let (steps, buffers, output) = operations(graph);
+        let base = self.buffers.len();
+        self.buffers.extend(&buffers[1..]);
+        let placed = |s: Slice| match s.buffer {
+            0 => Slice { offset: observation.offset + s.offset, buffer: observation.buffer, ..s },
+            buffer => Slice { buffer: base + buffer - 1, ..s },
+        };
+        for Step { kind, dst, src, third, data } in steps {
+            self.emit(kind, placed(dst), src.map(placed), third.map(placed), data);
+        }
+        placed(output)
+    }
+}
+
+/// Packs u16 in words, two each.
+pub(super) fn words(halves: &[usize]) -> Vec<u32> {
+    let half = |i: usize| halves.get(i).map_or(0, |half| *half as u32);
+    (0..halves.len().div_ceil(2)).map(|i| half(2 * i) | half(2 * i + 1) << 16).collect()
+}

@@ -1,0 +1,68 @@
+//! Policies with a description: the networks to quantize, and what is around them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use actq::error::{Context as _, Result, ensure};
+use actq::import::Importer;
+use actq::policy::Policy;
+use sha2::{Digest as _, Sha256};
+
+use crate::bundle::Bundle;
+use crate::compile::Deployment;
+use crate::description::Description;
+use crate::plan::Plan;
+use crate::reading::DESCRIPTION;
+
+/// Importer of folders with a `deploy.toml`, as `actq import` writes them.
+#[derive(Clone, Copy, Debug)]
+pub struct DeployFolder;
+
+impl Importer for DeployFolder {
+    fn accepts(&self, path: &Path) -> bool {
+        path.join(DESCRIPTION).is_file()
+    }
+
+    fn files(&self, path: &Path) -> Vec<PathBuf> {
+        let text = fs::read_to_string(path.join(DESCRIPTION)).unwrap_or_default();
+        let description = Description::parse(&text).ok();
+        let named = description.iter().flat_map(Description::files).map(|file| path.join(file));
+        [path.join(DESCRIPTION)].into_iter().chain(named).collect()
+    }
+
+    fn load(&self, path: &Path) -> Result<Policy> {
+        Ok(Deployment::load(path)?.policy)
+    }
+}
+
+impl Deployment {
+    /// Reads `deploy.toml` and the files that it names from a folder.
+    ///
+    /// # Errors
+    ///
+    /// If a file is missing or damaged, or an image has no operations for a part of the description.
+    pub fn load(path: &Path) -> Result<Self> {
+        let shown = path.join(DESCRIPTION);
+        let shown = || shown.display().to_string();
+        let bundle = Bundle::open(path)?;
+        let text = bundle.text(DESCRIPTION)?;
+        let description = Description::parse(&text).with_context(shown)?;
+        let plan = Plan::new(&description, &bundle).with_context(shown)?;
+        ensure!(
+            description.name.len() <= 200,
+            "{}: name has {} bytes; at most 200 are allowed",
+            shown(),
+            description.name.len()
+        );
+        let mut found = Self::new(&description.name, description.rate_hz as f32, &plan).with_context(shown)?;
+        let mut digest = Sha256::new();
+        digest.update(&text);
+        for file in description.files() {
+            let path = bundle.path(file)?;
+            digest.update(fs::read(&path).with_context(|| path.display().to_string())?);
+        }
+        found.policy.digest = digest.finalize().into();
+        found.policy.dir = path.to_owned();
+        Ok(found)
+    }
+}
