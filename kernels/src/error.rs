@@ -112,6 +112,9 @@ image_errors! {
     Smoothing = 30, "a smoothing coefficient is not above 0 and at most 1";
     /// Sizes, indices, rows or limits of an operation around the network do not fit each other.
     Around = 31, "sizes, indices or limits of an operation around the network do not fit";
+    /// The lengths of raw inputs and targets are not those of observation and action, or a name, a kind or a range is
+    /// impossible.
+    Ports = 32, "raw inputs or targets have impossible lengths, names, kinds or ranges";
 }
 
 impl ImageError {
@@ -257,6 +260,11 @@ pub enum StepError {
     },
     /// Every action is older than its deadline, or its period has passed.
     Stale,
+    /// A value of the observation is outside the range of its raw input ([`crate::Image::ports`]).
+    ObservationRange {
+        /// Its position.
+        index: usize,
+    },
 }
 
 impl StepError {
@@ -273,6 +281,7 @@ impl StepError {
             Self::NoiseLength { .. } => 87,
             Self::NoiseNotFinite { .. } => 88,
             Self::Stale => 89,
+            Self::ObservationRange { .. } => 90,
         }
     }
 }
@@ -311,6 +320,9 @@ impl fmt::Display for StepError {
                 write!(f, "observation has {given} values; the policy takes {expected}")
             }
             Self::ObservationNotFinite { index } => write!(f, "observation value {index} is not finite"),
+            Self::ObservationRange { index } => {
+                write!(f, "observation value {index} is outside the range of its raw input")
+            }
             Self::NotFinite => f.write_str("the network produced a value that is not finite"),
             Self::Damaged => f.write_str("the image's memory has changed since it was checked"),
             Self::SelfTest { step } => write!(f, "self-test step {step} gave other bits than the image records"),
@@ -369,6 +381,7 @@ mod tests {
             "Binarise",
             "Smoothing",
             "Around",
+            "Ports",
         ];
         assert_eq!(codes, (1..).zip(expected.map(Into::into)).collect::<std::vec::Vec<_>>());
         assert_eq!(HeadError::ScratchTooSmall { needed: 1, given: 0 }.code(), 64);
@@ -383,8 +396,9 @@ mod tests {
             StepError::NoiseLength { expected: 1, given: 0 },
             StepError::NoiseNotFinite { index: 0 },
             StepError::Stale,
+            StepError::ObservationRange { index: 0 },
         ];
-        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86, 87, 88, 89]);
+        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86, 87, 88, 89, 90]);
         let saved = [
             SavedError::Length { needed: 1, given: 0 },
             SavedError::Version,

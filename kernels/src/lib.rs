@@ -22,6 +22,8 @@
 //!
 //! Features:
 //!
+//! - `around` runs the operations around a network (`docs/DEPLOY.md`): raw values in, targets out. Without it, an image
+//!   that has some is refused with [`ImageError::Op`], and the code is 2 KB shorter.
 //! - `defmt` derives `defmt::Format` for the error types.
 //! - `writer` makes public what writes images and what checks the kernels: packed layouts, records, arithmetic and the
 //!   parts of the cost model. The quantizer, tests and measurements use it. It is **unstable**: any version may change
@@ -90,7 +92,7 @@ mod x;
 pub use arch::{BACKEND, Backend};
 pub use error::{HeadError, ImageError, SavedError, StepError};
 pub use head::Head;
-pub use image::{Image, ImageInfo, Kind};
+pub use image::{Image, ImageInfo, Kind, Port, PortKind};
 #[cfg(feature = "writer")]
 pub use layout::{Block, BlockShape, Width};
 pub use pace::cost::Cost;

@@ -79,6 +79,14 @@ pub(crate) enum Command {
     ///
     /// Example: actq eval ur3.actq --policy policies/ur3
     Eval(EvalArgs),
+    /// Compare an image of a deploy bundle with a run of the deploy code
+    ///
+    /// Runs the image on the raw inputs of a reference and compares its targets, tick by tick: the error is that of the
+    /// image's bits. RAW.npz has an array [tick, value] for each raw input that `actq inspect` lists; EXPECT.npz has
+    /// the array target.
+    ///
+    /// Example: actq check walker.actq --reference raw.npz:expect.npz --max-nmse 0.05
+    Check(CheckArgs),
     /// Quantize in on-policy rounds: roll out the image, record, and learn again (DAgger)
     ///
     /// Quantizes by method distill from the f32 policy's recordings. In every round a command rolls out the newest
@@ -290,6 +298,18 @@ pub(crate) struct EvalArgs {
     /// Print one JSON object: nmse, worst_nmse, max_abs, steps, bpw, bytes; with --driven also own_nmse
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct CheckArgs {
+    /// The image
+    pub(crate) image: PathBuf,
+    /// The raw inputs, and what the deploy code makes of them
+    #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]
+    pub(crate) reference: (PathBuf, PathBuf),
+    /// Fail if a target's NMSE is above this number
+    #[arg(long, value_name = "NMSE")]
+    pub(crate) max_nmse: Option<f64>,
 }
 
 #[derive(clap::Args)]

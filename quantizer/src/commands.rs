@@ -2,6 +2,7 @@
 //! their own.
 
 pub(crate) mod bundle;
+pub(crate) mod check;
 mod drive;
 pub(crate) mod eval;
 pub(crate) mod import;

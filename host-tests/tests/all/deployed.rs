@@ -116,7 +116,7 @@ fn published_bundles_in_an_image_give_the_targets_of_their_deploy_code() -> Resu
     for (name, answers) in PUBLISHED {
         let Some((plan, deployment, reference)) = published(name, answers)? else { return Ok(()) };
         let targets = reference.array("target").context("no targets")?;
-        gives(&deployment, &reference.raw().frames(&plan)?, &targets.values)?;
+        gives(&deployment, &reference.raw().frames(plan.inputs())?, &targets.values)?;
     }
     Ok(())
 }

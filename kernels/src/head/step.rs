@@ -19,7 +19,8 @@ impl Head<'_, '_> {
     ///
     /// # Errors
     ///
-    /// [`StepError::ObservationLength`] and [`StepError::ObservationNotFinite`] for the observation;
+    /// [`StepError::ObservationLength`], [`StepError::ObservationNotFinite`] and [`StepError::ObservationRange`] for the
+    /// observation;
     /// [`StepError::NotFinite`] if a value inside the network exceeds f32's range, [`StepError::Damaged`] if the
     /// image's memory has changed since its check, [`StepError::Stale`] if the action is older than its deadline.
     ///
@@ -175,6 +176,15 @@ impl Head<'_, '_> {
         }
         if let Some(index) = observation.iter().position(|v| !v.is_finite()) {
             return Err(StepError::ObservationNotFinite { index });
+        }
+        let mut rest = observation;
+        for port in self.image.ports() {
+            let Some((values, after)) = rest.split_at_checked(port.len) else { break };
+            let [low, high] = port.range;
+            if let Some(i) = values.iter().position(|value| !(low..=high).contains(value)) {
+                return Err(StepError::ObservationRange { index: expected - rest.len() + i });
+            }
+            rest = after;
         }
         let region = self.image.observation();
         copy(bytemuck::must_cast_slice(observation), self.arena.get_mut(region.range()).ok_or(StepError::Damaged)?);

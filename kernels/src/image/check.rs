@@ -5,6 +5,7 @@ use super::header::{self as h, Words};
 use super::info::check_whole;
 use super::matrix::{matrix, row_block};
 use super::op::{Form, Op, OpKind, Uses};
+use super::ports::PortKind;
 use super::proof::fits_i32;
 use super::region::Region;
 use super::text::is_text;
@@ -42,10 +43,12 @@ impl<'a> Image<'a> {
     }
 
     fn check(&self) -> Result<(), ImageError> {
-        if self.header.kind() >> 8 != 0 || self.header.contract_flags() >> CONTRACT_ARRAYS != 0 {
+        if self.header.kind() >> 8 > usize::from(cfg!(feature = "around"))
+            || self.header.contract_flags() >> CONTRACT_ARRAYS != 0
+        {
             return Err(ImageError::Reserved);
         }
-        match (self.header.kind(), self.chunk(), self.execute()) {
+        match (self.header.kind() & 0xff, self.chunk(), self.execute()) {
             (0, 1, 1) => {}
             (1..=3, chunk, execute) if (1..=chunk).contains(&execute) => {}
             (0..=3, ..) => return Err(ImageError::Chunk),
@@ -114,7 +117,29 @@ impl<'a> Image<'a> {
         }
         // The arena holds both lengths, so the product fits 32 bits.
         let self_test = self.self_test_steps() * (self.obs_len() + self.act_len());
-        front.take_finite(self.header.self_test(), self_test)
+        front.take_finite(self.header.self_test(), self_test)?;
+        if self.has_ports() { self.check_ports(front) } else { Ok(()) }
+    }
+
+    #[inline(never)]
+    fn check_ports(&self, front: &mut Front<'a>) -> Result<(), ImageError> {
+        front.take(self.ports_at(), 1)?;
+        front.take(self.ports_at() + 1, self.port_words() - 1)?;
+        let [inputs, outputs] = self.port_counts();
+        let mut lens = [0; 2];
+        for i in 0..inputs + outputs {
+            let [name, words] = self.port_name(i);
+            front.take(name, words)?;
+            let port = self.port(i).ok_or(ImageError::Ports)?;
+            let is_output = i >= inputs;
+            let [low, high] = port.range;
+            if is_output == (port.kind == PortKind::Input) || low > high || low.is_nan() || high.is_nan() || words == 0
+            {
+                return Err(ImageError::Ports);
+            }
+            lens[usize::from(is_output)] += port.len;
+        }
+        if lens == [self.obs_len(), self.act_len()] { Ok(()) } else { Err(ImageError::Ports) }
     }
 
     fn check_contract(&self, front: &mut Front<'a>) -> Result<(), ImageError> {

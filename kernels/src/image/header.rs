@@ -75,8 +75,8 @@ header! { |header|
     W_CRC = 3: crc Whole = 0;
     /// Kernel layout stamp.
     W_LAYOUT = 4: layout Whole = LAYOUT_STAMP as usize;
-    /// u8 kind, u8 zero, u16 number of operations.
-    W_KIND = 5: kind Low = header.kind as usize, op_count High = header.ops.count;
+    /// u8 kind, u8 1 if ports follow the self-test, else 0, u16 number of operations.
+    W_KIND = 5: kind Low = header.kind as usize | usize::from(header.has_ports) << 8, op_count High = header.ops.count;
     /// Offset of the operation records.
     W_OPS = 6: ops Whole = header.ops.offset as usize;
     /// u16 observation length, u16 action length.
@@ -162,6 +162,8 @@ impl Kind {
 pub struct Header {
     /// The meaning of the output.
     pub kind: Kind,
+    /// Ports follow the self-test.
+    pub has_ports: bool,
     /// Length of an observation.
     pub obs_len: usize,
     /// Length of an action.

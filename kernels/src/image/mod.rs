@@ -13,6 +13,7 @@ mod info;
 mod matrix;
 pub mod op;
 mod playback;
+mod ports;
 mod proof;
 mod region;
 mod text;
@@ -37,6 +38,7 @@ pub use op::OpRecord;
 pub use op::{Op, OpKind};
 #[cfg(feature = "writer")]
 pub use playback::kept_words;
+pub use ports::{Port, PortKind};
 #[cfg(feature = "writer")]
 pub use proof::{largest_sum_bound, worst_case};
 pub use region::Region;

@@ -79,12 +79,14 @@ impl OpKind {
         matches!(self, Self::Table | Self::Denoise)
     }
 
-    /// Returns `true` for the operations around a network ([`crate::ops::around`]).
+    /// Returns `true` for the operations around a network ([`crate::ops::around`]). A build without them has none.
+    #[inline(always)]
     pub(crate) fn is_around(self) -> bool {
-        matches!(
-            self,
-            Self::Select | Self::Clip | Self::Constant | Self::Start | Self::Row | Self::Stand | Self::History
-        )
+        cfg!(feature = "around")
+            && matches!(
+                self,
+                Self::Select | Self::Clip | Self::Constant | Self::Start | Self::Row | Self::Stand | Self::History
+            )
     }
 
     #[cfg(feature = "writer")]
@@ -399,6 +401,11 @@ impl<'a> Image<'a> {
         }
     }
 
+    /// Returns `true` if the image has operations around its network: then firmware needs the crate's feature `around`.
+    pub fn has_around(&self) -> bool {
+        (0..self.op_count()).any(|i| self.op(i).is_ok_and(|op| op.kind.is_around()))
+    }
+
     /// Returns the values of noise that an evaluation takes; 0 for a policy without noise.
     pub fn noise_len(&self) -> usize {
         self.noise().len
@@ -415,6 +422,9 @@ impl<'a> Image<'a> {
         let [head, places, lengths, data] = op.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
         let form = FORMS.get(usize::from(code).wrapping_sub(1)).ok_or(ImageError::Op)?;
+        if !cfg!(feature = "around") && code >= SELECT {
+            return Err(ImageError::Op);
+        }
         let [mut src, third] = [form.uses.src, form.uses.third].map(|times| len * usize::from(times));
         let mut third = Region { offset: high(lengths), len: third };
         let kind = match form.kind {

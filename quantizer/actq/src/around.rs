@@ -1,9 +1,24 @@
 //! What an image computes around its network.
 
+use actq_kernels::PortKind;
+
 use crate::graph::lowering::{Buffer, BufferId, Slice, Step};
 
 /// The buffer that stands for the network's output in [`Around::after`].
 pub const OUTPUT: BufferId = BufferId::MAX;
+
+/// A raw input, or targets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedPort {
+    /// What it is.
+    pub kind: PortKind,
+    /// Its name.
+    pub name: String,
+    /// Number of values.
+    pub len: usize,
+    /// Lowest and highest value that a step accepts; infinite for no limit.
+    pub range: [f32; 2],
+}
 
 /// The operations around a network, over buffers. Buffer 0 holds the raw values, which the caller writes.
 #[derive(Clone, Debug)]
@@ -18,6 +33,8 @@ pub struct Around {
     pub after: Vec<Step<Slice>>,
     /// Buffer of the action, which the image returns.
     pub action: BufferId,
+    /// Raw inputs in the order of the raw values, then targets in the order of the action.
+    pub ports: Vec<NamedPort>,
 }
 
 impl Around {

@@ -3,9 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use actq::data::Dataset;
 use actq::error::{Context as _, Result, ensure};
 use actq::import::Importer;
 use actq::policy::Policy;
+use ndarray::Array3;
 use sha2::{Digest as _, Sha256};
 
 use crate::bundle::Bundle;
@@ -13,6 +15,7 @@ use crate::compile::Deployment;
 use crate::description::Description;
 use crate::plan::Plan;
 use crate::reading::DESCRIPTION;
+use crate::run::Runner;
 
 /// Importer of folders with a `deploy.toml`, as `actq import` writes them.
 #[derive(Clone, Copy, Debug)]
@@ -65,4 +68,39 @@ impl Deployment {
         found.policy.dir = path.to_owned();
         Ok(found)
     }
+}
+
+/// Makes a recording of what the networks of a folder read, of a recording of raw values; each episode begins with a
+/// reset. The actions that are fed back are those of the f32 networks.
+///
+/// # Errors
+///
+/// If the folder cannot be read, or the recording's values are not its raw values.
+pub fn observed(folder: &Path, raw: &Dataset) -> Result<Dataset> {
+    let bundle = Bundle::open(folder)?;
+    let description = Description::parse(&bundle.text(DESCRIPTION)?).context(DESCRIPTION)?;
+    let plan = Plan::new(&description, &bundle).context(DESCRIPTION)?;
+    let columns = Deployment::new(&description.name, description.rate_hz as f32, &plan)?.columns;
+    let lens: Vec<usize> = plan.inputs().iter().map(|(_, len)| *len).collect();
+    let (len, given) = (lens.iter().sum::<usize>(), raw.obs.dim().2);
+    ensure!(given == len, "{}: it has {given} values a step, and the raw inputs {len}", raw.path.display());
+    let mut runner = Runner::new(plan);
+    let mut obs = Array3::zeros((raw.length.len(), raw.obs.dim().1, columns.len()));
+    for (episode, steps) in raw.length.iter().enumerate() {
+        runner.reset();
+        for (step, values) in raw.episode(episode).into_iter().take(*steps).enumerate() {
+            let mut rest = &values[..];
+            let mut inputs = Vec::new();
+            for len in &lens {
+                let (input, after) = rest.split_at(*len);
+                inputs.push(input.iter().map(|value| f64::from(*value)).collect());
+                rest = after;
+            }
+            let tick = runner.step(&inputs);
+            for (i, column) in columns.iter().enumerate() {
+                obs[[episode, step, i]] = tick.observation[*column] as f32;
+            }
+        }
+    }
+    Ok(Dataset { path: raw.path.clone(), obs, action: None, length: raw.length.clone(), state: None })
 }

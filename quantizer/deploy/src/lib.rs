@@ -27,7 +27,7 @@ pub use bundle::Bundle;
 pub use compile::Deployment;
 pub use conventions::{Variant, variants};
 pub use facts::{Answers, Question};
-pub use importer::DeployFolder;
+pub use importer::{DeployFolder, observed};
 pub use label::Label;
 pub use plan::Plan;
 pub use reading::{DESCRIPTION, Reading, read};

@@ -42,14 +42,14 @@ impl Raw {
         self.arrays.keys().map(String::as_str).filter(move |name| !known(name))
     }
 
-    /// Returns the raw inputs of each tick, in the plan's order.
+    /// Returns the raw inputs of each tick, in the order of `inputs`: names and lengths, as [`Plan::inputs`].
     ///
     /// # Errors
     ///
     /// If an input has no array, or one of another length.
-    pub fn frames(&self, plan: &Plan) -> Result<Vec<Vec<Vec<f64>>>> {
-        let mut frames = vec![Vec::with_capacity(plan.inputs.len()); self.ticks];
-        for (name, len) in &plan.inputs {
+    pub fn frames(&self, inputs: &[(String, usize)]) -> Result<Vec<Vec<Vec<f64>>>> {
+        let mut frames = vec![Vec::with_capacity(inputs.len()); self.ticks];
+        for (name, len) in inputs {
             let array = self.arrays.get(name).with_context(|| {
                 let all = self.arrays.keys().cloned().collect::<Vec<_>>().join(", ");
                 format!("there is no raw array {name:?}; there are {all}")
@@ -69,7 +69,7 @@ impl Raw {
     ///
     /// If an input is missing or has another length.
     pub fn run(&self, plan: Plan) -> Result<Vec<Tick>> {
-        let frames = self.frames(&plan)?;
+        let frames = self.frames(&plan.inputs)?;
         let mut runner = Runner::new(plan);
         Ok(frames.iter().map(|frame| runner.step(frame)).collect())
     }
@@ -148,7 +148,7 @@ impl Reference {
 
     /// Compares, up to the first difference only if `first` is `true`.
     fn run(&self, plan: Plan, first: bool) -> Result<Comparison> {
-        let frames = self.raw.frames(&plan)?;
+        let frames = self.raw.frames(&plan.inputs)?;
         let observation_labels: Vec<String> = plan.observation_labels().iter().map(ToString::to_string).collect();
         let largest = |array: &Array| array.values.iter().fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()));
         let scales: BTreeMap<_, _> = self.expected.iter().map(|(kind, array)| (*kind, largest(array))).collect();
@@ -198,7 +198,7 @@ pub fn explain(description: &Description, sources: &dyn Sources, reference: &Ref
         let compared = Plan::new(&variant.description, sources).and_then(|plan| reference.run(plan, true));
         compared.is_ok_and(|comparison| comparison.first.is_none())
     };
-    reference.raw.frames(&Plan::new(description, sources)?)?;
+    reference.raw.frames(&Plan::new(description, sources)?.inputs)?;
     Ok(variants(description).into_iter().filter(agrees).map(|variant| variant.convention).collect())
 }
 

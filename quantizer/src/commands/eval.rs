@@ -3,7 +3,7 @@
 use actq::data::{Range, Recording, Sizes, files_of};
 use actq::measure::{eval, own};
 use actq::runtime::ImageBuffer;
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 
 use crate::args::EvalArgs;
 use crate::importers::load;
@@ -14,6 +14,11 @@ use crate::terminal::{Progress, note, print};
 pub(crate) fn run(args: &EvalArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
+    ensure!(
+        !image.has_around(),
+        "{}: it takes raw inputs; compare it with a reference by `actq check`",
+        args.image.display()
+    );
     let policy = args.policy.as_deref();
     let driven = files_of(&args.driven)?;
     let _progress = Progress::new(args.quiet, "running the image over the recordings")?;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use actq::budget::{Budget, TimeLimit};
-use actq::data::{Learned, Recording, Recordings, Sizes, driven_by, files_of};
+use actq::data::{Recording, Recordings, Sizes, driven_by, files_of};
 use actq::measure::{check, own};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::stats::Stats;
@@ -13,7 +13,7 @@ use actq_kernels::Width;
 use anyhow::{Result, bail};
 
 use crate::args::{ActivationArg, QuantizeArgs};
-use crate::importers::{load, policy_files};
+use crate::importers::{learned as learned_from, load, policy_files};
 use crate::report::learned::learned;
 use crate::report::{notes, quantized, time};
 use crate::terminal::{Progress, note, print, reserve};
@@ -39,7 +39,7 @@ pub fn run(
     let options = options(args, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }));
     options.check()?;
     check_budget(&source, &options)?;
-    let (calib, shares) = Learned::load(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
+    let (calib, shares) = learned_from(&args.policy_dir, &source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
     let shares = shares.unwrap_or_default();
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
     let recordings = Recordings { calib, heldout };

@@ -19,8 +19,9 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     let image = buffer.image(&args.image)?;
     let (input, output) = (io::stdin().lock(), io::stdout().lock());
     let Some(path) = &args.record else { return serve(image, input, output, |_| {}) };
-    let source = source(args, &image)?;
-    if source.is_none() {
+    // An action of raw values has no label: `actq quantize` makes the networks' observations of them.
+    let source = if image.has_around() { None } else { source(args, &image)? };
+    if source.is_none() && !image.has_around() {
         note([
             "the image's folder does not hold the policy that the image was made from, so the recording gets no array \
                \"action\" (quantize and eval then compute it); pass the policy folder to --policy"

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use actq::data::{Learned, Recording, Recordings, Sizes, files_of};
+use actq::data::{Recording, Recordings, Sizes, files_of};
 use actq::methods::Method;
 use actq::pipeline::sweep::{self, SweepPlan};
 use anyhow::{Result, ensure};
 
 use crate::args::SweepArgs;
-use crate::importers::{load, policy_files};
+use crate::importers::{learned, load, policy_files};
 use crate::report::{self, notes};
 use crate::terminal::{Progress, note, print, reserve};
 use crate::threads::start_threads;
@@ -32,7 +32,7 @@ pub fn run(args: &SweepArgs, methods: &[Method]) -> Result<()> {
     let mut sweeps = Vec::new();
     for (p, policy) in policies.iter().enumerate() {
         let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));
-        let calib = Learned::load(policy, &calib)?.map(|learned| learned.dataset);
+        let calib = learned(&policy.dir, policy, &calib)?.map(|learned| learned.dataset);
         let heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
         let recordings = Recordings { calib, heldout: Some(heldout) };
         note(notes::of_recordings(&recordings));

@@ -27,6 +27,12 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     let outputs = reserve(&outputs, &inputs)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
     let policy = load(&args.policy_dir)?;
+    ensure!(
+        policy.around.is_none(),
+        "{}: rounds with a deploy.toml are not supported yet; record by `actq serve --record`, and pass the recordings to \
+         `actq quantize --calib`",
+        args.policy_dir.display()
+    );
     let sizes = Sizes::of(&policy);
     if calib.is_empty() {
         calib.extend(Recording::Calib.find(&args.policy_dir)?);

@@ -1,6 +1,9 @@
 //! Reports on an imported deploy bundle.
 
-use actq_deploy::{Comparison, Question, Reading};
+use std::ops::Range;
+
+use actq::text::printable;
+use actq_deploy::{Array, Comparison, Question, Reading};
 
 use super::table::table;
 
@@ -49,4 +52,50 @@ pub fn agreement(comparison: &Comparison) -> String {
         comparison.ticks,
         largest.join(", ")
     )
+}
+
+/// Error of a target over a reference.
+pub(crate) struct Target {
+    name: String,
+    /// Squared error over variance, mean over the values that vary.
+    pub(crate) nmse: f64,
+    largest: f64,
+    /// Tick and value of the largest error.
+    at: [usize; 2],
+}
+
+impl Target {
+    /// Compares the values `place` of each tick.
+    pub(crate) fn new(name: &str, place: Range<usize>, found: &[Vec<f32>], expected: &Array) -> Self {
+        let row = expected.values.len() / found.len().max(1);
+        let (mut largest, mut at) = (0.0, [0, 0]);
+        let (mut sum, mut count) = (0.0, 0);
+        for value in place.clone() {
+            let of = |tick: usize| expected.values[tick * row + value];
+            let mean = (0..found.len()).map(of).sum::<f64>() / found.len() as f64;
+            let (mut energy, mut error) = (0.0, 0.0);
+            for (tick, found) in found.iter().enumerate() {
+                let difference = (f64::from(found[value]) - of(tick)).abs();
+                energy += (of(tick) - mean).powi(2);
+                error += difference.powi(2);
+                if difference > largest {
+                    (largest, at) = (difference, [tick, value - place.start]);
+                }
+            }
+            if energy > 0.0 {
+                (sum, count) = (sum + error / energy, count + 1);
+            }
+        }
+        Self { name: name.to_owned(), nmse: sum / f64::from(count.max(1)), largest, at }
+    }
+}
+
+/// Formats the errors of targets.
+pub(crate) fn targets(targets: &[Target], ticks: usize) -> String {
+    let mut rows = table(&["target", "nmse", "largest error", "at tick", "value"]);
+    for Target { name, nmse, largest, at: [tick, value] } in targets {
+        let cells = [printable(name).to_string(), format!("{nmse:.3e}"), format!("{largest:.4}")];
+        rows.add_row(cells.into_iter().chain([tick.to_string(), value.to_string()]));
+    }
+    format!("{rows}\n\n{ticks} ticks; nmse: squared error / variance of the expected target, mean over values\n")
 }

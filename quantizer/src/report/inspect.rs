@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use actq::graph::ops::Balance;
 use actq::measure::size::{bits_per_weight, hex};
 use actq::text::printable;
-use actq_kernels::Image;
 use actq_kernels::image::Matrix;
 use actq_kernels::image::{Kind, Op, OpKind, Region};
+use actq_kernels::{Image, PortKind};
 
 use super::memory::{Peak, peak};
 use super::table::{group_name, table};
@@ -42,6 +42,18 @@ pub fn report(image: &Image<'_>) -> String {
     let _ = writeln!(text, "source        sha256 {digest}");
     let _ = writeln!(text, "image         {} bytes, crc32 {:08x}", image.bytes(), image.crc());
     let _ = writeln!(text, "kind          {kind}, {obs} observations -> {act} actions at {rate} Hz");
+    for port in image.ports() {
+        let what = match port.kind {
+            PortKind::Input => "input",
+            PortKind::Position => "positions",
+            PortKind::Velocity => "velocities",
+            PortKind::Torque => "torques",
+            _ => "output",
+        };
+        let [low, high] = port.range;
+        let range = if low.is_finite() || high.is_finite() { format!(", {low} to {high}") } else { String::new() };
+        let _ = writeln!(text, "{what:13} {} ({} values{range})", printable(port.name), port.len);
+    }
     let playback = playback(image);
     if !playback.is_empty() {
         let _ = writeln!(text, "playback      {}", playback.join(", "));
@@ -102,6 +114,7 @@ fn row(op: &Op<'_>) -> Vec<String> {
             format!("{}x{}{}", matrix.rows, matrix.cols, if accumulate { " added" } else { "" })
         }
         (OpKind::RmsNorm, _) if op.constant(0) == Balance::FREE_EPS => "factors, by the quantizer".into(),
+        (OpKind::History, _) => format!("{} frames", op.dst().len / op.src().len.max(1)),
         (kind, _) if kind.label().is_empty() => String::new(),
         (kind, _) => {
             let constants: String = op.constants().map(|constant| format!(" {constant}")).collect();

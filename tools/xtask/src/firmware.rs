@@ -94,8 +94,9 @@ impl Options {
                 let check = |image: &Path| check(image, &limits, application, target);
                 let given = image.as_deref().map(check).transpose()?;
                 setup::rust_target(target.triple())?;
-                let image = given.map_or_else(|| check(&example()?), Ok)?;
-                let elf = build(target, &image, &limits, features.as_deref(), key.as_deref())?;
+                let (image, has_around) = given.map_or_else(|| check(&example()?), Ok)?;
+                let features = [features.as_deref(), has_around.then_some("around")];
+                let elf = build(target, &image, &limits, &features, key.as_deref())?;
                 write(&out, &elf)?;
                 println!("{}: {} with {}", out.display(), target.board().name, image.display());
             }
@@ -124,9 +125,9 @@ fn check_out(out: &Path, image: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// Returns the whole path of an image that the board's application runs with these limits; an error tells why it
-/// does not.
-fn check(path: &Path, limits: &[Limits], application: Application, target: Target) -> Result<PathBuf> {
+/// Returns the whole path of an image that the board's application runs with these limits, and whether it has
+/// operations around its network; an error tells why the application does not run it.
+fn check(path: &Path, limits: &[Limits], application: Application, target: Target) -> Result<(PathBuf, bool)> {
     let bytes = fs::read(path).with_context(|| format!("cannot read the image {}", path.display()))?;
     // Words, because an image must be aligned to 4 bytes.
     let mut words = vec![0u32; bytes.len().div_ceil(4)];
@@ -149,7 +150,7 @@ fn check(path: &Path, limits: &[Limits], application: Application, target: Targe
             still.join(", ")
         );
     }
-    fs::canonicalize(path).with_context(|| path.display().to_string())
+    Ok((fs::canonicalize(path).with_context(|| path.display().to_string())?, image.has_around()))
 }
 
 /// Makes the image of the UR3 policy: rounded, which takes a second.
@@ -181,15 +182,15 @@ fn build(
     target: Target,
     image: &Path,
     limits: &[Limits],
-    features: Option<&str>,
+    features: &[Option<&str>],
     key: Option<&str>,
 ) -> Result<Vec<u8>> {
     let name = target.board().name;
     // A folder of its own: cargo uses the same names for all boards of a triple, and two builds may run at a time. A
     // cargo that knows the variable (1.91) shares the intermediate files.
     let folder = target_dir().join("boards").join(name);
-    let features = [Some(name), features, key.map(|_| "signed")];
-    let features = features.into_iter().flatten().collect::<Vec<_>>().join(",");
+    let features = [Some(name), key.map(|_| "signed")].iter().chain(features).flatten().copied().collect::<Vec<_>>();
+    let features = features.join(",");
     let mut command = cargo();
     if let Some(key) = key {
         command.env("ACTQ_PUBLIC_KEY", key);

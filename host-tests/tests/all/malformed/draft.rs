@@ -102,8 +102,13 @@ pub(super) type Case = (&'static str, E, Change);
 
 /// Applies every case to the valid image, updates the checksum, and reports all cases that are not refused as expected.
 pub(super) fn refused(cases: &[Case]) {
+    refused_of(&VALID, cases);
+}
+
+/// Changes a valid image in each of these ways, and asserts each error.
+pub(super) fn refused_of(valid: &Draft, cases: &[Case]) {
     let wrong = cases.iter().filter_map(|(name, expected, change)| {
-        let mut draft = VALID.clone();
+        let mut draft = valid.clone();
         change(&mut draft);
         draft.seal();
         let got = draft.check().err();

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use actq_kernels::image::{
-    BlockRecord, Header, Kind, MatrixRecord, OpKind, OpRecord, Records, Region, half_words, header as h, quarter_words,
-    seal,
+    BlockRecord, Header, Kind, MatrixRecord, OpKind, OpRecord, Port, PortKind, Records, Region, half_words,
+    header as h, quarter_words, seal,
 };
 use actq_kernels::layout::{self, BlockShape};
 
 use super::lower::lower;
-use crate::around::Around;
+use crate::around::{Around, NamedPort};
 use crate::contract::ActionContract;
 use crate::error::{Context, Result, ensure};
 use crate::graph::lowering::{Step, StepData};
@@ -173,8 +173,11 @@ impl Writer {
             self.push_floats(observation);
             self.push_floats(&vec![0.0; policy.act_len]);
         }
+        let ports = around.map(|around| &around.ports[..]).unwrap_or_default();
+        self.ports(ports)?;
         let header = Header {
             kind: policy.kind,
+            has_ports: !ports.is_empty(),
             obs_len,
             act_len: policy.act_len,
             chunk: policy.chunk,
@@ -202,6 +205,25 @@ impl Writer {
         };
         self.words[..h::WORDS].copy_from_slice(&header.emit()?);
         Ok(Draft { words: self.words, self_test: self_test as usize, observations })
+    }
+
+    /// Appends raw inputs and targets.
+    fn ports(&mut self, ports: &[NamedPort]) -> Result<()> {
+        if ports.is_empty() {
+            return Ok(());
+        }
+        let inputs = ports.iter().filter(|port| port.kind == PortKind::Input).count();
+        let mut records = vec![(inputs | (ports.len() - inputs) << 16) as u32];
+        let mut name = self.words.len() as u32 + 1 + 4 * ports.len() as u32;
+        for NamedPort { kind, name: text, len, range } in ports {
+            records.extend(Port { kind: *kind, name: text, len: *len, range: *range }.emit(name)?);
+            name += text.len().div_ceil(4) as u32;
+        }
+        self.push(records);
+        for port in ports {
+            self.push_bytes(port.name.as_bytes());
+        }
+        Ok(())
     }
 
     /// Appends words and returns their offset.

@@ -1,15 +1,16 @@
 //! The operations around the joined network, value by value.
 
-use actq::around::{Around, OUTPUT};
+use actq::around::{Around, NamedPort, OUTPUT};
 use actq::error::{Context as _, Result, ensure};
 use actq::graph::lowering::{Lifetime, Slice, StepData};
+use actq_kernels::PortKind;
 use actq_kernels::image::OpKind;
 
 use super::chain::Chain;
 use super::joined::{Joined, Source, has_weights, part};
 use super::operations::{Operations, words};
 use super::{Output, clock};
-use crate::description::{Clock, End, When};
+use crate::description::{Clock, End, TargetKind, When};
 use crate::plan::{Feed, Maker, Plan, Slot, Step};
 use crate::sources::Array;
 
@@ -91,7 +92,14 @@ impl Compiler<'_> {
         self.advance()?;
         let [before, after] = std::mem::take(&mut self.to.steps);
         let buffers = std::mem::take(&mut self.to.buffers);
-        Ok(Around { buffers, before, observation: observation.buffer, after, action: action.buffer })
+        Ok(Around {
+            buffers,
+            before,
+            observation: observation.buffer,
+            after,
+            action: action.buffer,
+            ports: ports(plan),
+        })
     }
 
     /// Moves every state to its value of the next tick.
@@ -284,6 +292,25 @@ impl Compiler<'_> {
         }
         Ok(operands)
     }
+}
+
+/// Lists raw inputs and targets.
+fn ports(plan: &Plan) -> Vec<NamedPort> {
+    let input = |(i, (name, len)): (usize, &(String, usize))| {
+        let range = plan.ranges[i].map_or([f32::NEG_INFINITY, f32::INFINITY], |range| range.map(|limit| limit as f32));
+        NamedPort { kind: PortKind::Input, name: name.clone(), len: *len, range }
+    };
+    let target = |(kind, slot): &(TargetKind, Slot)| {
+        let labels = &plan.values[*slot].labels;
+        let kind = match kind {
+            TargetKind::Position => PortKind::Position,
+            TargetKind::Velocity => PortKind::Velocity,
+            TargetKind::Torque => PortKind::Torque,
+        };
+        let name = plan.names[*slot].clone();
+        NamedPort { kind, name, len: labels.len(), range: [f32::NEG_INFINITY, f32::INFINITY] }
+    };
+    plan.inputs.iter().enumerate().map(input).chain(plan.targets.iter().map(target)).collect()
 }
 
 fn find(places: &[(Output, Slice)], output: Output) -> Option<Slice> {

@@ -43,6 +43,8 @@ impl Plan {
                 networks: Vec::new(),
                 states: Vec::new(),
                 inputs: Vec::new(),
+                ranges: Vec::new(),
+                names: Vec::new(),
                 order: Vec::new(),
                 action: 0,
                 targets: Vec::new(),
@@ -92,6 +94,7 @@ impl Builder<'_> {
             }
             let labels = labels(&input.name, len, joints);
             self.plan.inputs.push((input.name.clone(), len));
+            self.plan.ranges.push(input.range);
             self.add(&input.name, Maker::Input(i), labels, input.joints.clone())?;
         }
         for (i, state) in description.states.iter().enumerate() {
@@ -158,6 +161,7 @@ impl Builder<'_> {
         ensure!(self.in_all <= MOST_IN_ALL, "{name:?}: with it there are more than {MOST_IN_ALL} values");
         let slot = self.plan.values.len();
         self.plan.values.push(Planned { maker, labels, joints });
+        self.plan.names.push(name.to_owned());
         self.values.insert(name.to_owned(), slot);
         self.plan.order.push(Work::Make(slot));
         Ok(slot)

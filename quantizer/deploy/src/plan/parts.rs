@@ -68,6 +68,10 @@ pub struct Plan {
     pub(crate) states: Vec<PlannedState>,
     /// Raw inputs with their lengths.
     pub(crate) inputs: Vec<(String, usize)>,
+    /// Lowest and highest value of each raw input, if they are given.
+    pub(crate) ranges: Vec<Option<[f64; 2]>>,
+    /// Name of each value.
+    pub(crate) names: Vec<String>,
     pub(crate) order: Vec<Work>,
     pub(crate) action: Slot,
     pub(crate) targets: Vec<(TargetKind, Slot)>,

@@ -174,6 +174,8 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
             Feature::value(op::LSTM_CELL),
             Feature::value(op::GRU_CELL),
             Feature::value(op::DENOISE),
+            // Only the first step after a reset writes the values.
+            Feature::value(op::START),
             Feature::LIMITED,
             Feature::CONTRACT,
             Feature::PREDICTED_VALUE,

@@ -1,8 +1,10 @@
 //! The measured images: many shapes of every operation.
 
+use actq::around::{Around, OUTPUT};
 use actq::contract::{Ensemble, Playback};
 use actq::emit;
 use actq::error::bail;
+use actq::graph::lowering::{Buffer, Lifetime, Slice, Step, StepData};
 use actq::graph::ops::{Add, Concat, Gru, Iterate, Lstm, Normalize, Span, Table};
 use actq::graph::syntax::Keys;
 use actq::graph::{Denoising, NodeKind, ValueId};
@@ -10,7 +12,7 @@ use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq_bench::networks::{Builder, accumulating};
 use actq_kernels::Width;
-use actq_kernels::image::Kind;
+use actq_kernels::image::{Kind, OpKind};
 use actq_kernels::ops::denoise::Coefficients;
 use anyhow::{Context as _, Result};
 
@@ -66,7 +68,56 @@ pub(super) fn images() -> Result<Vec<(String, Vec<u8>)>> {
     }
     let name = "added biases";
     images.push((name.to_owned(), accumulating(&builder.image(name)?)?));
+    images.push(around()?);
     Ok(images)
+}
+
+/// Operations around a network, each of every length.
+fn around() -> Result<(String, Vec<u8>)> {
+    let name = "operations around a network";
+    let mut builder = Builder::new(8);
+    builder.linear((8, 8), Activations::Int8, |_| Some(Width::W2), 0, true)?;
+    let (policy, outcomes) = builder.finish(name.to_owned(), false);
+    let mut buffers = vec![Buffer { len: OBSERVATION, lifetime: Lifetime::Observation }];
+    let mut before = Vec::new();
+    let mut value = |len: usize, lifetime| {
+        buffers.push(Buffer { len, lifetime });
+        Slice { buffer: buffers.len() - 1, offset: 0, len }
+    };
+    let mut add = |kind, dst, src, third, data| before.push(Step { kind, dst, src, third, data });
+    let pair = |low: usize, high: usize| (low | high << 16) as u32;
+    // Above the square of every vector's norm.
+    let never_moves = 1e12f32.to_bits();
+    for len in LENGTHS {
+        let raw = Slice { buffer: 0, offset: 0, len };
+        let dst = value(len, Lifetime::Step);
+        let places = (0..len.div_ceil(2)).map(|i| pair(len - 1 - 2 * i, len.saturating_sub(2 * i + 2)));
+        let data = [pair(len, 0)].into_iter().chain(places).collect();
+        add(OpKind::Select, dst, Some(raw), None, StepData::Words(data));
+        let limits = [-0.5, 0.5].map(|limit| {
+            let dst = value(len, Lifetime::Step);
+            add(OpKind::Constant, dst, None, None, StepData::Constants(vec![limit; len]));
+            dst
+        });
+        add(OpKind::Clip, dst, Some(limits[0]), Some(limits[1]), StepData::None);
+        let (kept, count) = (value(len, Lifetime::State), value(1, Lifetime::State));
+        add(OpKind::Start, kept, None, Some(count), StepData::Constants(vec![0.25; len]));
+        let (row, count) = (value(len, Lifetime::Step), value(1, Lifetime::State));
+        let rows = [pair(3, 0), pair(1, 0)].into_iter().chain((0..3 * len as u32).map(|i| (i as f32).to_bits()));
+        add(OpKind::Row, row, None, Some(count), StepData::Words(rows.collect()));
+        let at = [pair(len, 1), never_moves].into_iter().chain(vec![0; len]).chain([pair(len, 0)]);
+        add(OpKind::Stand, row, Some(raw), Some(count), StepData::Words(at.collect()));
+        let (frames, ring) = (value(3 * len, Lifetime::Step), value(4 * len + 1, Lifetime::State));
+        let sizes = [pair(len, 4), pair(3, 2), pair(0, 0)];
+        add(OpKind::History, frames, Some(raw), Some(ring), StepData::Words(sizes.to_vec()));
+    }
+    let [observation, action] = [8, 8].map(|len| value(len, Lifetime::Step));
+    add(OpKind::Copy, observation, Some(Slice { buffer: 0, offset: 0, len: 8 }), None, StepData::None);
+    let output = Slice { buffer: OUTPUT, ..action };
+    let after = vec![Step { kind: OpKind::Copy, dst: action, src: Some(output), third: None, data: StepData::None }];
+    let around =
+        Around { buffers, before, observation: observation.buffer, after, action: action.buffer, ports: Vec::new() };
+    Ok((name.to_owned(), emit::image_around(&policy, &outcomes, &around)?))
 }
 
 /// Ops of policy.json with shapes of their own. All others are measured with [`LENGTHS`], so that a new one needs no

@@ -1,0 +1,107 @@
+//! The raw inputs and the targets of an image with operations around its network: names, lengths and ranges. The section
+//! follows the self-test vector.
+
+use super::text::is_text;
+use super::view::Image;
+#[cfg(feature = "writer")]
+use super::words::{TooLarge, halves};
+use super::words::{high, low, record, section, word};
+
+/// Words of a port's record.
+const PORT_WORDS: usize = 4;
+
+/// What a port is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum PortKind {
+    /// A raw input.
+    Input = 0,
+    /// Targets of joint positions, in rad or m.
+    Position = 1,
+    /// Targets of joint velocities, in rad/s or m/s.
+    Velocity = 2,
+    /// Targets of joint torques, in N m, or forces, in N.
+    Torque = 3,
+}
+
+impl PortKind {
+    /// All kinds, by number.
+    pub const ALL: [Self; 4] = [Self::Input, Self::Position, Self::Velocity, Self::Torque];
+}
+
+/// A raw input, or targets: values that follow each other in the observation, or in the action.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Port<'a> {
+    /// What it is.
+    pub kind: PortKind,
+    /// Its name.
+    pub name: &'a str,
+    /// Number of values.
+    pub len: usize,
+    /// Lowest and highest value that a step accepts; infinite for no limit.
+    pub range: [f32; 2],
+}
+
+#[cfg(feature = "writer")]
+impl Port<'_> {
+    /// Returns the record's words, with the offset of the name.
+    ///
+    /// # Errors
+    ///
+    /// [`TooLarge`] if a length does not fit its field.
+    pub fn emit(&self, name: u32) -> Result<[u32; PORT_WORDS], TooLarge> {
+        let bytes = u8::try_from(self.name.len()).map_err(|_| TooLarge(self.name.len()))?;
+        let [low, high] = self.range.map(f32::to_bits);
+        Ok([halves(self.len, self.kind as usize | usize::from(bytes) << 8)?, low, high, name])
+    }
+}
+
+impl<'a> Image<'a> {
+    /// Returns the raw inputs in the order of the observation, then the targets in the order of the action. None if the
+    /// image has no operations around its network, or this build does not run them.
+    pub fn ports(&self) -> impl Iterator<Item = Port<'a>> + use<'a> {
+        let image = *self;
+        let [inputs, outputs] = image.port_counts();
+        (0..inputs + outputs).map_while(move |i| image.port(i))
+    }
+
+    /// Returns the numbers of raw inputs and of targets.
+    pub(super) fn port_counts(&self) -> [usize; 2] {
+        let counts = if self.has_ports() { self.word(self.ports_at()) } else { 0 };
+        [low(counts), high(counts)]
+    }
+
+    /// Returns `true` if the image has this section.
+    #[inline(always)]
+    pub(super) fn has_ports(&self) -> bool {
+        cfg!(feature = "around") && self.header.kind() >> 8 != 0
+    }
+
+    /// Returns the section's offset.
+    pub(super) fn ports_at(&self) -> usize {
+        let steps = self.self_test_steps().wrapping_mul(self.obs_len() + self.act_len());
+        self.header.self_test().wrapping_add(steps)
+    }
+
+    /// Returns the offset and the length of a port's name, in words.
+    pub(super) fn port_name(&self, i: usize) -> [usize; 2] {
+        let at = self.ports_at().wrapping_add(1 + i * PORT_WORDS);
+        [word(self.words, at.wrapping_add(3)) as usize, (high(word(self.words, at)) >> 8).div_ceil(4)]
+    }
+
+    /// Returns the words of the section before the names.
+    pub(super) fn port_words(&self) -> usize {
+        1 + self.port_counts().iter().sum::<usize>() * PORT_WORDS
+    }
+
+    /// Reads a port; `None` if it is impossible, which a checked image excludes.
+    pub(super) fn port(&self, i: usize) -> Option<Port<'a>> {
+        let record = record::<PORT_WORDS>(self.words, self.ports_at().wrapping_add(1 + i * PORT_WORDS)).ok()?;
+        let [sizes, least, most, _] = record.map(u32::from_le);
+        let [name, words] = self.port_name(i);
+        let bytes = bytemuck::must_cast_slice(section(self.words, name, words)?).get(..high(sizes) >> 8)?;
+        let name = core::str::from_utf8(bytes).ok().filter(|_| is_text(bytes))?;
+        let kind = *PortKind::ALL.get(high(sizes) & 0xff)?;
+        Some(Port { kind, name, len: low(sizes), range: [least, most].map(f32::from_bits) })
+    }
+}
