@@ -57,7 +57,9 @@ impl Exact<'_> {
                 arena[op.dst().offset + row] = (sum + packed.bias(row)).to_bits();
             }
         }
-        Ok(arena[self.image.output().range()].iter().map(|word| f32::from_bits(*word)).collect())
+        let output = arena[self.image.output().range()].iter().map(|word| f32::from_bits(*word)).enumerate();
+        let limited = |(i, x): (usize, f32)| self.image.limits(i).map_or(x, |[low, high]| x.clamp(low, high));
+        Ok(output.map(limited).collect())
     }
 }
 
@@ -265,6 +267,7 @@ do = [{ scale = 0.25 }, { add = "default" }, { add = "q" }]
 [[target]]
 kind = "position"
 value = "target"
+limits = [-0.4, [0.3, 0.4, 0.5]]
 [[target]]
 kind = "velocity"
 value = "mixed"

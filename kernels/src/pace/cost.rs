@@ -169,6 +169,10 @@ pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
 fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
     add(values(op).1, len);
     rest(op, len % EIGHT, add);
+    if op.kind == OpKind::History {
+        add(Feature::FRAME, op.dst().len.checked_div(op.src().len).unwrap_or(0));
+    }
+    squared(op, add);
     if op.kind == OpKind::Denoise {
         let ([sample_x, sample_v, _, _, _, sigma, _], _) = op.coefficients(0);
         add(Feature::LIMITED, if [sample_x, sample_v] == [0.0; 2] { 0 } else { len });
@@ -188,6 +192,13 @@ fn rest(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
     }
 }
 
+/// Counts the values whose norm an operation computes, in each of its pieces.
+fn squared(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
+    if op.kind == OpKind::Stand {
+        add(Feature::SQUARED, op.src().len);
+    }
+}
+
 /// Counts the features of a piece of an operation's values, without those of each value.
 pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     // Each piece of a norm computes the results of the sums again.
@@ -195,11 +206,16 @@ pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
         add(values(op).0, 1);
     }
     rest(op, EIGHT - 1, add);
+    squared(op, add);
 }
 
 /// Counts the features of one value of an operation, in the denoising step with the highest cost.
 pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(values(op).1, 1);
+    if op.kind == OpKind::History {
+        // A frame may be one value long.
+        add(Feature::FRAME, 1);
+    }
     if op.kind == OpKind::Denoise {
         add(Feature::LIMITED, 1);
         add(Feature::NOISY, 1);

@@ -38,6 +38,8 @@ singles! {
     NOISY "a value of an iterate that noise is added to"
     DENOISED_REST "a value of an iterate after the last eight"
     NORMALIZED_REST "a value normalized after the last eight"
+    FRAME "a frame of a history"
+    SQUARED "a value whose norm decides whether the robot stands"
     POLL_OP "a call that runs one operation"
     POLL "a call that runs pieces"
     ENTERED "an operation that a poll enters"

@@ -33,6 +33,8 @@ pub struct Around {
     pub after: Vec<Step<Slice>>,
     /// Buffer of the action, which the image returns.
     pub action: BufferId,
+    /// Lowest and highest value of the action, if it has limits.
+    pub limits: Option<[Vec<f32>; 2]>,
     /// Raw inputs in the order of the raw values, then targets in the order of the action.
     pub ports: Vec<NamedPort>,
 }

@@ -63,6 +63,3 @@ fn columns(plan: &Plan, joined: &Joined) -> Result<Vec<usize>> {
     ensure!(!columns.is_empty(), "no network reads a value");
     Ok(columns)
 }
-
-/// Index of the outputs of networks: network, output.
-type Output = (usize, usize);

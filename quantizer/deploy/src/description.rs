@@ -387,6 +387,9 @@ pub struct Target {
     /// Order of its values: a list of `joints`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joints: Option<String>,
+    /// Lowest and highest value, which the image keeps and a controller needs to arm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<[Numbers; 2]>,
 }
 
 /// Kind of a target.

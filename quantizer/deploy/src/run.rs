@@ -93,8 +93,19 @@ impl Runner {
         Tick {
             observation: observations.concat(),
             action: self.values[self.plan.action].clone(),
-            targets: self.plan.targets.iter().map(|(kind, slot)| (*kind, self.values[*slot].clone())).collect(),
+            targets: self.targets(),
         }
+    }
+
+    fn targets(&self) -> Vec<(TargetKind, Vec<f64>)> {
+        let limited = |((kind, slot), limits): (&(TargetKind, usize), &Option<[Vec<f64>; 2]>)| {
+            let mut values = self.values[*slot].clone();
+            if let Some([low, high]) = limits {
+                values.iter_mut().zip(low.iter().zip(high)).for_each(|(x, (low, high))| *x = x.clamp(*low, *high));
+            }
+            (*kind, values)
+        };
+        self.plan.targets.iter().zip(&self.plan.limits).map(limited).collect()
     }
 
     fn make(&mut self, slot: usize, raw: &[Vec<f64>]) -> Vec<f64> {

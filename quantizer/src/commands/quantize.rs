@@ -44,7 +44,10 @@ pub fn run(
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
     let recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
-    note(notes::without_limits((0..source.act_len).map(|i| source.contract.limits(i))));
+    note(match &source.around {
+        Some(around) => notes::targets_without_limits(around),
+        None => notes::without_limits((0..source.act_len).map(|i| source.contract.limits(i))),
+    });
     let started = Instant::now();
     start_threads(args.run.threads)?;
     progress.begin("calibrating");

@@ -1,5 +1,6 @@
 //! The error summary, notes and warnings.
 
+use actq::around::Around;
 use actq::budget::Budget;
 use actq::data::{Dataset, Range, Recordings, runs};
 use actq::measure::check::{Check, Checked};
@@ -47,6 +48,20 @@ pub fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Opt
         format!(
             "no finite limits for actions {}: a motor controller refuses to arm without limits; set low and high of action in \
              policy.json, or build the firmware by cargo xtask firmware --limits LOW:HIGH",
+            runs(&without)
+        )
+    })
+}
+
+/// Returns a note if a target of a description has no limits.
+pub fn targets_without_limits(around: &Around) -> Option<String> {
+    let is_limited =
+        |i: usize| around.limits.as_ref().is_some_and(|[low, high]| low[i] > f32::MIN && high[i] < f32::MAX);
+    let without: Vec<usize> = (0..around.action_len()).filter(|i| !is_limited(*i)).collect();
+    (!without.is_empty()).then(|| {
+        format!(
+            "no finite limits for targets {}: a motor controller refuses to arm without limits; add limits = [LOW, HIGH] to [[target]] \
+             in deploy.toml, or build the firmware by cargo xtask firmware --limits LOW:HIGH",
             runs(&without)
         )
     })

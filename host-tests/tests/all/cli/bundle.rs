@@ -105,7 +105,7 @@ fn a_bundle_without_answers_is_asked_about_and_nothing_is_written() -> Result<()
 }
 
 #[test]
-fn a_bundle_becomes_a_description_a_policy_and_an_image() -> Result<()> {
+fn a_bundle_becomes_a_description_and_an_image() -> Result<()> {
     let robot = Robot::new(YAML)?;
     expect(&robot.path("expect.npz"), false)?;
     let (raw, image) = (text(&robot.path("raw.npz")), text(&robot.path("head.actq")));
@@ -123,10 +123,28 @@ fn a_bundle_becomes_a_description_a_policy_and_an_image() -> Result<()> {
     ensure!(without_comments(description("out")?) == without_comments(description("again")?), "it changed");
 
     let calib = arrays(&robot.path("out/calib.npz"))?;
-    ensure!(calib["obs"].shape == [1, TICKS, 8] && calib["action"].shape == [1, TICKS, 2]);
-    let policy = fs::read_to_string(robot.path("out/policy.json"))?;
-    ensure!(policy.contains("\"control_hz\": 100.0"), "{policy}");
+    ensure!(calib["obs"].shape == [1, TICKS, 8]);
     succeeded(&run(actq(&["quantize", &out, "--method", "rtn", "--bits", "8", "--out", &image]), b"")?)?;
+    let inspected = succeeded(&run(actq(&["inspect", &image]), b"")?)?;
+    for part in ["100 Hz", "input         joint_pos (2 values)", "positions     target (2 values)", "2 frames"] {
+        ensure!(inspected.contains(part), "{part} is not in\n{inspected}");
+    }
+    let check = ["check", &image, "--reference", &reference, "--max-nmse"];
+    let report = succeeded(&run(actq(&[&check[..], &["1e-3"]].concat()), b"")?)?;
+    ensure!(report.contains("12 ticks"), "{report}");
+    let error = refused(&run(actq(&[&check[..], &["1e-12"]].concat()), b"")?)?;
+    ensure!(error.contains("above 0.000000000001; quantize at more bits"), "{error}");
+
+    // A recording of raw values makes what the network learns from.
+    let recording = text(&robot.path("recording.npz"));
+    let mut npz = NpzWriter::new(File::create(&recording)?);
+    npz.array("obs", &[2, 120, 2], (0..480).map(|i| (0.3 * i as f32).sin()))?;
+    npz.finish()?;
+    let quantize = ["quantize", &out, "--calib", &recording, "--bits", "4", "--steps", "5", "--out"];
+    let report = succeeded(&run(actq(&[&quantize[..], &[&text(&robot.path("learned.actq"))]].concat()), b"")?)?;
+    ensure!(report.contains("240 observations"), "{report}");
+    let error = refused(&run(actq(&["eval", &image, "--policy", &out]), b"")?)?;
+    ensure!(error.contains("it takes raw inputs"), "{error}");
     Ok(())
 }
 

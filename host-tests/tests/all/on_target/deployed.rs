@@ -1,7 +1,11 @@
 //! Descriptions of everything around a network, on the target: the bits of the host.
 
-use actq_bench::Target;
-use anyhow::Result;
+use std::path::Path;
+
+use actq::runtime::ImageBuffer;
+use actq_bench::qemu::Counter;
+use actq_bench::{Target, firmware, profile};
+use anyhow::{Context as _, Result, ensure};
 
 use super::qemu::same_bits;
 use crate::deployed::{Made, PUBLISHED, four_bits, published};
@@ -31,5 +35,27 @@ fn published_bundles_have_the_bits_of_the_host() -> Result<()> {
         same_bits(Target::Fpu, &four_bits(&deployment.policy)?, &raw)?;
         println!("{name}: {TICKS} ticks at 4 bits have the host's bits");
     }
+    Ok(())
+}
+
+/// The cost model knows the operations around a network: whole steps, and polls of the least budget.
+#[test]
+fn steps_and_polls_of_a_description_match_the_prediction() -> Result<()> {
+    let bytes = four_bits(&Made::deployment()?.1.policy)?;
+    let raw = &single(&Made::raw(24))[..24];
+    let buffer = ImageBuffer::new(&bytes);
+    let image = buffer.image(Path::new("made"))?;
+    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
+    let counted = profile::steps(&elf, &counter, &bytes, raw)?;
+    let mean = counted.iter().map(|cost| cost.instructions).sum::<u64>() as f64 / counted.len() as f64;
+    let error = image.step_cost().instructions as f64 / mean - 1.0;
+    println!("{mean:.0} instructions a step, predicted {:+.2}%", 100.0 * error);
+    ensure!(error.abs() < 0.02, "{error}");
+    let least = image.least_budget();
+    let (polls, _) = profile::regions(&elf, &counter, &bytes, &format!("poll {least}"), raw)?;
+    // The first region of a step takes the observation.
+    let longest = polls.iter().map(|cost| cost.instructions).max().context("no polls")?;
+    println!("polls of {least} instructions: {} of them, {longest} at most", polls.len());
+    ensure!(polls.len() > 20 * raw.len() && longest <= u64::from(least), "{longest} of {least}");
     Ok(())
 }

@@ -46,7 +46,9 @@ pub fn image_around(policy: &Policy, matrices: &[Outcome], around: &Around) -> R
 /// Returns the policy as it is seen from outside.
 fn outside(policy: &Policy, around: &Around) -> Result<Policy> {
     ensure!(policy.kind == Kind::Step, "only a policy of kind step can have operations around its network");
-    Ok(Policy { act_len: around.action_len(), contract: ActionContract::default(), ..policy.clone() })
+    let [low, high] = around.limits.clone().map_or([None, None], |limits| limits.map(Some));
+    let contract = ActionContract { low, high, ..ActionContract::default() };
+    Ok(Policy { act_len: around.action_len(), contract, ..policy.clone() })
 }
 
 fn emit(policy: &Policy, matrices: &[Outcome], around: Option<&Around>) -> Result<Vec<u8>> {

@@ -7,9 +7,9 @@ use actq_kernels::PortKind;
 use actq_kernels::image::OpKind;
 
 use super::chain::Chain;
-use super::joined::{Joined, Source, has_weights, part};
+use super::clock;
+use super::joined::{Joined, Output, Source, has_weights, part};
 use super::operations::{Operations, words};
-use super::{Output, clock};
 use crate::description::{Clock, End, TargetKind, When};
 use crate::plan::{Feed, Maker, Plan, Slot, Step};
 use crate::sources::Array;
@@ -98,6 +98,7 @@ impl Compiler<'_> {
             observation: observation.buffer,
             after,
             action: action.buffer,
+            limits: limits(plan),
             ports: ports(plan),
         })
     }
@@ -292,6 +293,18 @@ impl Compiler<'_> {
         }
         Ok(operands)
     }
+}
+
+/// Returns the limits of all targets, the largest numbers where one has none.
+fn limits(plan: &Plan) -> Option<[Vec<f32>; 2]> {
+    let of = |which: usize, none: f32| {
+        let each = plan.targets.iter().zip(&plan.limits).flat_map(move |((_, slot), limits)| match limits {
+            Some(limits) => limits[which].iter().map(|limit| *limit as f32).collect(),
+            None => vec![none; plan.values[*slot].labels.len()],
+        });
+        each.collect()
+    };
+    plan.limits.iter().any(Option::is_some).then(|| [of(0, f32::MIN), of(1, f32::MAX)])
 }
 
 /// Lists raw inputs and targets.

@@ -5,9 +5,11 @@ use actq::graph::ops::{Concat, Span};
 use actq::graph::{Graph, ValueId};
 use actq_kernels::Kind;
 
-use super::Output;
 use crate::plan::{Feed, Maker, Plan, Slot, Step, Work};
 use crate::sources::Part;
+
+/// An output: its network, and its number there.
+pub(super) type Output = (usize, usize);
 
 /// What the joined network reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

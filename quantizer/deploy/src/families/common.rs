@@ -218,12 +218,17 @@ impl Parts {
     }
 
     pub(super) fn target(&mut self, kind: TargetKind, value: &str) {
-        self.description.targets.push(Target { kind, value: value.to_owned(), joints: None });
+        self.description.targets.push(Target { kind, value: value.to_owned(), joints: None, limits: None });
     }
 
     /// Adds a target in the order of a list of joints.
     pub(super) fn target_joints(&mut self, kind: TargetKind, value: &str, joints: &str) {
-        self.description.targets.push(Target { kind, value: value.to_owned(), joints: Some(joints.to_owned()) });
+        self.description.targets.push(Target {
+            kind,
+            value: value.to_owned(),
+            joints: Some(joints.to_owned()),
+            limits: None,
+        });
     }
 
     pub(super) fn gains(&mut self, gains: Gains) {

@@ -48,6 +48,7 @@ impl Plan {
                 order: Vec::new(),
                 action: 0,
                 targets: Vec::new(),
+                limits: Vec::new(),
             },
         };
         builder.build()?;
@@ -136,6 +137,14 @@ impl Builder<'_> {
                 );
             }
             self.plan.targets.push((target.kind, slot));
+            let len = self.plan.values[slot].labels.len();
+            let limits = target.limits.as_ref().map(|limits| -> Result<[Vec<f64>; 2]> {
+                let [low, high] = [numbers::each(&limits[0], len)?, numbers::each(&limits[1], len)?];
+                let bad = low.iter().zip(&high).position(|(low, high)| low > high);
+                ensure!(bad.is_none(), "value {}: give the lowest number first", bad.unwrap_or(0));
+                Ok([low, high])
+            });
+            self.plan.limits.push(limits.transpose().with_context(|| format!("target {:?}: limits", target.value))?);
         }
         self.gains()
     }

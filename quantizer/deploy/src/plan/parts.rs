@@ -75,6 +75,8 @@ pub struct Plan {
     pub(crate) order: Vec<Work>,
     pub(crate) action: Slot,
     pub(crate) targets: Vec<(TargetKind, Slot)>,
+    /// Lowest and highest value of each target, if they are given.
+    pub(crate) limits: Vec<Option<[Vec<f64>; 2]>>,
 }
 
 impl Plan {

@@ -105,18 +105,31 @@ fn around() -> Result<(String, Vec<u8>)> {
         let (row, count) = (value(len, Lifetime::Step), value(1, Lifetime::State));
         let rows = [pair(3, 0), pair(1, 0)].into_iter().chain((0..3 * len as u32).map(|i| (i as f32).to_bits()));
         add(OpKind::Row, row, None, Some(count), StepData::Words(rows.collect()));
-        let at = [pair(len, 1), never_moves].into_iter().chain(vec![0; len]).chain([pair(len, 0)]);
-        add(OpKind::Stand, row, Some(raw), Some(count), StepData::Words(at.collect()));
-        let (frames, ring) = (value(3 * len, Lifetime::Step), value(4 * len + 1, Lifetime::State));
-        let sizes = [pair(len, 4), pair(3, 2), pair(0, 0)];
-        add(OpKind::History, frames, Some(raw), Some(ring), StepData::Words(sizes.to_vec()));
+        for read in [len, 8] {
+            let at = [pair(read, 1), never_moves].into_iter().chain(vec![0; len]).chain([pair(read, 0)]);
+            add(OpKind::Stand, row, Some(Slice { len: read, ..raw }), Some(count), StepData::Words(at.collect()));
+        }
+        for (frame, length) in [(len, 3), (1, len), (len / 4, 8)] {
+            let slots = 2 * (length - 1);
+            let (frames, ring) = (value(frame * length, Lifetime::Step), value(frame * slots + 1, Lifetime::State));
+            let sizes = [pair(frame, slots), pair(length, 2), pair(0, 0)];
+            let newest = Slice { len: frame, ..raw };
+            add(OpKind::History, frames, Some(newest), Some(ring), StepData::Words(sizes.to_vec()));
+        }
     }
     let [observation, action] = [8, 8].map(|len| value(len, Lifetime::Step));
     add(OpKind::Copy, observation, Some(Slice { buffer: 0, offset: 0, len: 8 }), None, StepData::None);
     let output = Slice { buffer: OUTPUT, ..action };
     let after = vec![Step { kind: OpKind::Copy, dst: action, src: Some(output), third: None, data: StepData::None }];
-    let around =
-        Around { buffers, before, observation: observation.buffer, after, action: action.buffer, ports: Vec::new() };
+    let around = Around {
+        buffers,
+        before,
+        observation: observation.buffer,
+        after,
+        action: action.buffer,
+        limits: None,
+        ports: Vec::new(),
+    };
     Ok((name.to_owned(), emit::image_around(&policy, &outcomes, &around)?))
 }
 
