@@ -23,7 +23,7 @@
 //! Features:
 //!
 //! - `around` runs the operations around a network (`docs/DEPLOY.md`): raw values in, targets out. Without it, an image
-//!   that has some is refused with [`ImageError::Op`], and the code is 2 KB shorter.
+//!   that has some is refused with [`ImageError::Op`], and the code is 3 KB shorter.
 //! - `defmt` derives `defmt::Format` for the error types.
 //! - `writer` makes public what writes images and what checks the kernels: packed layouts, records, arithmetic and the
 //!   parts of the cost model. The quantizer, tests and measurements use it. It is **unstable**: any version may change

@@ -36,6 +36,9 @@ pub(crate) struct Rule {
     pub meaning: String,
     /// The family's value; none if it differs between the family's policies.
     pub value: Option<toml::Value>,
+    /// Texts that an answer may be; empty for any.
+    #[serde(default)]
+    pub choices: Vec<String>,
     /// File and lines of the repository that have it.
     #[serde(default)]
     pub from: String,
@@ -129,6 +132,14 @@ impl Facts {
         if let Some(answer) = self.answers.0.get(key) {
             self.used.insert(key.to_owned());
             self.sources.insert(key.to_owned(), "answers".to_owned());
+            let is_choice =
+                rule.choices.is_empty() || rule.choices.iter().any(|choice| answer.as_str() == Some(choice));
+            ensure!(
+                is_choice,
+                "answer {key} = {}: give one of {}",
+                printable(&answer.to_string()),
+                rule.choices.join(", ")
+            );
             return read(answer, &format!("answer {key}")).map(Some);
         }
         match (&rule.value, self.accepted) {
@@ -157,6 +168,17 @@ impl Facts {
         }
         self.ask(Question { key: key.to_owned(), meaning: meaning.to_owned(), profile: None });
         Ok(None)
+    }
+
+    /// Asks whether the application computes a value that no reader knows.
+    ///
+    /// # Errors
+    ///
+    /// If the answer is another than `true`.
+    pub(crate) fn of_application(&mut self, key: &str, meaning: &str) -> Result<()> {
+        let given = self.missing::<bool>(key, meaning)?;
+        ensure!(given != Some(false), "answer {key} = false: nothing else can compute it; describe it in deploy.toml");
+        Ok(())
     }
 
     /// Returns `true` if a key is a question that nothing has answered.

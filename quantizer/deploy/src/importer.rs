@@ -88,7 +88,7 @@ pub fn observed(folder: &Path, raw: &Dataset) -> Result<Dataset> {
     let mut obs = Array3::zeros((raw.length.len(), raw.obs.dim().1, columns.len()));
     for (episode, steps) in raw.length.iter().enumerate() {
         runner.reset();
-        for (step, values) in raw.episode(episode).into_iter().take(*steps).enumerate() {
+        for (step, values) in raw.episode(episode).take(*steps).enumerate() {
             let mut rest = &values[..];
             let mut inputs = Vec::new();
             for len in &lens {

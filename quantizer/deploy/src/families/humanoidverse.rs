@@ -517,7 +517,7 @@ impl Reader<'_> {
             "ref_motion_phase" => self.motion_phase()?,
             other => {
                 // Only the application's code says what it is, so it is an input of its own name.
-                self.facts.missing::<bool>(
+                self.facts.of_application(
                     &format!("raw.{other}"),
                     &format!("term {other:?} is not known to this reader; does the application compute it (true)?"),
                 )?;
@@ -583,7 +583,7 @@ impl Reader<'_> {
             (Some("clock") | None, None) => {
                 let meaning = "nothing states the length of the reference motion; \
                                does the application compute ref_motion_phase (true)?";
-                self.facts.missing::<bool>("raw.ref_motion_phase", meaning)?;
+                self.facts.of_application("raw.ref_motion_phase", meaning)?;
                 Ok(self.raw("ref_motion_phase", 1, "motions"))
             }
             (Some(other), _) => bail!("motion_phase = {other:?}: give \"clock\" or \"raw\""),

@@ -372,7 +372,7 @@ fn inputs(
             }
             _ => {
                 // What it is only the application's code says, so it is an input under its own name.
-                facts.missing::<bool>(
+                facts.of_application(
                     &format!("raw.{name}"),
                     &format!("the input {input:?} is not known to this reader; does the application compute its {len} values (true)?"),
                 )?;

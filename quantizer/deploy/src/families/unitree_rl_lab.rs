@@ -99,7 +99,7 @@ impl Family for UnitreeRlLab {
                             yaml.at(&path)
                         );
                     };
-                    facts.missing::<bool>(
+                    facts.of_application(
                         &format!("raw.{other}"),
                         &format!("term {other:?} is not known to this reader; does the application compute it (true)?"),
                     )?;
