@@ -79,6 +79,15 @@ pub(crate) enum Command {
     ///
     /// Example: actq eval ur3.actq --policy policies/ur3
     Eval(EvalArgs),
+    /// Turn a deploy bundle into an image and firmware, in one command that can be run again
+    ///
+    /// Imports the bundle into OUT/policy, compares it with --reference, quantizes it to OUT/policy.actq, compares the
+    /// image with the reference, and builds OUT/BOARD.elf (in a checkout of actq, by `cargo xtask firmware`). Each step
+    /// is a command of its own: import, quantize, check. If one fails, run the command again: the description stays, which
+    /// one may edit in between, and so does an image that was made with the same files and options.
+    ///
+    /// Example: actq deploy bundle --accept-profile --reference raw.npz:expect.npz --recordings runs --bpw 2 --out walker
+    Deploy(DeployArgs),
     /// Compare an image of a deploy bundle with a run of the deploy code
     ///
     /// Runs the image on the raw inputs of a reference and compares its targets, tick by tick: the error is that of the
@@ -301,6 +310,51 @@ pub(crate) struct EvalArgs {
 }
 
 #[derive(clap::Args)]
+pub(crate) struct DeployArgs {
+    /// The bundle: a folder, a .kinfer file, or an ONNX file with metadata
+    pub(crate) bundle: PathBuf,
+    /// The folder to write to
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// The board to build firmware for; `cargo xtask firmware --list` shows them
+    #[arg(long, value_name = "NAME")]
+    pub(crate) board: Option<String>,
+    /// The answers to the questions of an earlier run, a TOML file of their keys
+    #[arg(long, value_name = "FILE")]
+    pub(crate) answers: Option<PathBuf>,
+    /// Accept what the family's deploy code says where the files say nothing
+    #[arg(long)]
+    pub(crate) accept_profile: bool,
+    /// A run of the deploy code, for comparison: RAW.npz has the raw inputs [tick, value] by name, EXPECT.npz the arrays
+    /// observation, action and target
+    #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]
+    pub(crate) reference: Option<(PathBuf, PathBuf)>,
+    /// A recording of raw values by `actq serve --record`, or a folder of them; may be repeated. Without one, the policy
+    /// learns from RAW.npz
+    #[arg(long, value_name = "FILE|DIR")]
+    pub(crate) recordings: Vec<PathBuf>,
+    /// Fail if a target's NMSE over the reference is above this number
+    #[arg(long, value_name = "NMSE")]
+    pub(crate) max_nmse: Option<f64>,
+    /// Bits per weight of all weights, with scales and padding
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub(crate) bpw: Option<f64>,
+    /// The most bytes of the image, as 98304, 96K or 1M
+    #[arg(long, value_name = "SIZE", conflicts_with = "bpw", value_parser = size)]
+    pub(crate) flash: Option<usize>,
+    /// The most milliseconds of a step of the network on a Cortex-M4, as predicted
+    #[arg(long, value_name = "X", conflicts_with_all = ["bpw", "flash"], value_parser = positive)]
+    pub(crate) ms: Option<f64>,
+    /// The processor's clock for --ms, in Hz or as 168M
+    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = clock)]
+    pub(crate) clock: f64,
+    #[command(flatten)]
+    pub(crate) learn: LearnArgs,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+#[derive(clap::Args)]
 pub(crate) struct CheckArgs {
     /// The image
     pub(crate) image: PathBuf,
@@ -377,7 +431,7 @@ pub struct SweepArgs {
 }
 
 /// Options of distillation, which also ends when the error no longer falls.
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args, Clone, Debug)]
 pub(crate) struct LearnArgs {
     /// The most steps of distillation; 0 = two-sided error feedback instead, which takes seconds and gives a larger
     /// error at few bits [default: by the number of weights, 20000 for 200 thousand, recurrent policies 7800, heads
@@ -395,7 +449,7 @@ pub(crate) struct LearnArgs {
 }
 
 /// Options of every quantization.
-#[derive(clap::Args, Debug)]
+#[derive(clap::Args, Clone, Debug)]
 pub(crate) struct RunArgs {
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]

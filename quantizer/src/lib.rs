@@ -59,6 +59,7 @@ fn run_command(command: &Command) -> Result<()> {
         Command::Inspect(args) => inspect::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Check(args) => commands::check::run(args),
+        Command::Deploy(args) => commands::deploy::run(args),
         Command::Tune(args) => tune::run(args),
         Command::Sweep { args, methods } => {
             sweep::run(args, &methods.iter().map(|method| method.method()).collect::<Result<Vec<_>>>()?)

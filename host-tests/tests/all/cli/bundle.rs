@@ -136,15 +136,52 @@ fn a_bundle_becomes_a_description_and_an_image() -> Result<()> {
     ensure!(error.contains("above 0.000000000001; quantize at more bits"), "{error}");
 
     // A recording of raw values makes what the network learns from.
-    let recording = text(&robot.path("recording.npz"));
-    let mut npz = NpzWriter::new(File::create(&recording)?);
-    npz.array("obs", &[2, 120, 2], (0..480).map(|i| (0.3 * i as f32).sin()))?;
-    npz.finish()?;
+    let recording = recording(&robot)?;
     let quantize = ["quantize", &out, "--calib", &recording, "--bits", "4", "--steps", "5", "--out"];
     let report = succeeded(&run(actq(&[&quantize[..], &[&text(&robot.path("learned.actq"))]].concat()), b"")?)?;
     ensure!(report.contains("240 observations"), "{report}");
     let error = refused(&run(actq(&["eval", &image, "--policy", &out]), b"")?)?;
     ensure!(error.contains("it takes raw inputs"), "{error}");
+    Ok(())
+}
+
+/// Writes a recording of raw values; returns its path.
+fn recording(robot: &Robot) -> Result<String> {
+    let path = text(&robot.path("recording.npz"));
+    let mut npz = NpzWriter::new(File::create(&path)?);
+    npz.array("obs", &[2, 120, 2], (0..480).map(|i| (0.3 * i as f32).sin()))?;
+    npz.finish()?;
+    Ok(path)
+}
+
+#[test]
+fn deploy_makes_everything_and_keeps_what_is_made() -> Result<()> {
+    let robot = Robot::new(YAML)?;
+    expect(&robot.path("expect.npz"), false)?;
+    let reference = format!("{}:{}", text(&robot.path("raw.npz")), text(&robot.path("expect.npz")));
+    let (bundle, out) = (text(&robot.path("bundle")), text(&robot.path("deployed")));
+    let base = ["deploy", &bundle, "--out", &out, "--accept-profile"];
+    let error = refused(&run(actq(&base), b"")?)?;
+    ensure!(error.contains("give --recordings") && !robot.path("deployed").exists(), "{error}");
+
+    let recording = recording(&robot)?;
+    let all = [&base[..], &["--reference", &reference, "--recordings", &recording, "--steps", "5"]].concat();
+    let report = succeeded(&run(actq(&all), b"")?)?;
+    for part in
+        ["1. import", "12 ticks agree", "2. quantize", "240 observations", "3. check the image", "largest error"]
+    {
+        ensure!(report.contains(part), "{part} is not in\n{report}");
+    }
+    let image = fs::read(robot.path("deployed/policy.actq"))?;
+    let report = succeeded(&run(actq(&all), b"")?)?;
+    for part in ["deploy.toml: kept", "made before with the same options", "largest error"] {
+        ensure!(report.contains(part), "{part} is not in\n{report}");
+    }
+    // Another option makes another image.
+    let report = succeeded(&run(actq(&[&all[..], &["--bpw", "20"]].concat()), b"")?)?;
+    ensure!(!report.contains("made before") && fs::read(robot.path("deployed/policy.actq"))? != image, "{report}");
+    let error = refused(&run(actq(&[&all[..], &["--bpw", "20", "--max-nmse", "1e-12"]].concat()), b"")?)?;
+    ensure!(error.contains("quantize at more bits"), "{error}");
     Ok(())
 }
 

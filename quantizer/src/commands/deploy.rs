@@ -1,0 +1,161 @@
+//! `actq deploy`
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use actq::methods::Method;
+use actq::runtime::ImageBuffer;
+use actq_deploy::DESCRIPTION;
+use anyhow::{Context as _, Result, bail, ensure};
+
+use super::{bundle, check, quantize};
+use crate::args::{CheckArgs, DeployArgs, ImportArgs, LearnArgs, QuantizeArgs};
+use crate::importers::load;
+use crate::terminal::{note, print};
+
+/// Minutes of learning if neither steps nor minutes are given.
+const MINUTES: f64 = 6.0;
+/// Folder of the description, and file of what the last image was made with, in the output folder.
+const POLICY: &str = "policy";
+const MADE_WITH: &str = "policy.actq.txt";
+const IMAGE: &str = "policy.actq";
+
+/// Imports a bundle, checks it, quantizes it, checks the image, and builds firmware. What an earlier run has finished
+/// with the same options stays.
+pub(crate) fn run(args: &DeployArgs) -> Result<()> {
+    let only_reference = args.recordings.is_empty();
+    ensure!(
+        !only_reference || args.reference.is_some(),
+        "give --recordings: what the policy observes on its task. `actq import` and `actq quantize --method rtn` make a first image; \
+         run it on the robot or in simulation by `actq serve IMAGE --record FILE`, and pass FILE"
+    );
+    let policy = args.out.join(POLICY);
+    let raw = args.reference.as_ref().map(|(raw, _)| raw.clone());
+    step(1, "import")?;
+    let description = policy.join(DESCRIPTION);
+    if description.exists() {
+        // It may have been edited.
+        print(&format!("{}: kept; remove the folder to import the bundle again\n", description.display()))?;
+    } else {
+        bundle::run(&ImportArgs {
+            model: args.bundle.clone(),
+            out: policy.clone(),
+            calib: raw.filter(|_| only_reference),
+            output: None,
+            state: Vec::new(),
+            check: false,
+            answers: args.answers.clone(),
+            accept_profile: args.accept_profile,
+            reference: args.reference.clone(),
+            force: false,
+        })?;
+    }
+    if only_reference {
+        note(["the policy learns from the raw inputs of --reference: too little for a robot; pass recordings of its task by \
+               --recordings"
+            .to_owned()]);
+    }
+
+    step(2, "quantize")?;
+    let image = args.out.join(IMAGE);
+    let made_with = made_with(args)?;
+    if is_made(&image, &policy, &args.out.join(MADE_WITH), &made_with) {
+        print(&format!("{}: made before with the same options\n", image.display()))?;
+    } else {
+        quantize::run(&quantization(args, &policy, &image), Some(Method::Distill), |_, _| String::new())?;
+        fs::write(args.out.join(MADE_WITH), &made_with).context("cannot write the options")?;
+    }
+    if let Some(reference) = &args.reference {
+        step(3, "check the image")?;
+        check::run(&CheckArgs { image: image.clone(), reference: reference.clone(), max_nmse: args.max_nmse })?;
+    }
+    if let Some(board) = &args.board {
+        step(4, "firmware")?;
+        firmware(board, &image, &args.out.join(format!("{board}.elf")))?;
+    }
+    Ok(())
+}
+
+fn step(number: usize, what: &str) -> Result<()> {
+    print(&format!("\n{number}. {what}\n"))
+}
+
+fn quantization(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs {
+    let own = args.learn.steps.is_some() || args.learn.minutes.is_some();
+    QuantizeArgs {
+        policy_dir: policy.to_owned(),
+        out: image.to_owned(),
+        calib: args.recordings.clone(),
+        bits: None,
+        bpw: args.bpw,
+        flash: args.flash,
+        max_nmse: None,
+        ms: args.ms,
+        clock: args.clock,
+        width: Vec::new(),
+        protect: Vec::new(),
+        group: None,
+        activations: None,
+        learn: LearnArgs { minutes: if own { args.learn.minutes } else { Some(MINUTES) }, ..args.learn.clone() },
+        run: args.run.clone(),
+        save_stats: None,
+    }
+}
+
+/// Returns what an image depends on beside the policy, as text.
+fn made_with(args: &DeployArgs) -> Result<String> {
+    let mut text = format!(
+        "bpw {:?}, flash {:?}, ms {:?} at {}, {:?}, seed {}\n",
+        args.bpw, args.flash, args.ms, args.clock, args.learn, args.run.seed
+    );
+    let files = if args.recordings.is_empty() {
+        args.reference.iter().map(|(raw, _)| raw).collect()
+    } else {
+        args.recordings.iter().collect::<Vec<_>>()
+    };
+    for file in actq::data::files_of(&files.into_iter().cloned().collect::<Vec<PathBuf>>())? {
+        let bytes = fs::read(&file).with_context(|| file.display().to_string())?;
+        text += &format!("{} {:08x}\n", file.display(), actq_kernels::image::checksum(&bytes));
+    }
+    Ok(text)
+}
+
+/// Returns `true` if an image of this policy was made with the same options.
+fn is_made(image: &Path, policy: &Path, record: &Path, made_with: &str) -> bool {
+    let same = fs::read_to_string(record).is_ok_and(|text| text == made_with);
+    let digest = || -> Result<[u8; 32]> {
+        let buffer = ImageBuffer::read(image)?;
+        Ok(buffer.image(image)?.digest())
+    };
+    same && matches!((digest(), load(policy)), (Ok(digest), Ok(policy)) if policy.digest == digest)
+}
+
+/// Builds the firmware by the workspace's own command, which only a checkout has.
+fn firmware(board: &str, image: &Path, elf: &Path) -> Result<()> {
+    let here = env::current_dir().context("cannot find the current folder")?;
+    let image = fs::canonicalize(image).with_context(|| image.display().to_string())?;
+    let Some(root) = here.ancestors().find(|folder| folder.join("tools/xtask/Cargo.toml").is_file()) else {
+        note([format!(
+            "firmware is built in a checkout of actq: cargo xtask firmware --board {board} --image {} --out {board}.elf",
+            image.display()
+        )]);
+        return Ok(());
+    };
+    let elf = fs::canonicalize(elf.parent().unwrap_or(Path::new(".")))
+        .context("no output folder")?
+        .join(elf.file_name().unwrap_or_default());
+    let mut command = Command::new("cargo");
+    command
+        .current_dir(root)
+        .args(["xtask", "firmware", "--board", board, "--image"])
+        .arg(&image)
+        .arg("--out")
+        .arg(&elf);
+    let status = command.status().context("cannot start cargo")?;
+    if !status.success() {
+        bail!("cannot build the firmware for {board}; {} is whole, and the command can be run again", image.display());
+    }
+    Ok(())
+}
