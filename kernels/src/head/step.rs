@@ -178,9 +178,8 @@ impl Head<'_, '_> {
             return Err(StepError::ObservationNotFinite { index });
         }
         let mut rest = observation;
-        for port in self.image.ports() {
-            let Some((values, after)) = rest.split_at_checked(port.len) else { break };
-            let [low, high] = port.range;
+        for (len, [low, high]) in self.image.input_ranges() {
+            let Some((values, after)) = rest.split_at_checked(len) else { break };
             if let Some(i) = values.iter().position(|value| !(low..=high).contains(value)) {
                 return Err(StepError::ObservationRange { index: expected - rest.len() + i });
             }

@@ -5,7 +5,7 @@ use super::text::is_text;
 use super::view::Image;
 #[cfg(feature = "writer")]
 use super::words::{TooLarge, halves};
-use super::words::{high, low, record, section, word};
+use super::words::{high, low, record, section};
 
 /// Words of a port's record.
 const PORT_WORDS: usize = 4;
@@ -85,8 +85,8 @@ impl<'a> Image<'a> {
 
     /// Returns the offset and the length of a port's name, in words.
     pub(super) fn port_name(&self, i: usize) -> [usize; 2] {
-        let at = self.ports_at().wrapping_add(1 + i * PORT_WORDS);
-        [word(self.words, at.wrapping_add(3)) as usize, (high(word(self.words, at)) >> 8).div_ceil(4)]
+        let [sizes, _, _, name] = self.port_record(i).unwrap_or_default();
+        [name as usize, (high(sizes) >> 8).div_ceil(4)]
     }
 
     /// Returns the words of the section before the names.
@@ -94,12 +94,25 @@ impl<'a> Image<'a> {
         1 + self.port_counts().iter().sum::<usize>() * PORT_WORDS
     }
 
+    /// Returns the number of values and the range of each raw input, without reading names: every step does.
+    pub(crate) fn input_ranges(&self) -> impl Iterator<Item = (usize, [f32; 2])> {
+        let [inputs, _] = self.port_counts();
+        (0..inputs).map_while(|i| {
+            let [sizes, least, most, _] = self.port_record(i)?;
+            Some((low(sizes), [least, most].map(f32::from_bits)))
+        })
+    }
+
+    fn port_record(&self, i: usize) -> Option<[u32; PORT_WORDS]> {
+        let record = record(self.words, self.ports_at().wrapping_add(1 + i * PORT_WORDS)).ok()?;
+        Some(record.map(u32::from_le))
+    }
+
     /// Reads a port; `None` if it is impossible, which a checked image excludes.
     pub(super) fn port(&self, i: usize) -> Option<Port<'a>> {
-        let record = record::<PORT_WORDS>(self.words, self.ports_at().wrapping_add(1 + i * PORT_WORDS)).ok()?;
-        let [sizes, least, most, _] = record.map(u32::from_le);
-        let [name, words] = self.port_name(i);
-        let bytes = bytemuck::must_cast_slice(section(self.words, name, words)?).get(..high(sizes) >> 8)?;
+        let [sizes, least, most, name] = self.port_record(i)?;
+        let words = (high(sizes) >> 8).div_ceil(4);
+        let bytes = bytemuck::must_cast_slice(section(self.words, name as usize, words)?).get(..high(sizes) >> 8)?;
         let name = core::str::from_utf8(bytes).ok().filter(|_| is_text(bytes))?;
         let kind = *PortKind::ALL.get(high(sizes) & 0xff)?;
         Some(Port { kind, name, len: low(sizes), range: [least, most].map(f32::from_bits) })

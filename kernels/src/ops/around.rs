@@ -143,7 +143,8 @@ impl History {
     }
 
     fn next(&self) -> u32 {
-        let next = self.step + 1;
+        // A caller may have written any state.
+        let next = self.step.wrapping_add(1);
         (if next >= 2 * self.slots { self.slots } else { next }) as u32
     }
 }
