@@ -82,12 +82,20 @@ pub(crate) enum Command {
     /// Turn a deploy bundle into an image and firmware, in one command that can be run again
     ///
     /// Imports the bundle into OUT/policy, compares it with --reference, quantizes it to OUT/policy.actq, compares the
-    /// image with the reference, and builds OUT/BOARD.elf (in a checkout of actq, by `cargo xtask firmware`). Each step
-    /// is a command of its own: import, quantize, check. If one fails, run the command again: the description stays, which
+    /// image with the reference, writes OUT/policy.h and OUT/policy.rs for the application, and builds OUT/BOARD.elf (in
+    /// a checkout of actq, by `cargo xtask firmware`). Each step is a command of its own: import, quantize, check, constants. If one fails, run the command again: the description stays, which
     /// one may edit in between, and so does an image that was made with the same files and options.
     ///
     /// Example: actq deploy bundle --accept-profile --reference raw.npz:expect.npz --recordings runs --bpw 2 --out walker
     Deploy(DeployArgs),
+    /// Write an image's sizes, names and places as constants of Rust, or of C
+    ///
+    /// The file has the lengths of observation and action, the control rate and the words of scratch memory. Of an image of
+    /// a deploy bundle, it also has the place of each raw input and of each joint in the observation, and of the
+    /// targets in the action. Names of a C header begin with the file's name: those of walker.h with WALKER_.
+    ///
+    /// Example: actq constants walker.actq --out walker.h
+    Constants(ConstantsArgs),
     /// Compare an image of a deploy bundle with a run of the deploy code
     ///
     /// Runs the image on the raw inputs of a reference and compares its targets, tick by tick: the error is that of the
@@ -177,9 +185,22 @@ pub(crate) struct ImportArgs {
     /// (python3, or the interpreter that ACTQ_PYTHON names)
     #[arg(long)]
     pub(crate) check: bool,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
+    /// Replace existing files
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+/// How a deploy bundle is read.
+#[derive(clap::Args, Clone)]
+pub(crate) struct ReadingArgs {
     /// Bundle: the answers to the questions of an earlier run, a TOML file of their keys
     #[arg(long, value_name = "FILE")]
     pub(crate) answers: Option<PathBuf>,
+    /// Bundle: ask for what nothing states, line by line on standard input
+    #[arg(long)]
+    pub(crate) ask: bool,
     /// Bundle: accept what the family's deploy code says where the files say nothing
     #[arg(long)]
     pub(crate) accept_profile: bool,
@@ -187,9 +208,6 @@ pub(crate) struct ImportArgs {
     /// inputs [tick, value] by name, EXPECT.npz the arrays observation, action and target
     #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]
     pub(crate) reference: Option<(PathBuf, PathBuf)>,
-    /// Replace existing files
-    #[arg(long)]
-    pub(crate) force: bool,
 }
 
 #[derive(clap::Args)]
@@ -217,33 +235,12 @@ pub struct QuantizeArgs {
     /// POLICY_DIR]
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) calib: Vec<PathBuf>,
-    /// Bits of every weight: 2, 3, 4 or 8 [default: 3]
-    #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
-    pub(crate) bits: Option<Width>,
-    /// Bits per weight of all weights, with scales and padding; each matrix gets a width
-    #[arg(long, value_name = "X", value_parser = positive)]
-    pub(crate) bpw: Option<f64>,
-    /// The most bytes of the image, as 98304, 96K or 1M (K is 1024 bytes, M is 1024 K)
-    #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
-    pub(crate) flash: Option<usize>,
+    #[command(flatten)]
+    pub(crate) budget: BudgetArgs,
     /// The largest error (NMSE, as eval measures it): searches the fewest bits that keep it, to a tenth of a bit per
     /// weight. It is measured on the held-out recording, or else on the calibration recording
-    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash"], value_parser = positive)]
+    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash", "ms", "clock"], value_parser = positive)]
     pub(crate) max_nmse: Option<f64>,
-    /// The most milliseconds of a step on a Cortex-M4, as predicted: takes the most bits that keep them
-    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash", "max_nmse"], value_parser = positive)]
-    pub(crate) ms: Option<f64>,
-    /// The processor's clock for --ms, in Hz or as 168M
-    // Without the conflicts, clap accepts a missing --ms if a given option conflicts with --ms.
-    #[arg(
-        long,
-        value_name = "HZ",
-        requires = "ms",
-        conflicts_with_all = ["bits", "bpw", "flash", "max_nmse"],
-        default_value = "168M",
-        value_parser = clock
-    )]
-    pub(crate) clock: f64,
     /// Force the width of a matrix, by its tensor's name (method distill); may be repeated
     #[arg(long, value_name = "NAME=BITS", value_parser = forced)]
     pub(crate) width: Vec<(String, Width)>,
@@ -265,6 +262,34 @@ pub struct QuantizeArgs {
     /// Write the statistics and the allocation as JSON, for `actq inspect --stats`
     #[arg(long, value_name = "FILE")]
     pub(crate) save_stats: Option<PathBuf>,
+}
+
+/// What an image may take.
+#[derive(clap::Args, Clone, Debug)]
+pub(crate) struct BudgetArgs {
+    /// Bits of every weight: 2, 3, 4 or 8 [default: 3]
+    #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
+    pub(crate) bits: Option<Width>,
+    /// Bits per weight of all weights, with scales and padding; each matrix gets a width
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub(crate) bpw: Option<f64>,
+    /// The most bytes of the image, as 98304, 96K or 1M (K is 1024 bytes, M is 1024 K)
+    #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
+    pub(crate) flash: Option<usize>,
+    /// The most milliseconds of a step on a Cortex-M4, as predicted: takes the most bits that keep them
+    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash"], value_parser = positive)]
+    pub(crate) ms: Option<f64>,
+    /// The processor's clock for --ms, in Hz or as 168M
+    // Without the conflicts, clap accepts a missing --ms if a given option conflicts with --ms.
+    #[arg(
+        long,
+        value_name = "HZ",
+        requires = "ms",
+        conflicts_with_all = ["bits", "bpw", "flash"],
+        default_value = "168M",
+        value_parser = clock
+    )]
+    pub(crate) clock: f64,
 }
 
 #[derive(clap::Args)]
@@ -319,16 +344,8 @@ pub(crate) struct DeployArgs {
     /// The board to build firmware for; `cargo xtask firmware --list` shows them
     #[arg(long, value_name = "NAME")]
     pub(crate) board: Option<String>,
-    /// The answers to the questions of an earlier run, a TOML file of their keys
-    #[arg(long, value_name = "FILE")]
-    pub(crate) answers: Option<PathBuf>,
-    /// Accept what the family's deploy code says where the files say nothing
-    #[arg(long)]
-    pub(crate) accept_profile: bool,
-    /// A run of the deploy code, for comparison: RAW.npz has the raw inputs [tick, value] by name, EXPECT.npz the arrays
-    /// observation, action and target
-    #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]
-    pub(crate) reference: Option<(PathBuf, PathBuf)>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
     /// A recording of raw values by `actq serve --record`, or a folder of them; may be repeated. Without one, the policy
     /// learns from RAW.npz
     #[arg(long, value_name = "FILE|DIR")]
@@ -336,22 +353,24 @@ pub(crate) struct DeployArgs {
     /// Fail if a target's NMSE over the reference is above this number
     #[arg(long, value_name = "NMSE")]
     pub(crate) max_nmse: Option<f64>,
-    /// Bits per weight of all weights, with scales and padding
-    #[arg(long, value_name = "X", value_parser = positive)]
-    pub(crate) bpw: Option<f64>,
-    /// The most bytes of the image, as 98304, 96K or 1M
-    #[arg(long, value_name = "SIZE", conflicts_with = "bpw", value_parser = size)]
-    pub(crate) flash: Option<usize>,
-    /// The most milliseconds of a step of the network on a Cortex-M4, as predicted
-    #[arg(long, value_name = "X", conflicts_with_all = ["bpw", "flash"], value_parser = positive)]
-    pub(crate) ms: Option<f64>,
-    /// The processor's clock for --ms, in Hz or as 168M
-    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = clock)]
-    pub(crate) clock: f64,
+    #[command(flatten)]
+    pub(crate) budget: BudgetArgs,
     #[command(flatten)]
     pub(crate) learn: LearnArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct ConstantsArgs {
+    /// The image
+    pub(crate) image: PathBuf,
+    /// The file to write: .rs for a module of Rust, .h for a header of C and C++
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// A deploy.toml, whose [gains] are added
+    #[arg(long, value_name = "FILE")]
+    pub(crate) gains: Option<PathBuf>,
 }
 
 #[derive(clap::Args)]

@@ -3,6 +3,7 @@
 
 pub(crate) mod bundle;
 pub(crate) mod check;
+pub(crate) mod constants;
 pub(crate) mod deploy;
 mod drive;
 pub(crate) mod eval;

@@ -11,6 +11,7 @@ mod importers;
 #[cfg(unix)]
 mod interrupts;
 pub mod outputs;
+mod questions;
 pub mod report;
 mod serve;
 mod suggestions;
@@ -59,6 +60,7 @@ fn run_command(command: &Command) -> Result<()> {
         Command::Inspect(args) => inspect::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Check(args) => commands::check::run(args),
+        Command::Constants(args) => commands::constants::run(args),
         Command::Deploy(args) => commands::deploy::run(args),
         Command::Tune(args) => tune::run(args),
         Command::Sweep { args, methods } => {

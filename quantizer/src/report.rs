@@ -1,5 +1,6 @@
 //! Human-readable tables, notes and plots.
 
+pub mod constants;
 pub mod deployment;
 pub mod imported;
 pub mod inspect;

@@ -1,6 +1,7 @@
 //! The command `actq` as other tools call it: exit status, messages, files, and the pipe protocol.
 
 mod bundle;
+mod constants;
 mod eval;
 mod fixture;
 mod inspect;

@@ -20,7 +20,7 @@ use actq_deploy::description::{Description, Network};
 use actq_deploy::{Answers, Array, Bundle, Compute, Deployment, Part, Plan, Reference, Runner, Sources, read};
 use actq_kernels::image::OpKind;
 use actq_kernels::ops::run_whole;
-use actq_kernels::{Image, Width};
+use actq_kernels::{Image, PortKind, Width};
 use anyhow::{Context as _, Result, ensure};
 
 /// Published bundles with the answers that they need.
@@ -372,6 +372,23 @@ fn every_operation_in_an_image_gives_what_the_description_says() -> Result<()> {
     let targets: Vec<f64> =
         raw.iter().flat_map(|raw| runner.step(raw).targets.into_iter().flat_map(|(_, target)| target)).collect();
     gives(&deployment, &raw, &targets)
+}
+
+#[test]
+fn an_image_names_its_inputs_its_targets_and_their_joints() -> Result<()> {
+    let bytes = four_bits(&Made::deployment()?.1.policy)?;
+    let buffer = ImageBuffer::new(&bytes);
+    let found: Vec<_> = buffer.image(Path::new("new"))?.ports().map(|p| (p.kind, p.name, p.len, p.names)).collect();
+    let expected = [
+        (PortKind::Input, "q", 3, "a\nb\nc"),
+        (PortKind::Input, "quaternion", 4, ""),
+        (PortKind::Input, "angles", 3, ""),
+        (PortKind::Input, "command", 2, ""),
+        (PortKind::Position, "target", 3, ""),
+        (PortKind::Velocity, "mixed", 3, "c\na\nb"),
+    ];
+    ensure!(found == expected, "{found:?}");
+    Ok(())
 }
 
 #[test]

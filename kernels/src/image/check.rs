@@ -126,10 +126,16 @@ impl<'a> Image<'a> {
         front.take(self.ports_at(), 1)?;
         front.take(self.ports_at() + 1, self.port_words() - 1)?;
         let [inputs, outputs] = self.port_counts();
-        let mut lens = [0; 2];
+        let (mut lens, mut list) = ([0; 2], 0);
         for i in 0..inputs + outputs {
-            let [name, words] = self.port_name(i);
+            let [name, words, names] = self.port_texts(i);
             front.take(name, words)?;
+            // A port without a list of its own may name that of an earlier port, the last that there was.
+            if names != 0 && names != list {
+                front.take(names, 1)?;
+                front.take(names + 1, (self.word(names) as usize).div_ceil(4))?;
+                list = names;
+            }
             let port = self.port(i).ok_or(ImageError::Ports)?;
             let is_output = i >= inputs;
             let [low, high] = port.range;

@@ -8,9 +8,9 @@ use super::words::{TooLarge, halves};
 use super::words::{high, low, record, section};
 
 /// Words of a port's record.
-const PORT_WORDS: usize = 4;
+const PORT_WORDS: usize = 5;
 
-/// What a port is.
+/// Kinds of ports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PortKind {
@@ -32,10 +32,12 @@ impl PortKind {
 /// A raw input, or targets: values that follow each other in the observation, or in the action.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Port<'a> {
-    /// What it is.
+    /// Input, or the quantity of a target.
     pub kind: PortKind,
     /// Its name.
     pub name: &'a str,
+    /// Names of its values, one a line, as those of joints; empty if they have none.
+    pub names: &'a str,
     /// Number of values.
     pub len: usize,
     /// Lowest and highest value that a step accepts; infinite for no limit.
@@ -44,15 +46,18 @@ pub struct Port<'a> {
 
 #[cfg(feature = "writer")]
 impl Port<'_> {
-    /// Returns the record's words, with the offset of the name.
+    /// Words of a record.
+    pub const WORDS: usize = PORT_WORDS;
+
+    /// Returns the record's words, with the offsets of the name and of the list of its values' names.
     ///
     /// # Errors
     ///
     /// [`TooLarge`] if a length does not fit its field.
-    pub fn emit(&self, name: u32) -> Result<[u32; PORT_WORDS], TooLarge> {
+    pub fn emit(&self, name: u32, names: u32) -> Result<[u32; PORT_WORDS], TooLarge> {
         let bytes = u8::try_from(self.name.len()).map_err(|_| TooLarge(self.name.len()))?;
         let [low, high] = self.range.map(f32::to_bits);
-        Ok([halves(self.len, self.kind as usize | usize::from(bytes) << 8)?, low, high, name])
+        Ok([halves(self.len, self.kind as usize | usize::from(bytes) << 8)?, low, high, name, names])
     }
 }
 
@@ -83,10 +88,10 @@ impl<'a> Image<'a> {
         self.header.self_test().wrapping_add(steps)
     }
 
-    /// Returns the offset and the length of a port's name, in words.
-    pub(super) fn port_name(&self, i: usize) -> [usize; 2] {
-        let [sizes, _, _, name] = self.port_record(i).unwrap_or_default();
-        [name as usize, (high(sizes) >> 8).div_ceil(4)]
+    /// Returns the offset and the length of a port's name, in words, and the offset of the list of its values' names.
+    pub(super) fn port_texts(&self, i: usize) -> [usize; 3] {
+        let [sizes, _, _, name, names] = self.port_record(i).unwrap_or_default();
+        [name as usize, (high(sizes) >> 8).div_ceil(4), names as usize]
     }
 
     /// Returns the words of the section before the names.
@@ -98,7 +103,7 @@ impl<'a> Image<'a> {
     pub(crate) fn input_ranges(&self) -> impl Iterator<Item = (usize, [f32; 2])> {
         let [inputs, _] = self.port_counts();
         (0..inputs).map_while(|i| {
-            let [sizes, least, most, _] = self.port_record(i)?;
+            let [sizes, least, most, ..] = self.port_record(i)?;
             Some((low(sizes), [least, most].map(f32::from_bits)))
         })
     }
@@ -110,11 +115,28 @@ impl<'a> Image<'a> {
 
     /// Reads a port; `None` if it is impossible, which a checked image excludes.
     pub(super) fn port(&self, i: usize) -> Option<Port<'a>> {
-        let [sizes, least, most, name] = self.port_record(i)?;
-        let words = (high(sizes) >> 8).div_ceil(4);
-        let bytes = bytemuck::must_cast_slice(section(self.words, name as usize, words)?).get(..high(sizes) >> 8)?;
-        let name = core::str::from_utf8(bytes).ok().filter(|_| is_text(bytes))?;
+        let [sizes, least, most, name, names] = self.port_record(i)?;
+        let name = self.text(name as usize, high(sizes) >> 8).filter(|name| is_text(name.as_bytes()))?;
+        let names = if names == 0 { "" } else { self.names(names as usize, low(sizes))? };
         let kind = *PortKind::ALL.get(high(sizes) & 0xff)?;
-        Some(Port { kind, name, len: low(sizes), range: [least, most].map(f32::from_bits) })
+        Some(Port { kind, name, names, len: low(sizes), range: [least, most].map(f32::from_bits) })
+    }
+
+    /// Reads a list of `count` names: u32 bytes, then the names, one a line.
+    fn names(&self, at: usize, count: usize) -> Option<&'a str> {
+        let names = self.text(at.wrapping_add(1), self.word(at) as usize)?;
+        let mut lines = 0;
+        for line in names.split('\n') {
+            if line.is_empty() || !is_text(line.as_bytes()) {
+                return None;
+            }
+            lines += 1;
+        }
+        (lines == count).then_some(names)
+    }
+
+    fn text(&self, at: usize, bytes: usize) -> Option<&'a str> {
+        let words = section(self.words, at, bytes.div_ceil(4))?;
+        core::str::from_utf8(bytemuck::must_cast_slice(words).get(..bytes)?).ok()
     }
 }

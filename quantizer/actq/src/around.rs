@@ -10,10 +10,12 @@ pub const OUTPUT: BufferId = BufferId::MAX;
 /// A raw input, or targets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedPort {
-    /// What it is.
+    /// Input, or the quantity of a target.
     pub kind: PortKind,
     /// Its name.
     pub name: String,
+    /// Names of its values, as those of joints; empty if they have none.
+    pub names: Vec<String>,
     /// Number of values.
     pub len: usize,
     /// Lowest and highest value that a step accepts; infinite for no limit.

@@ -2,6 +2,7 @@
 //! states becomes a question.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 
 use actq::error::{Context as _, Error, Result, bail, ensure};
 use actq::text::printable;
@@ -72,6 +73,28 @@ impl Answers {
         Ok(answers)
     }
 
+    /// Answers a question by what a person typed: a TOML value, or a text without its quotes. An empty line accepts what the
+    /// profile says.
+    ///
+    /// # Errors
+    ///
+    /// If the line is empty and the profile says nothing, or if it begins as a TOML value and is none.
+    pub fn set(&mut self, question: &Question, line: &str) -> Result<()> {
+        let line = match (line.trim(), &question.profile) {
+            ("", Some((value, _))) => value,
+            ("", None) => bail!("{}: give a value", question.key),
+            (line, _) => line,
+        };
+        let value = match toml::from_str::<toml::Table>(&format!("value = {line}")) {
+            Ok(mut table) if table.len() == 1 => table.remove("value"),
+            _ if line.starts_with(['[', '{', '"', '\'']) => None,
+            _ => Some(toml::Value::String(line.to_owned())),
+        };
+        let value = value.with_context(|| format!("{}: {line:?} is no value of TOML", question.key))?;
+        self.0.insert(question.key.clone(), value);
+        Ok(())
+    }
+
     fn add(&mut self, prefix: String, table: toml::Table) {
         for (key, value) in table {
             let key = if prefix.is_empty() { key } else { format!("{prefix}.{key}") };
@@ -80,6 +103,13 @@ impl Answers {
                 other => drop(self.0.insert(key, other)),
             }
         }
+    }
+}
+
+impl fmt::Display for Answers {
+    /// Writes them as [`Answers::parse`] reads them.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|(key, value)| writeln!(f, "{key} = {value}"))
     }
 }
 

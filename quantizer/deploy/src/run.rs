@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::clock::Phases;
 use crate::description::{End, Orientation, TargetKind};
 use crate::history::Frames;
-use crate::plan::{Arg, Feed, Maker, Plan, Step, Work};
+use crate::plan::{Arg, Feed, Maker, Plan, PlannedTarget, Step, Work};
 
 /// Values of a tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,14 +98,14 @@ impl Runner {
     }
 
     fn targets(&self) -> Vec<(TargetKind, Vec<f64>)> {
-        let limited = |((kind, slot), limits): (&(TargetKind, usize), &Option<[Vec<f64>; 2]>)| {
-            let mut values = self.values[*slot].clone();
-            if let Some([low, high]) = limits {
+        let limited = |target: &PlannedTarget| {
+            let mut values = self.values[target.slot].clone();
+            if let Some([low, high]) = &target.limits {
                 values.iter_mut().zip(low.iter().zip(high)).for_each(|(x, (low, high))| *x = x.clamp(*low, *high));
             }
-            (*kind, values)
+            (target.kind, values)
         };
-        self.plan.targets.iter().zip(&self.plan.limits).map(limited).collect()
+        self.plan.targets.iter().map(limited).collect()
     }
 
     fn make(&mut self, slot: usize, raw: &[Vec<f64>]) -> Vec<f64> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs;
-use std::io::Cursor;
+use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
 use actq::data::NpzWriter;
@@ -12,14 +12,16 @@ use actq_deploy::{Answers, Bundle, DESCRIPTION, Deployment, Plan, Raw, Reading, 
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::import::refuse_existing;
-use crate::args::ImportArgs;
+use crate::args::{ImportArgs, ReadingArgs};
 use crate::outputs::unfinished::OutputFolder;
+use crate::questions;
 use crate::report::deployment;
 use crate::terminal::{note, print, reserve};
 
 /// Returns `true` if the arguments name a bundle, or have an option that only bundles take.
 pub(crate) fn is_bundle(args: &ImportArgs) -> bool {
-    let options = args.answers.is_some() || args.accept_profile || args.reference.is_some();
+    let ReadingArgs { answers, ask, accept_profile, reference } = &args.reading;
+    let options = answers.is_some() || *ask || *accept_profile || reference.is_some();
     options || args.model.is_dir() || args.model.extension().is_some_and(|ending| ending == "kinfer")
 }
 
@@ -27,19 +29,14 @@ pub(crate) fn is_bundle(args: &ImportArgs) -> bool {
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     let of_files = args.output.is_some() || !args.state.is_empty();
     ensure!(!of_files, "a bundle takes no --output and no --state: its description names them");
-    ensure!(!args.check || args.reference.is_some(), "--check of a bundle needs --reference RAW.npz:EXPECT.npz");
+    ensure!(
+        !args.check || args.reading.reference.is_some(),
+        "--check of a bundle needs --reference RAW.npz:EXPECT.npz"
+    );
     let bundle = Bundle::open(&args.model)?;
-    let answers = match &args.answers {
-        Some(path) => {
-            let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
-            Answers::parse(&text).with_context(|| path.display().to_string())?
-        }
-        None => Answers::default(),
-    };
-    let reading = read(&bundle, args.accept_profile, answers)?;
-    refuse_open_questions(&reading)?;
+    let reading = answered(&bundle, &args.reading)?;
     let plan = Plan::new(&reading.description, &bundle).context(DESCRIPTION)?;
-    let checked = match &args.reference {
+    let checked = match &args.reading.reference {
         Some((raw, expect)) => Some(compare(&reading.description, plan, &bundle, &Reference::read(raw, expect)?)?),
         None => None,
     };
@@ -69,6 +66,26 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     print(&format!("written   {}\n", written.join(", ")))
 }
 
+/// Reads a bundle with the answers of a file and of the terminal.
+fn answered(bundle: &Bundle, args: &ReadingArgs) -> Result<Reading> {
+    let answers = match &args.answers {
+        Some(path) => {
+            let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+            Answers::parse(&text).with_context(|| path.display().to_string())?
+        }
+        None => Answers::default(),
+    };
+    if !args.ask {
+        let reading = read(bundle, args.accept_profile, answers)?;
+        refuse_open_questions(&reading)?;
+        return Ok(reading);
+    }
+    let (reading, answers) =
+        questions::ask(bundle, args.accept_profile, answers, &mut io::stdin().lock(), &mut io::stderr())?;
+    print(&format!("answers, as --answers takes them:\n{answers}\n"))?;
+    Ok(reading)
+}
+
 /// Fails with the questions that nothing answers.
 fn refuse_open_questions(reading: &Reading) -> Result<()> {
     let questions = &reading.questions;
@@ -82,8 +99,8 @@ fn refuse_open_questions(reading: &Reading) -> Result<()> {
     };
     print(&deployment::questions(questions))?;
     bail!(
-        "the bundle (family {}) leaves {} questions open; {accept}write answers to a file as KEY = VALUE, and pass it to --answers. \
-         Nothing was written",
+        "the bundle (family {}) leaves {} questions open; {accept}write answers to a file as KEY = VALUE, and pass it to --answers, or \
+         pass --ask. Nothing was written",
         reading.family,
         questions.len()
     )

@@ -8,10 +8,11 @@ use std::process::Command;
 use actq::methods::Method;
 use actq::runtime::ImageBuffer;
 use actq_deploy::DESCRIPTION;
+use actq_deploy::description::Description;
 use anyhow::{Context as _, Result, bail, ensure};
 
-use super::{bundle, check, quantize};
-use crate::args::{CheckArgs, DeployArgs, ImportArgs, LearnArgs, QuantizeArgs};
+use super::{bundle, check, constants, quantize};
+use crate::args::{CheckArgs, ConstantsArgs, DeployArgs, ImportArgs, LearnArgs, QuantizeArgs};
 use crate::importers::load;
 use crate::terminal::{note, print};
 
@@ -27,12 +28,12 @@ const IMAGE: &str = "policy.actq";
 pub(crate) fn run(args: &DeployArgs) -> Result<()> {
     let only_reference = args.recordings.is_empty();
     ensure!(
-        !only_reference || args.reference.is_some(),
+        !only_reference || args.reading.reference.is_some(),
         "give --recordings: what the policy observes on its task. `actq import` and `actq quantize --method rtn` make a first image; \
          run it on the robot or in simulation by `actq serve IMAGE --record FILE`, and pass FILE"
     );
     let policy = args.out.join(POLICY);
-    let raw = args.reference.as_ref().map(|(raw, _)| raw.clone());
+    let raw = args.reading.reference.as_ref().map(|(raw, _)| raw.clone());
     step(1, "import")?;
     let description = policy.join(DESCRIPTION);
     if description.exists() {
@@ -46,9 +47,7 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
             output: None,
             state: Vec::new(),
             check: false,
-            answers: args.answers.clone(),
-            accept_profile: args.accept_profile,
-            reference: args.reference.clone(),
+            reading: args.reading.clone(),
             force: false,
         })?;
     }
@@ -67,15 +66,25 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
         quantize::run(&quantization(args, &policy, &image), Some(Method::Distill), |_, _| String::new())?;
         fs::write(args.out.join(MADE_WITH), &made_with).context("cannot write the options")?;
     }
-    if let Some(reference) = &args.reference {
+    if let Some(reference) = &args.reading.reference {
         step(3, "check the image")?;
         check::run(&CheckArgs { image: image.clone(), reference: reference.clone(), max_nmse: args.max_nmse })?;
     }
+    step(4, "constants")?;
+    for ending in ["rs", "h"] {
+        let out = args.out.join(IMAGE).with_extension(ending);
+        let gains = has_gains(&description)?.then(|| description.clone());
+        constants::run(&ConstantsArgs { image: image.clone(), out, gains })?;
+    }
     if let Some(board) = &args.board {
-        step(4, "firmware")?;
+        step(5, "firmware")?;
         firmware(board, &image, &args.out.join(format!("{board}.elf")))?;
     }
     Ok(())
+}
+
+fn has_gains(description: &Path) -> Result<bool> {
+    Ok(Description::parse(&fs::read_to_string(description)?)?.gains.is_some())
 }
 
 fn step(number: usize, what: &str) -> Result<()> {
@@ -88,12 +97,8 @@ fn quantization(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs 
         policy_dir: policy.to_owned(),
         out: image.to_owned(),
         calib: args.recordings.clone(),
-        bits: None,
-        bpw: args.bpw,
-        flash: args.flash,
+        budget: args.budget.clone(),
         max_nmse: None,
-        ms: args.ms,
-        clock: args.clock,
         width: Vec::new(),
         protect: Vec::new(),
         group: None,
@@ -106,12 +111,9 @@ fn quantization(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs 
 
 /// Returns what an image depends on beside the policy, as text.
 fn made_with(args: &DeployArgs) -> Result<String> {
-    let mut text = format!(
-        "bpw {:?}, flash {:?}, ms {:?} at {}, {:?}, seed {}\n",
-        args.bpw, args.flash, args.ms, args.clock, args.learn, args.run.seed
-    );
+    let mut text = format!("{:?}, {:?}, seed {}\n", args.budget, args.learn, args.run.seed);
     let files = if args.recordings.is_empty() {
-        args.reference.iter().map(|(raw, _)| raw).collect()
+        args.reading.reference.iter().map(|(raw, _)| raw).collect()
     } else {
         args.recordings.iter().collect::<Vec<_>>()
     };

@@ -12,7 +12,7 @@ use actq::pipeline::{QuantizedPolicy, Quantizer, check_budget};
 use actq_kernels::Width;
 use anyhow::{Result, bail};
 
-use crate::args::{ActivationArg, QuantizeArgs};
+use crate::args::{ActivationArg, BudgetArgs, QuantizeArgs};
 use crate::importers::{learned as learned_from, load, policy_files};
 use crate::report::learned::learned;
 use crate::report::{notes, quantized, time};
@@ -106,13 +106,14 @@ pub fn run(
 
 /// Returns the options of the command line.
 fn options(args: &QuantizeArgs, method: Method) -> Options {
+    let BudgetArgs { bits, bpw, flash, ms, clock } = args.budget;
     let limits = [
-        args.bpw.map(Budget::BitsPerWeight),
-        args.flash.map(Budget::ImageBytes),
+        bpw.map(Budget::BitsPerWeight),
+        flash.map(Budget::ImageBytes),
         args.max_nmse.map(Budget::MaxNmse),
-        args.ms.map(|milliseconds| Budget::Time(TimeLimit { milliseconds, clock_hz: args.clock })),
+        ms.map(|milliseconds| Budget::Time(TimeLimit { milliseconds, clock_hz: clock })),
     ];
-    let width = args.bits.unwrap_or(Width::W3);
+    let width = bits.unwrap_or(Width::W3);
     let protected = args.protect.iter().map(|name| (name.clone(), Width::W8));
     Options {
         group: args.group.unwrap_or(method.default_group()),

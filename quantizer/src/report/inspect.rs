@@ -52,7 +52,8 @@ pub fn report(image: &Image<'_>) -> String {
         };
         let [low, high] = port.range;
         let range = if low.is_finite() || high.is_finite() { format!(", {low} to {high}") } else { String::new() };
-        let _ = writeln!(text, "{what:13} {} ({} values{range})", printable(port.name), port.len);
+        let names = if port.names.is_empty() { String::new() } else { format!(": {}", port.names.replace('\n', ", ")) };
+        let _ = writeln!(text, "{what:13} {} ({} values{range}){names}", printable(port.name), port.len);
     }
     let playback = playback(image);
     if !playback.is_empty() {

@@ -105,6 +105,31 @@ fn a_bundle_without_answers_is_asked_about_and_nothing_is_written() -> Result<()
 }
 
 #[test]
+fn questions_are_asked_until_all_are_answered() -> Result<()> {
+    let robot = Robot::new(YAML)?;
+    succeeded(&run(robot.import("accepted", &["--accept-profile"]), b"")?)?;
+    // A wrong answer is asked for again; an empty line accepts what the deploy code says.
+    let answers = format!("sideways\n{}", "\n".repeat(50));
+    let output = run(robot.import("asked", &["--ask"]), answers.as_bytes())?;
+    let (asked, report) = (String::from_utf8(output.stderr.clone())?, succeeded(&output)?);
+    ensure!(asked.matches("history.layout = ").count() >= 2, "{asked}");
+    ensure!(
+        report.contains("answers, as --answers takes them:\n") && report.contains("history.layout = \"term\"\n"),
+        "{report}"
+    );
+    let description = |folder: &str| -> Result<String> {
+        let text = fs::read_to_string(robot.path(folder).join("deploy.toml"))?;
+        Ok(text.lines().filter(|line| !line.starts_with('#')).collect())
+    };
+    ensure!(description("asked")? == description("accepted")?, "the answers made another description");
+
+    let error = refused(&run(robot.import("ended", &["--ask"]), b"\n")?)?;
+    ensure!(error.contains("the input ended before") && error.contains(" was answered; the answers so far"), "{error}");
+    ensure!(!robot.path("ended").exists(), "something was written");
+    Ok(())
+}
+
+#[test]
 fn a_bundle_becomes_a_description_and_an_image() -> Result<()> {
     let robot = Robot::new(YAML)?;
     expect(&robot.path("expect.npz"), false)?;
@@ -167,15 +192,27 @@ fn deploy_makes_everything_and_keeps_what_is_made() -> Result<()> {
     let recording = recording(&robot)?;
     let all = [&base[..], &["--reference", &reference, "--recordings", &recording, "--steps", "5"]].concat();
     let report = succeeded(&run(actq(&all), b"")?)?;
-    for part in
-        ["1. import", "12 ticks agree", "2. quantize", "240 observations", "3. check the image", "largest error"]
-    {
+    for part in [
+        "1. import",
+        "12 ticks agree",
+        "2. quantize",
+        "240 observations",
+        "3. check the image",
+        "largest error",
+        "4. constants",
+    ] {
         ensure!(report.contains(part), "{part} is not in\n{report}");
     }
     let image = fs::read(robot.path("deployed/policy.actq"))?;
     let report = succeeded(&run(actq(&all), b"")?)?;
     for part in ["deploy.toml: kept", "made before with the same options", "largest error"] {
         ensure!(report.contains(part), "{part} is not in\n{report}");
+    }
+    for (file, part) in
+        [("policy.rs", "pub const TARGET_TARGET: usize = 0;"), ("policy.h", "#define POLICY_STIFFNESS {10.0f, 20.0f}")]
+    {
+        let source = fs::read_to_string(robot.path("deployed").join(file))?;
+        ensure!(source.contains(part), "{part} is not in {file}:\n{source}");
     }
     // Another option makes another image.
     let report = succeeded(&run(actq(&[&all[..], &["--bpw", "20"]].concat()), b"")?)?;

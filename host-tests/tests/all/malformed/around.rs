@@ -105,6 +105,19 @@ fn impossible_operations_around_a_network_are_refused() -> Result<()> {
             let name = d.offset(ports(d) + 4);
             d.set(name, 7);
         }),
+        ("names of values outside", E::Section, |d| d.set(ports(d) + 5, d.0.len() as u32)),
+        ("names of values in the header", E::Section, |d| d.set(ports(d) + 5, 1)),
+        ("names of values that are none", E::Ports, |d| d.set(d.offset(ports(d) + 5), 0)),
+        ("a name too few", E::Ports, |d| d.set(d.offset(ports(d) + 5), 3)),
+        ("a name of a value that is empty", E::Ports, |d| {
+            // "a\nb\nc" becomes "a\n\ncc".
+            let text = d.offset(ports(d) + 5) + 1;
+            d.set(text, u32::from_le_bytes(*b"a\n\nc"));
+        }),
+        ("a name of a value with a control character", E::Ports, |d| {
+            let text = d.offset(ports(d) + 5) + 1;
+            d.set(text, u32::from_le_bytes(*b"a\n\x07\n"));
+        }),
     ];
     refused_of(&Draft::of(&four_bits(&Made::deployment()?.1.policy)?), cases);
     Ok(())

@@ -1,5 +1,6 @@
 //! Writes an image's words.
 
+use std::iter;
 use std::path::Path;
 
 use actq_kernels::image::{
@@ -216,15 +217,25 @@ impl Writer {
         }
         let inputs = ports.iter().filter(|port| port.kind == PortKind::Input).count();
         let mut records = vec![(inputs | (ports.len() - inputs) << 16) as u32];
-        let mut name = self.words.len() as u32 + 1 + 4 * ports.len() as u32;
-        for NamedPort { kind, name: text, len, range } in ports {
-            records.extend(Port { kind: *kind, name: text, len: *len, range: *range }.emit(name)?);
-            name += text.len().div_ceil(4) as u32;
+        let mut texts: Vec<u8> = Vec::new();
+        let (mut list, mut list_at) = (&[][..], 0);
+        for NamedPort { kind, name, names, len, range } in ports {
+            let end = |texts: &[u8]| (self.words.len() + 1 + Port::WORDS * ports.len() + texts.len() / 4) as u32;
+            let name_at = end(&texts);
+            texts.extend(whole_words(name));
+            // Ports that follow each other often have the same joints: they share a list.
+            if !names.is_empty() && names != list {
+                let lines = names.join("\n");
+                (list, list_at) = (names, end(&texts));
+                texts.extend((lines.len() as u32).to_le_bytes());
+                texts.extend(whole_words(&lines));
+            }
+            let names_at = if names.is_empty() { 0 } else { list_at };
+            let port = Port { kind: *kind, name, names: "", len: *len, range: *range };
+            records.extend(port.emit(name_at, names_at)?);
         }
         self.push(records);
-        for port in ports {
-            self.push_bytes(port.name.as_bytes());
-        }
+        self.push_bytes(&texts);
         Ok(())
     }
 
@@ -319,7 +330,12 @@ impl Writer {
 
 /// Returns the distances from each row's output to the next row's, and from output 0 to the first.
 fn steps(rows: &[usize]) -> Result<Vec<u8>> {
-    let before = std::iter::once(&0).chain(rows);
+    let before = iter::once(&0).chain(rows);
     let steps = before.zip(rows).map(|(before, row)| u8::try_from(row - before));
     steps.collect::<Result<_, _>>().context("rows of one width are more than 255 apart")
+}
+
+/// Returns a text's bytes, with zeros up to a whole word.
+fn whole_words(text: &str) -> impl Iterator<Item = u8> + use<'_> {
+    text.bytes().chain(iter::repeat_n(0, text.len().next_multiple_of(4) - text.len()))
 }

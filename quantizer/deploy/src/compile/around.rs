@@ -11,7 +11,7 @@ use super::clock;
 use super::joined::{Joined, Output, Source, has_weights, part};
 use super::operations::{Operations, words};
 use crate::description::{Clock, End, TargetKind, When};
-use crate::plan::{Feed, Maker, Plan, Slot, Step};
+use crate::plan::{Feed, Maker, Plan, PlannedTarget, Slot, Step};
 use crate::sources::Array;
 
 /// Makes the operations.
@@ -81,7 +81,7 @@ impl Compiler<'_> {
         } else {
             self.to.own(observation)
         };
-        let targets = self.places(&plan.targets.iter().map(|(_, slot)| *slot).collect::<Vec<_>>())?;
+        let targets = self.places(&plan.targets.iter().map(|target| target.slot).collect::<Vec<_>>())?;
         self.to.phase = 1;
         let action = self.to.value(targets.iter().map(|target| target.len).sum());
         let mut offset = 0;
@@ -298,30 +298,36 @@ impl Compiler<'_> {
 /// Returns the limits of all targets, the largest numbers where one has none.
 fn limits(plan: &Plan) -> Option<[Vec<f32>; 2]> {
     let of = |which: usize, none: f32| {
-        let each = plan.targets.iter().zip(&plan.limits).flat_map(move |((_, slot), limits)| match limits {
+        let each = plan.targets.iter().flat_map(move |target| match &target.limits {
             Some(limits) => limits[which].iter().map(|limit| *limit as f32).collect(),
-            None => vec![none; plan.values[*slot].labels.len()],
+            None => vec![none; plan.values[target.slot].labels.len()],
         });
         each.collect()
     };
-    plan.limits.iter().any(Option::is_some).then(|| [of(0, f32::MIN), of(1, f32::MAX)])
+    let limited = plan.targets.iter().any(|target| target.limits.is_some());
+    limited.then(|| [of(0, f32::MIN), of(1, f32::MAX)])
 }
 
 /// Lists raw inputs and targets.
 fn ports(plan: &Plan) -> Vec<NamedPort> {
+    const UNLIMITED: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
     let input = |(i, (name, len)): (usize, &(String, usize))| {
-        let range = plan.ranges[i].map_or([f32::NEG_INFINITY, f32::INFINITY], |range| range.map(|limit| limit as f32));
-        NamedPort { kind: PortKind::Input, name: name.clone(), len: *len, range }
+        let range = plan.ranges[i].map_or(UNLIMITED, |range| range.map(|limit| limit as f32));
+        // Inputs are the first values of a plan.
+        let value = &plan.values[i];
+        let joints = value.labels.iter().filter(|_| value.joints.is_some());
+        let names = joints.map(|label| label.element.clone()).collect();
+        NamedPort { kind: PortKind::Input, name: name.clone(), names, len: *len, range }
     };
-    let target = |(kind, slot): &(TargetKind, Slot)| {
-        let labels = &plan.values[*slot].labels;
-        let kind = match kind {
+    let target = |target: &PlannedTarget| {
+        let kind = match target.kind {
             TargetKind::Position => PortKind::Position,
             TargetKind::Velocity => PortKind::Velocity,
             TargetKind::Torque => PortKind::Torque,
         };
-        let name = plan.names[*slot].clone();
-        NamedPort { kind, name, len: labels.len(), range: [f32::NEG_INFINITY, f32::INFINITY] }
+        let name = plan.names[target.slot].clone();
+        let len = plan.values[target.slot].labels.len();
+        NamedPort { kind, name, names: target.joints.clone(), len, range: UNLIMITED }
     };
     plan.inputs.iter().enumerate().map(input).chain(plan.targets.iter().map(target)).collect()
 }

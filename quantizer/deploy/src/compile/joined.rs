@@ -147,7 +147,7 @@ impl Builder<'_> {
     fn used(&self) -> Result<Vec<Output>> {
         let plan = self.plan;
         let mut read: Vec<Slot> = vec![plan.action];
-        read.extend(plan.targets.iter().map(|(_, slot)| *slot));
+        read.extend(plan.targets.iter().map(|target| target.slot));
         read.extend(plan.states.iter().map(|state| state.next));
         let mut seen = vec![false; plan.values.len()];
         let mut used = Vec::new();

@@ -6,8 +6,8 @@ use actq::error::{Context as _, Result, bail, ensure};
 
 use super::names::Names;
 use super::numbers;
-use super::parts::{Feed, Maker, Plan, Planned, PlannedNetwork, PlannedState, Slot, Work};
-use crate::description::{Clock, Description, Order, SCHEMA};
+use super::parts::{Feed, Maker, Plan, Planned, PlannedNetwork, PlannedState, PlannedTarget, Slot, Work};
+use crate::description::{Clock, Description, Order, SCHEMA, Target};
 use crate::label::{Label, labels};
 use crate::sources::Sources;
 
@@ -48,7 +48,6 @@ impl Plan {
                 order: Vec::new(),
                 action: 0,
                 targets: Vec::new(),
-                limits: Vec::new(),
             },
         };
         builder.build()?;
@@ -124,29 +123,37 @@ impl Builder<'_> {
         self.plan.action = self.value(&description.action, "action")?;
         ensure!(!description.targets.is_empty(), "[[target]]: give at least one");
         for target in &description.targets {
-            let key = format!("target {:?}: value", target.value);
-            let slot = self.value(&target.value, &key)?;
-            if let Some(order) = &target.joints {
-                let (names, len) = (self.joints(order, &key)?.len(), self.plan.values[slot].labels.len());
-                ensure!(names == len, "{key}: it has {len} values, but joints.{order} has {names} names");
-                let own = self.plan.values[slot].joints.as_ref();
-                ensure!(
-                    own.is_none_or(|own| own == order),
-                    "{key}: its values are in the order joints.{}, not joints.{order}; add {{ place = {order:?} }}",
-                    own.map_or("", String::as_str)
-                );
-            }
-            self.plan.targets.push((target.kind, slot));
-            let len = self.plan.values[slot].labels.len();
-            let limits = target.limits.as_ref().map(|limits| -> Result<[Vec<f64>; 2]> {
-                let [low, high] = [numbers::each(&limits[0], len)?, numbers::each(&limits[1], len)?];
-                let bad = low.iter().zip(&high).position(|(low, high)| low > high);
-                ensure!(bad.is_none(), "value {}: give the lowest number first", bad.unwrap_or(0));
-                Ok([low, high])
-            });
-            self.plan.limits.push(limits.transpose().with_context(|| format!("target {:?}: limits", target.value))?);
+            let target = self.target(target)?;
+            self.plan.targets.push(target);
         }
         self.gains()
+    }
+
+    fn target(&mut self, target: &Target) -> Result<PlannedTarget> {
+        let key = format!("target {:?}", target.value);
+        let slot = self.value(&target.value, &format!("{key}: value"))?;
+        let value = &self.plan.values[slot];
+        let len = value.labels.len();
+        if let Some(order) = &target.joints {
+            let names = self.joints(order, &key)?.len();
+            ensure!(names == len, "{key}: it has {len} values, but joints.{order} has {names} names");
+            let own = value.joints.as_ref();
+            ensure!(
+                own.is_none_or(|own| own == order),
+                "{key}: its values are in the order joints.{}, not joints.{order}; add {{ place = {order:?} }}",
+                own.map_or("", String::as_str)
+            );
+        }
+        let order = target.joints.as_ref().or(value.joints.as_ref());
+        let joints = order.map_or(Ok(Vec::new()), |order| self.joints(order, &key).map(<[_]>::to_vec))?;
+        let limits = target.limits.as_ref().map(|limits| -> Result<[Vec<f64>; 2]> {
+            let [low, high] = [numbers::each(&limits[0], len)?, numbers::each(&limits[1], len)?];
+            let bad = low.iter().zip(&high).position(|(low, high)| low > high);
+            ensure!(bad.is_none(), "value {}: give the lowest number first", bad.unwrap_or(0));
+            Ok([low, high])
+        });
+        let limits = limits.transpose().with_context(|| format!("{key}: limits"))?;
+        Ok(PlannedTarget { kind: target.kind, slot, joints, limits })
     }
 
     fn gains(&self) -> Result<()> {

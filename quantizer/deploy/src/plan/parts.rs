@@ -54,6 +54,16 @@ pub(crate) struct PlannedState {
     pub(crate) next: Slot,
 }
 
+/// A target.
+pub(crate) struct PlannedTarget {
+    pub(crate) kind: TargetKind,
+    pub(crate) slot: Slot,
+    /// Its joints, if they are given or known.
+    pub(crate) joints: Vec<String>,
+    /// Lowest and highest values, if they are given.
+    pub(crate) limits: Option<[Vec<f64>; 2]>,
+}
+
 /// A step of a tick.
 #[derive(Clone, Copy)]
 pub(crate) enum Work {
@@ -74,9 +84,7 @@ pub struct Plan {
     pub(crate) names: Vec<String>,
     pub(crate) order: Vec<Work>,
     pub(crate) action: Slot,
-    pub(crate) targets: Vec<(TargetKind, Slot)>,
-    /// Lowest and highest value of each target, if they are given.
-    pub(crate) limits: Vec<Option<[Vec<f64>; 2]>>,
+    pub(crate) targets: Vec<PlannedTarget>,
 }
 
 impl Plan {

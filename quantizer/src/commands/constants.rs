@@ -1,0 +1,48 @@
+//! `actq constants`
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::Path;
+
+use actq::runtime::ImageBuffer;
+use actq_deploy::description::Description;
+use anyhow::{Context as _, Result, bail, ensure};
+
+use crate::args::ConstantsArgs;
+use crate::report::constants::{Language, source};
+use crate::terminal::{print, reserve};
+
+/// Writes an image's constants as source code.
+pub(crate) fn run(args: &ConstantsArgs) -> Result<()> {
+    let shown = args.out.display();
+    let language = match args.out.extension().and_then(OsStr::to_str) {
+        Some("rs") => Language::Rust,
+        Some("h") => Language::C,
+        _ => bail!("{shown}: give a name that ends in .rs for Rust, or in .h for C and C++"),
+    };
+    let prefix = args.out.file_stem().and_then(OsStr::to_str).with_context(|| format!("{shown}: no name of a file"))?;
+    let inputs: Vec<_> = [Some(args.image.clone()), args.gains.clone()].into_iter().flatten().collect();
+    let outputs = reserve(&[&args.out], &inputs)?;
+    let buffer = ImageBuffer::read(&args.image)?;
+    let image = buffer.image(&args.image)?;
+    let description = args.gains.as_deref().map(described).transpose()?;
+    let gains = description.as_ref().and_then(|description| {
+        let gains = description.gains.as_ref()?;
+        let joints = gains.joints.as_ref().and_then(|order| description.joints.get(order));
+        Some((gains, joints.map_or(&[][..], Vec::as_slice)))
+    });
+    outputs.write(&[source(language, &image, prefix, gains)])?;
+    print(&format!("{shown}: constants of {}\n", args.image.display()))
+}
+
+/// Reads a description that has gains.
+fn described(path: &Path) -> Result<Description> {
+    let read = || -> Result<Description> {
+        let description = Description::parse(&fs::read_to_string(path)?)?;
+        let gains = description.gains.as_ref().context("it has no [gains]")?;
+        let all = gains.stiffness.iter().chain(&gains.damping);
+        ensure!(all.clone().all(|gain| (*gain as f32).is_finite()), "[gains]: a gain is outside f32");
+        Ok(description)
+    };
+    read().with_context(|| path.display().to_string())
+}
