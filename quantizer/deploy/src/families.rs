@@ -4,6 +4,7 @@ mod common;
 mod holosoma;
 mod humanoidverse;
 mod kinfer;
+mod lerobot;
 mod limx;
 mod mjlab;
 mod unitree_rl_lab;
@@ -18,4 +19,5 @@ pub(crate) static FAMILIES: &[&dyn Family] = &[
     &holosoma::Holosoma,
     &kinfer::Kinfer,
     &mjlab::Mjlab,
+    &lerobot::Lerobot,
 ];

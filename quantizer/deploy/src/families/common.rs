@@ -82,7 +82,8 @@ impl Parts {
 
     /// Adds a raw input in the order of a list of joints.
     pub(super) fn raw_joints(&mut self, name: &str, joints: &str, unit: &str) {
-        let (unit, joints) = (Some(unit.to_owned()), Some(joints.to_owned()));
+        let unit = (!unit.is_empty()).then(|| unit.to_owned());
+        let joints = Some(joints.to_owned());
         self.description.inputs.push(Input { name: name.to_owned(), len: None, joints, unit, range: None });
     }
 

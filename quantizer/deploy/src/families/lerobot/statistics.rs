@@ -1,0 +1,110 @@
+//! Statistics of features in .safetensors files.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use actq::error::{Context as _, Result, ensure};
+use actq::import::tensors::TensorFile;
+use actq::import::values::{Tensor, Values};
+use actq::text::printable;
+
+use super::Feature;
+use crate::bundle::Bundle;
+use crate::facts::Facts;
+
+/// Most bytes of a file: more than the weights of a network that fits a microcontroller.
+const MOST_BYTES: u64 = 256 << 20;
+/// Most names in a message.
+const MOST_LISTED: usize = 12;
+
+/// The statistics of a file.
+#[derive(Debug)]
+pub(super) struct Statistics {
+    file: String,
+    /// Prefixes of the names of a feature's statistics, each up to the name of the statistic.
+    prefixes: fn(&str) -> Vec<String>,
+    tensors: BTreeMap<String, Tensor>,
+}
+
+impl Statistics {
+    /// Reads a processor's state: tensors `FEATURE.STATISTIC`.
+    pub(super) fn of_processor(bundle: &Bundle, file: &str) -> Result<Self> {
+        let tensors = read(bundle, file, |_| true)?;
+        Ok(Self { file: file.to_owned(), prefixes: |feature| vec![format!("{feature}.")], tensors })
+    }
+
+    /// Stands for a state that `file` does not name.
+    pub(super) fn none(file: &str) -> Self {
+        Self { file: file.to_owned(), prefixes: |_| Vec::new(), tensors: BTreeMap::new() }
+    }
+
+    /// Reads the buffers that older policies kept beside their weights; without any, it is empty.
+    pub(super) fn of_weights(bundle: &Bundle, file: &str) -> Result<Self> {
+        let tensors = read(bundle, file, |name| {
+            ["normalize_inputs.", "unnormalize_outputs."].iter().any(|p| name.starts_with(p))
+        })?;
+        let prefixes = |feature: &str| {
+            let module = if feature == "action" { "unnormalize_outputs" } else { "normalize_inputs" };
+            let feature = feature.replace('.', "_");
+            vec![format!("{module}.buffer_{feature}."), format!("{module}.{feature}_")]
+        };
+        Ok(Self { file: file.to_owned(), prefixes, tensors })
+    }
+
+    /// Returns the name of one of the tensors, if there is one.
+    pub(super) fn first(&self) -> Option<&str> {
+        self.tensors.keys().next().map(String::as_str)
+    }
+
+    /// Returns a statistic of a feature, and its place for reports.
+    pub(super) fn vector(&self, feature: &Feature, statistic: &str) -> Result<(Vec<f64>, String)> {
+        let mut names = (self.prefixes)(&feature.name).into_iter().map(|prefix| prefix + statistic);
+        let found = names.find_map(|name| self.tensors.get_key_value(&name));
+        let (name, tensor) = found.with_context(|| {
+            let names: Vec<_> = self.tensors.keys().take(MOST_LISTED).map(|name| printable(name)).collect();
+            format!(
+                "{}: it has no {statistic} of {:?}; save the policy with its dataset's statistics, or set the mode of {} to \
+                 IDENTITY if its values are not normalized. It has {}",
+                self.file,
+                printable(&feature.name),
+                feature.kind,
+                if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+            )
+        })?;
+        let at = format!("{}: {}", self.file, printable(name));
+        let supported = matches!(tensor.values, Values::F32(_) | Values::F64(_) | Values::I64(_));
+        let values = tensor.values.to_f64().filter(|_| supported);
+        let values = values.with_context(|| {
+            format!("{at} is of type {}; use float32, float64 or int64", printable(tensor.values.type_name()))
+        })?;
+        if tensor.shape != [feature.len] {
+            return Err(Facts::contradiction(
+                &format!("length of {:?}", printable(&feature.name)),
+                (&feature.at, &format!("{} values", feature.len)),
+                (&at, &format!("the shape {:?}", tensor.shape)),
+            ));
+        }
+        let wrong = values.iter().position(|value| !(*value as f32).is_finite());
+        ensure!(
+            wrong.is_none(),
+            "{at}: value {} (the first is 0) is {}; give finite float32 numbers",
+            wrong.unwrap_or_default(),
+            wrong.map_or(0.0, |i| values[i])
+        );
+        Ok((values, at))
+    }
+}
+
+/// Reads the tensors with some names.
+fn read(bundle: &Bundle, file: &str, keep: impl Fn(&str) -> bool) -> Result<BTreeMap<String, Tensor>> {
+    let path = bundle.path(file)?;
+    let read = || -> Result<_> {
+        let bytes = fs::metadata(&path).context("cannot read the file")?.len();
+        ensure!(bytes <= MOST_BYTES, "it has {bytes} bytes, and at most {MOST_BYTES} are read");
+        let bytes = fs::read(&path).context("cannot read the file")?;
+        let tensors = TensorFile::new(&bytes).context("not a .safetensors file, or a truncated one")?;
+        let names = tensors.names().into_iter().filter(|name| keep(name));
+        Ok(names.filter_map(|name| Some((name.clone(), tensors.get(&name)?))).collect())
+    };
+    read().with_context(|| file.to_owned())
+}
