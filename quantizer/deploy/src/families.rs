@@ -7,6 +7,7 @@ mod kinfer;
 mod lerobot;
 mod limx;
 mod mjlab;
+mod rl_sar;
 mod unitree_rl_lab;
 
 use crate::family::Family;
@@ -15,6 +16,7 @@ use crate::family::Family;
 pub(crate) static FAMILIES: &[&dyn Family] = &[
     &limx::Limx,
     &unitree_rl_lab::UnitreeRlLab,
+    &rl_sar::RlSar,
     &humanoidverse::Humanoidverse,
     &holosoma::Holosoma,
     &kinfer::Kinfer,

@@ -19,6 +19,8 @@ pub(super) struct Histories {
     pub(super) by_term: bool,
     pub(super) first: First,
     pub(super) fill: Fill,
+    /// Ticks from a frame to the next.
+    pub(super) stride: usize,
 }
 
 impl Histories {
@@ -30,11 +32,11 @@ impl Histories {
             Some("frame") | None => false,
             Some(other) => bail!("history.layout = {other:?}: give \"term\" or \"frame\""),
         };
-        Ok(Self { by_term, first: facts.get("history.first")?, fill: facts.get("history.fill")? })
+        Ok(Self { by_term, first: facts.get("history.first")?, fill: facts.get("history.fill")?, stride: 1 })
     }
 
     pub(super) fn spec(&self, length: usize) -> History {
-        History { length, stride: 1, first: self.first, fill: self.fill, current: true }
+        History { length, stride: self.stride, first: self.first, fill: self.fill, current: true }
     }
 }
 

@@ -184,7 +184,7 @@ impl Reader<'_> {
         let histories = if length > 1 {
             Histories::of(self.facts)?
         } else {
-            Histories { by_term: true, first: Default::default(), fill: Default::default() }
+            Histories { by_term: true, first: Default::default(), fill: Default::default(), stride: 1 }
         };
         let mut all = 0;
         for (i, name) in terms.iter().enumerate() {

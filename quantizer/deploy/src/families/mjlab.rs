@@ -628,7 +628,7 @@ fn terms(
     let histories = if frames.iter().any(|length| *length > 1) {
         Histories::of(facts)?
     } else {
-        Histories { by_term: false, first: Default::default(), fill: Default::default() }
+        Histories { by_term: false, first: Default::default(), fill: Default::default(), stride: 1 }
     };
     parts.observe(&histories)
 }

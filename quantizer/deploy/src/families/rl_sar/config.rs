@@ -1,0 +1,148 @@
+//! The keys of a policy: those of its config.yaml, and those of its robot's base.yaml that it does not replace.
+
+use actq::error::{Context as _, Result, ensure};
+use actq::text::printable;
+
+use super::super::common::count;
+use crate::document::Document;
+use crate::facts::Facts;
+use crate::yaml::Node;
+
+/// A map of a file, below its first key.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Section<'a> {
+    pub(super) document: &'a Document,
+    pub(super) name: &'a str,
+}
+
+impl Section<'_> {
+    fn path(self, key: &str) -> String {
+        format!("{}.{key}", self.name)
+    }
+
+    pub(super) fn has(self, key: &str) -> bool {
+        self.document.look(&self.path(key)).is_some()
+    }
+
+    /// Returns a list of names, if it has one.
+    pub(super) fn names(self, key: &str) -> Result<Option<Vec<String>>> {
+        let path = self.path(key);
+        let Some(names) = self.document.maybe(&path, "a list of names", Node::texts)? else { return Ok(None) };
+        for (i, name) in names.iter().enumerate() {
+            let shown = printable(name);
+            ensure!(shown == *name && !name.is_empty(), "{}: {shown:?} is not a name", self.at(key));
+            ensure!(!names[..i].contains(name), "{}: {name:?} occurs twice", self.at(key));
+        }
+        Ok(Some(names))
+    }
+
+    pub(super) fn at(self, key: &str) -> String {
+        self.document.at(&self.path(key))
+    }
+}
+
+/// The keys of a policy.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Config<'a> {
+    pub(super) own: Section<'a>,
+    pub(super) base: Option<Section<'a>>,
+}
+
+impl<'a> Config<'a> {
+    /// Returns the section that has a key: the policy's own, if both have it.
+    fn section(&self, key: &str) -> Section<'a> {
+        let given = |section: &Section<'_>| section.document.get(&section.path(key)).is_some();
+        // Both are looked up, since a key of base.yaml counts as read if the policy replaces it.
+        match (given(&self.own), self.base.filter(given)) {
+            (false, Some(base)) => base,
+            _ => self.own,
+        }
+    }
+
+    /// Names a key, for reports and errors.
+    pub(super) fn at(&self, key: &str) -> String {
+        self.section(key).at(key)
+    }
+
+    pub(super) fn need<T>(&self, key: &str, what: &str, as_type: impl Fn(&'a Node) -> Option<T>) -> Result<T> {
+        let section = self.section(key);
+        section.document.need(&section.path(key), what, as_type)
+    }
+
+    pub(super) fn maybe<T>(&self, key: &str, what: &str, as_type: impl Fn(&'a Node) -> Option<T>) -> Result<Option<T>> {
+        let section = self.section(key);
+        section.document.maybe(&section.path(key), what, as_type)
+    }
+
+    pub(super) fn number(&self, key: &str) -> Result<f64> {
+        self.need(key, "a finite number", Node::number)
+    }
+
+    pub(super) fn positive(&self, key: &str) -> Result<f64> {
+        self.need(key, "a number above 0", |node| node.number().filter(|number| *number > 0.0))
+    }
+
+    /// Returns the number of the policy's joints.
+    pub(super) fn joints(&self) -> Result<usize> {
+        let joints = self.need("num_of_dofs", "a number of joints", count)?;
+        ensure!(joints > 0, "{} is 0", self.at("num_of_dofs"));
+        Ok(joints)
+    }
+
+    /// Returns a number for each joint of the policy; `None` if the list is empty or missing.
+    pub(super) fn maybe_of_joints(&self, key: &str) -> Result<Option<Vec<f64>>> {
+        let Some(list) = self.maybe(key, "a list of finite numbers", Node::numbers)? else { return Ok(None) };
+        if list.is_empty() {
+            return Ok(None);
+        }
+        self.check(key, list.len())?;
+        Ok(Some(list))
+    }
+
+    /// Returns a number for each joint of the policy.
+    pub(super) fn of_joints(&self, key: &str) -> Result<Vec<f64>> {
+        let list = self.need(key, "a list of finite numbers", Node::numbers)?;
+        self.check(key, list.len())?;
+        Ok(list)
+    }
+
+    /// Refuses a list that has not one value for each joint of the policy.
+    pub(super) fn check(&self, key: &str, len: usize) -> Result<()> {
+        let joints = self.joints()?;
+        if len != joints {
+            return Err(Facts::contradiction(
+                "number of joints",
+                (&self.at("num_of_dofs"), &joints.to_string()),
+                (&self.at(key), &format!("{len} values")),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Returns joints by their numbers, each at most one time; none if the list is missing.
+    pub(super) fn places(&self, key: &str) -> Result<Vec<usize>> {
+        let joints = self.joints()?;
+        let places = self.maybe(key, "a list of joints' numbers, from 0", counts)?.unwrap_or_default();
+        for (i, place) in places.iter().enumerate() {
+            ensure!(*place < joints, "{}: there is no joint {place}; num_of_dofs is {joints}", self.at(key));
+            ensure!(!places[..i].contains(place), "{}: joint {place} occurs twice", self.at(key));
+        }
+        Ok(places)
+    }
+
+    /// Returns the network's file: `model_name` beside the policy's config.yaml, with the ending .onnx.
+    pub(super) fn model(&self) -> Result<(String, String)> {
+        let name = self.need("model_name", "the name of a file", Node::text)?;
+        let folder = self.own.document.file.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let file = if folder.is_empty() { name.to_owned() } else { format!("{folder}/{name}") };
+        let stem = file.rsplit_once('.').map(|(stem, _)| stem);
+        let stem = stem.with_context(|| format!("{}: {:?} has no ending", self.at("model_name"), printable(name)))?;
+        Ok((format!("{stem}.onnx"), file))
+    }
+}
+
+/// Reads a list of numbers of values or frames.
+pub(super) fn counts(node: &Node) -> Option<Vec<usize>> {
+    node.numbers()?;
+    node.items().iter().map(count).collect()
+}

@@ -1,0 +1,47 @@
+//! The history of the observation.
+
+use actq::error::{Result, ensure};
+
+use super::super::common::Histories;
+use super::config::{Config, counts};
+use crate::description::First;
+use crate::facts::Facts;
+
+/// Returns the number of frames, and how they are kept.
+pub(super) fn frames(config: &Config<'_>, facts: &mut Facts) -> Result<(usize, Histories)> {
+    let key = "observations_history";
+    let numbers = config.maybe(key, "a list of frames' numbers, from 0", counts)?.unwrap_or_default();
+    let by_term =
+        config.maybe("observations_history_priority", "\"time\" or \"term\"", |node| match node.text()? {
+            "time" => Some(false),
+            "term" => Some(true),
+            _ => None,
+        })?;
+    facts.note("observation", config.at("observations"));
+    if matches!(numbers[..], [] | [0]) {
+        let (first, fill) = Default::default();
+        return Ok((1, Histories { by_term: false, first, fill, stride: 1 }));
+    }
+    let ascends = numbers[0] == 0;
+    let ascending: Vec<usize> = if ascends { numbers.clone() } else { numbers.iter().rev().copied().collect() };
+    let stride = ascending.get(1).copied().unwrap_or(0);
+    let is_even = ascending.iter().enumerate().all(|(i, number)| stride.checked_mul(i) == Some(*number));
+    ensure!(
+        stride > 0 && is_even,
+        "{}: only numbers in equal steps, from 0 or down to 0, are supported",
+        config.at(key)
+    );
+    let (by_term, layout) = match by_term {
+        Some(by_term) => (by_term, config.at("observations_history_priority")),
+        None => {
+            let layout: Option<String> = facts.find("history.layout")?;
+            (layout.as_deref() == Some("term"), facts.source("history.layout"))
+        }
+    };
+    let zero: Option<String> = facts.find("history.zero")?;
+    let first = if ascends == (zero.as_deref() == Some("oldest")) { First::Oldest } else { First::Newest };
+    let fill = facts.get("history.fill")?;
+    let [zero, filled] = ["history.zero", "history.fill"].map(|rule| facts.source(rule));
+    facts.note("observation", format!("{}; {layout}; {zero}; {filled}", config.at(key)));
+    Ok((numbers.len(), Histories { by_term, first, fill, stride }))
+}
