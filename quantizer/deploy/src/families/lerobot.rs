@@ -1,6 +1,7 @@
 //! Policies of LeRobot that read states only: `config.json` and the processors' files, with an ONNX file of the network.
 
 mod dataset;
+mod feature;
 mod graph;
 mod normalizer;
 mod processors;
@@ -12,6 +13,7 @@ use actq::error::{Result, bail, ensure};
 use actq::text::printable;
 
 use self::dataset::Training;
+use self::feature::{Feature, KEYS, join};
 use self::graph::Graph;
 use self::normalizer::Normalizer;
 use self::processors::{Normalization, PROCESSORS};
@@ -27,9 +29,8 @@ use crate::yaml::Node;
 #[derive(Debug)]
 pub(super) struct Lerobot;
 
-/// File of the policy's configuration, and keys that only LeRobot's have.
+/// File of the policy's configuration.
 const CONFIG: &str = "config.json";
-const KEYS: [&str; 2] = ["input_features", "output_features"];
 /// Most observations of a history.
 const MOST_FRAMES: usize = 1000;
 
@@ -115,83 +116,6 @@ impl Family for Lerobot {
     }
 }
 
-/// A vector that the policy reads or gives.
-#[derive(Debug)]
-struct Feature {
-    name: String,
-    /// LeRobot's `FeatureType`.
-    kind: String,
-    len: usize,
-    /// File and key, for reports and errors.
-    at: String,
-}
-
-impl Feature {
-    /// Reads the observations, all of which must be vectors.
-    fn observations(config: &Document) -> Result<Vec<Self>> {
-        let section = KEYS[0];
-        let features: Vec<Self> =
-            config.keys(section).into_iter().map(|name| Self::of(config, section, name)).collect::<Result<_>>()?;
-        ensure!(!features.is_empty(), "{}: it has no features; the policy must read a state", config.at(section));
-        for feature in &features {
-            ensure!(
-                ["STATE", "ENV"].contains(&feature.kind.as_str()),
-                "{}: the type {:?} is not supported; STATE and ENV are",
-                feature.at,
-                printable(&feature.kind)
-            );
-        }
-        Ok(features)
-    }
-
-    fn action(config: &Document) -> Result<Self> {
-        let section = KEYS[1];
-        let names = config.keys(section);
-        let [name] = names[..] else {
-            bail!(
-                "{}: it has {} features; a policy with the only one \"action\" is supported",
-                config.at(section),
-                names.len()
-            )
-        };
-        let feature = Self::of(config, section, name)?;
-        ensure!(
-            feature.is_action() && feature.kind == "ACTION",
-            "{}: the only output must be \"action\" of the type ACTION",
-            feature.at
-        );
-        Ok(feature)
-    }
-
-    fn of(config: &Document, section: &str, name: &str) -> Result<Self> {
-        let path = format!("{section}.{name}");
-        let kind = config.need(&format!("{path}.type"), "a text", Node::text)?.to_owned();
-        let shape_path = format!("{path}.shape");
-        let shape = config.need(&shape_path, "a list of lengths above 0", lengths)?;
-        let at = config.at(&path);
-        ensure!(
-            kind != "VISUAL",
-            "{at} is an image {shape:?}, whose encoder does not run on a microcontroller. Export the network behind the encoder, \
-             and declare what it reads as features of the type STATE, which the application computes; or train a policy of states"
-        );
-        let [len] = shape[..] else { bail!("{} = {shape:?}: give one length", config.at(&shape_path)) };
-        Ok(Self { name: name.to_owned(), kind, len, at })
-    }
-
-    fn is_action(&self) -> bool {
-        self.name == "action"
-    }
-
-    /// Returns its name without points, which separate networks from outputs in a description.
-    fn plain(&self) -> String {
-        self.name.replace('.', "_")
-    }
-}
-
-fn lengths(node: &Node) -> Option<Vec<usize>> {
-    node.items().iter().map(|item| count(item).filter(|len| *len > 0)).collect()
-}
-
 /// Checks that an image can run the policy; returns the number of observations that it reads.
 fn check_policy(config: &Document, facts: &mut Facts) -> Result<usize> {
     let kind = config.need("type", "a type of policies", Node::text)?;
@@ -270,8 +194,4 @@ fn targets(parts: &mut Parts, action: &Feature, names: Option<(Vec<String>, Stri
 /// Returns the folder of a file in the bundle; empty for the bundle's own.
 fn folder(file: &str) -> &str {
     file.rsplit_once('/').map_or("", |(folder, _)| folder)
-}
-
-fn join(folder: &str, file: &str) -> String {
-    if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") }
 }

@@ -3,7 +3,7 @@
 use actq::error::{Result, ensure};
 use actq::text::printable;
 
-use super::{Feature, join};
+use super::feature::{Feature, join};
 use crate::bundle::Bundle;
 use crate::document::Document;
 use crate::facts::Facts;

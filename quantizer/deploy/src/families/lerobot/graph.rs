@@ -7,7 +7,7 @@ use actq::graph::NodeKind;
 use actq::text::printable;
 use actq_onnx::Signature;
 
-use super::Feature;
+use super::feature::Feature;
 use super::normalizer::Normalizer;
 use crate::bundle::Bundle;
 use crate::description::Network;

@@ -3,7 +3,7 @@
 use actq::error::{Result, bail, ensure};
 
 use super::super::common::Parts;
-use super::Feature;
+use super::feature::Feature;
 use super::statistics::Statistics;
 use crate::description::{Op, Operand};
 

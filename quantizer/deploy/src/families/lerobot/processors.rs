@@ -3,9 +3,9 @@
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 
+use super::feature::{Feature, join};
 use super::normalizer::{Eps, Mode, Normalizer};
 use super::statistics::Statistics;
-use super::{Feature, join};
 use crate::bundle::Bundle;
 use crate::document::Document;
 use crate::facts::Facts;

@@ -8,7 +8,7 @@ use actq::import::tensors::TensorFile;
 use actq::import::values::{Tensor, Values};
 use actq::text::printable;
 
-use super::Feature;
+use super::feature::Feature;
 use crate::bundle::Bundle;
 use crate::facts::Facts;
 

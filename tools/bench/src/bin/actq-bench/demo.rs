@@ -1,7 +1,8 @@
-//! `cargo demo`: takes the UR3 policies from their PyTorch weights to a Cortex-M4, in closed loop.
+//! `cargo demo`: takes the UR3 policies from their PyTorch weights, and the balancer from its bundle, to a Cortex-M4, in
+//! closed loop.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
@@ -12,20 +13,17 @@ use actq::pipeline::Quantizer;
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::closed_loop::{episode, episode_on_host};
-use actq_bench::qemu::{self, Counter, Server};
-use actq_bench::{Target, bits, evaluation, firmware, target_dir, ur3, ur3_flow};
-use actq_cli::report::table::table;
-use actq_kernels::{Image, Width};
+use actq_bench::qemu::Counter;
+use actq_bench::{Target, evaluation, firmware, ur3, ur3_flow};
+use actq_kernels::Width;
 use actq_ur3::OBS_DIM;
 use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::task::{EPISODE_STEPS, Outcome, run_episode};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use ndarray::Array3;
 
-use crate::{faults, heads, kernels};
-
-/// First seed of the closed-loop episodes; the policy was trained and calibrated on others.
-const FIRST_SEED: u64 = 1000;
+use crate::trials::{Column, Firmware, closed_loop, folder, summary};
+use crate::{balancer, faults, heads, kernels};
 
 /// Limit of distillation steps: a quarter of the default of `actq quantize`, for a result within a minute.
 const STEPS: usize = 2000;
@@ -72,12 +70,6 @@ struct Trial<'a> {
     qemu_episodes: u64,
 }
 
-/// A policy's column in the table.
-struct Column {
-    name: String,
-    cells: Vec<String>,
-}
-
 const ROWS: [&str; 9] = [
     "bits per weight",
     "image bytes",
@@ -111,7 +103,7 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
         episodes: (episodes / FLOW_EPISODES_DIVISOR).max(1),
         qemu_episodes: (qemu_episodes / FLOW_EPISODES_DIVISOR).max(1),
     };
-    let reports = [reach.run(&counter)?, flow.run(&counter)?];
+    let reports = [reach.run(&counter)?, flow.run(&counter)?, balancer::run(&counter, episodes, qemu_episodes)?];
     println!("\n{}", reports.join("\n"));
     faults::some(&reach.path(CONTROLLER_IMAGE))?;
     println!();
@@ -121,11 +113,6 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
         kernels::report(&records, Some((256, 256)))
     );
     Ok(())
-}
-
-/// Instructions and cycles of the images.
-fn folder() -> PathBuf {
-    target_dir().join("demo")
 }
 
 impl Trial<'_> {
@@ -180,7 +167,9 @@ impl Trial<'_> {
             let outcomes = with_head(image, |head| closed_loop(episodes, |seed| episode_on_host(head, seed)))?;
             println!("Closed loop at {name}, {qemu_episodes} episodes with the firmware in QEMU as the policy");
             let elf = firmware::harness_with(Target::Fpu, &path)?;
-            let firmware = Firmware::run(&elf, image, qemu_episodes)?;
+            let firmware = Firmware::run(&elf, image, qemu_episodes, |seed, step| {
+                episode(seed, |obs| step(obs)?.as_slice().try_into().context("an action must have six values"))
+            })?;
             let heldout = eval::heldout(policy_dir, &image)?;
             let instructions =
                 evaluation::count(counter, Target::Fpu, &elf, None, &image, heldout.episode(0))?.instructions;
@@ -203,28 +192,11 @@ impl Trial<'_> {
                     },
                 ],
             });
-            report.push(format!(
-            "{name}, firmware in QEMU: success {}, identical bits: {} of {} actions, {} bytes of code beside the image",
-            success(&firmware.outcomes),
-            firmware.identical,
-            firmware.actions,
-            firmware::flash_bytes(&elf)? - image.bytes() as u64,
-        ));
-            ensure!(firmware.identical == firmware.actions, "the firmware's actions differ from the host's");
+            report.push(firmware.report(name, &success(&firmware.outcomes), &elf, image)?);
         }
 
-        let names: Vec<&str> = std::iter::once(policy_name).chain(columns.iter().map(|c| c.name.as_str())).collect();
-        let mut summary = table(&names);
-        for (i, row) in ROWS.iter().enumerate() {
-            let cells = columns.iter().map(|c| c.cells.get(i).cloned().unwrap_or_else(|| "-".into()));
-            summary.add_row(std::iter::once((*row).to_owned()).chain(cells));
-        }
-        Ok(format!("{summary}\n\n{}\n", report.join("\n")))
+        Ok(format!("{}\n\n{}\n", summary(policy_name, &ROWS, &columns), report.join("\n")))
     }
-}
-
-fn closed_loop(episodes: u64, mut episode: impl FnMut(u64) -> Result<Outcome>) -> Result<Vec<Outcome>> {
-    (FIRST_SEED..FIRST_SEED + episodes).map(&mut episode).collect()
 }
 
 fn success(outcomes: &[Outcome]) -> String {
@@ -234,34 +206,4 @@ fn success(outcomes: &[Outcome]) -> String {
 fn tracking(outcomes: &[Outcome]) -> String {
     let mean = outcomes.iter().map(|o| o.tracking_error_m).sum::<f64>() / outcomes.len().max(1) as f64;
     format!("{:.2} mm", 1e3 * mean)
-}
-
-/// The result of a run with the firmware as the policy.
-struct Firmware {
-    outcomes: Vec<Outcome>,
-    actions: usize,
-    /// Actions with the same bits as the host executor's on the same observations.
-    identical: usize,
-}
-
-impl Firmware {
-    fn run(elf: &Path, image: Image<'_>, episodes: u64) -> Result<Self> {
-        let mut server = Server::start(qemu::command(elf, None, "serve")?, image.act_len())?;
-        let (mut actions, mut identical) = (0, 0);
-        let outcomes = with_head(image, |head| {
-            closed_loop(episodes, |seed| {
-                head.reset();
-                server.reset()?;
-                episode(seed, |obs| {
-                    let action = server.step(obs)?;
-                    let same = bits(&action) == bits(head.step(obs)?);
-                    actions += 1;
-                    identical += usize::from(same);
-                    action.as_slice().try_into().context("an action must have six values")
-                })
-            })
-        })?;
-        server.finish()?;
-        Ok(Self { outcomes, actions, identical })
-    }
 }

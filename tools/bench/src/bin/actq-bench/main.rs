@@ -2,6 +2,7 @@
 //! faults`, `cargo xtask stack`. xtask installs their requirements, builds this binary and runs it.
 #![forbid(unsafe_code)]
 
+mod balancer;
 mod bench;
 mod boards;
 mod budgets;
@@ -11,6 +12,7 @@ mod fit;
 mod heads;
 mod kernels;
 mod stack;
+mod trials;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

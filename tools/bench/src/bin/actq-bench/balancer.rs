@@ -1,0 +1,152 @@
+//! The balancing robot of `cargo demo`: a deploy bundle in closed loop, from raw sensor values to torques.
+
+use std::fs;
+
+use actq::budget::Budget;
+use actq::data::{Dataset, Recordings};
+use actq::measure::size::bits_per_weight;
+use actq::methods::{Method, Options};
+use actq::pipeline::quantize;
+use actq::runtime::{ImageBuffer, with_head};
+use actq_balancer::{EPISODE_STEPS, Outcome, RAW_LEN, bundle, run_episode};
+use actq_bench::qemu::Counter;
+use actq_bench::{Target, evaluation, firmware};
+use actq_cli::outputs::files;
+use actq_deploy::description::Description;
+use actq_deploy::{Bundle, DESCRIPTION, Deployment, Plan, Runner, observed};
+use anyhow::{Context as _, Result};
+use ndarray::Array3;
+
+use crate::trials::{Column, Firmware, closed_loop, folder, summary};
+
+const ROWS: [&str; 7] = [
+    "bits per weight",
+    "image bytes",
+    "against f32",
+    "scratch RAM bytes",
+    "closed-loop success",
+    "speed error",
+    "instructions per step",
+];
+/// Budgets in bits per weight.
+const BITS: [f64; 2] = [3.0, 2.0];
+/// Steps of distillation, and episodes of the f32 policy to learn from, from seed 0.
+const STEPS: usize = 2000;
+const RECORDED_EPISODES: usize = 40;
+
+/// Reads the bundle, quantizes it, and drives the robot with the images on the host and in QEMU; returns a report.
+pub(crate) fn run(counter: &Counter, episodes: u64, qemu_episodes: u64) -> Result<String> {
+    let policy = Deployment::load(bundle())?.policy;
+    let f32_bytes = 4 * policy.parameters;
+    println!("\nReading the balancer's bundle ({} parameters, {f32_bytes} bytes in f32)", policy.parameters);
+    let mut f32_policy = F32::open()?;
+
+    println!("Closed loop in f32, {episodes} episodes");
+    let outcomes = closed_loop(episodes, |seed| f32_policy.episode(seed, |_| ()))?;
+    let mut columns = vec![Column {
+        name: "f32".into(),
+        cells: ["32", &f32_bytes.to_string(), "1.0x", "-", &success(&outcomes), &error(&outcomes)]
+            .map(str::to_owned)
+            .to_vec(),
+    }];
+    println!("Recording {RECORDED_EPISODES} episodes of the f32 policy to learn from");
+    let raw = f32_policy.record()?;
+    let recordings = Recordings { calib: Some(observed(bundle(), &raw)?), heldout: None };
+
+    let mut report = Vec::new();
+    fs::create_dir_all(folder())?;
+    for bits in BITS {
+        let name = format!("{bits:.1} bits");
+        println!("Quantizing to {name} with distill");
+        let options = Options { steps: Some(STEPS), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
+        let bytes = quantize(&policy, &recordings, &options, ())?.whole_image()?;
+        let path = folder().join(format!("balancer-{bits:.1}-bits.actq"));
+        files::write(&path, &bytes)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(&path)?;
+        println!("Closed loop at {name}, {episodes} episodes on the host");
+        let outcomes = with_head(image, |head| {
+            closed_loop(episodes, |seed| {
+                head.reset();
+                run_episode(seed, |raw| torques(head.step(raw)?))
+            })
+        })?;
+        println!("Closed loop at {name}, {qemu_episodes} episodes with the firmware in QEMU as the policy");
+        let elf = firmware::harness_with(Target::Fpu, &path)?;
+        let firmware =
+            Firmware::run(&elf, image, qemu_episodes, |seed, step| run_episode(seed, |raw| torques(&step(raw)?)))?;
+        let instructions = evaluation::count(counter, Target::Fpu, &elf, None, &image, raw.episode(0))?.instructions;
+        columns.push(Column {
+            name: name.clone(),
+            cells: vec![
+                format!("{:.2}", bits_per_weight(&image)),
+                bytes.len().to_string(),
+                format!("{:.1}x", f32_bytes as f64 / bytes.len() as f64),
+                (4 * image.scratch_words()).to_string(),
+                success(&outcomes),
+                error(&outcomes),
+                instructions.to_string(),
+            ],
+        });
+        report.push(firmware.report(&name, &success(&firmware.outcomes), &elf, image)?);
+    }
+    Ok(format!("{}\n\n{}\n", summary("Balancer", &ROWS, &columns), report.join("\n")))
+}
+
+/// The policy as its bundle describes it, in f32.
+struct F32 {
+    runner: Runner,
+    /// Lengths of the raw inputs.
+    lens: Vec<usize>,
+}
+
+impl F32 {
+    fn open() -> Result<Self> {
+        let opened = Bundle::open(bundle())?;
+        let description = Description::parse(&opened.text(DESCRIPTION)?)?;
+        let plan = Plan::new(&description, &opened)?;
+        let lens = plan.inputs().iter().map(|(_, len)| *len).collect();
+        Ok(Self { runner: Runner::new(plan), lens })
+    }
+
+    /// Runs an episode; `see` gets the raw values of each step.
+    fn episode(&mut self, seed: u64, mut see: impl FnMut(&[f32])) -> Result<Outcome> {
+        self.runner.reset();
+        run_episode(seed, |raw| {
+            see(raw);
+            let mut rest = raw.iter().map(|x| f64::from(*x));
+            let inputs: Vec<Vec<f64>> = self.lens.iter().map(|len| rest.by_ref().take(*len).collect()).collect();
+            let tick = self.runner.step(&inputs);
+            let (_, torque) = tick.targets.first().context("the bundle has no target")?;
+            torques(&torque.iter().map(|x| *x as f32).collect::<Vec<_>>())
+        })
+    }
+
+    /// Records the raw values of some episodes.
+    fn record(&mut self) -> Result<Dataset> {
+        let mut obs = Array3::zeros((RECORDED_EPISODES, EPISODE_STEPS, RAW_LEN));
+        let mut length = Vec::new();
+        for seed in 0..RECORDED_EPISODES {
+            let mut steps = 0;
+            self.episode(seed as u64, |raw| {
+                raw.iter().enumerate().for_each(|(i, value)| obs[[seed, steps, i]] = *value);
+                steps += 1;
+            })?;
+            length.push(steps);
+        }
+        Ok(Dataset { path: "episodes of f32".into(), obs, action: None, length, state: None })
+    }
+}
+
+fn torques(values: &[f32]) -> Result<[f32; 2]> {
+    values.try_into().context("the policy must give two torques")
+}
+
+fn success(outcomes: &[Outcome]) -> String {
+    format!("{} of {}", outcomes.iter().filter(|outcome| outcome.success).count(), outcomes.len())
+}
+
+fn error(outcomes: &[Outcome]) -> String {
+    let mean = outcomes.iter().map(|outcome| outcome.speed_error).sum::<f64>() / outcomes.len().max(1) as f64;
+    format!("{:.1} mm/s", 1e3 * mean)
+}
