@@ -1,13 +1,18 @@
 //! What readers share: a description in the making.
 
-use actq::error::{Result, bail, ensure};
+use std::collections::BTreeMap;
+
+use actq::error::{Context as _, Result, bail, ensure};
+use actq::text::printable;
+use actq_onnx::Signature;
 
 use crate::description::{
     Clock, Description, Fill, First, From, Gains, History, Input, Network, Numbers, Op, Orientation, SCHEMA, State,
     Target, TargetKind, Value,
 };
+use crate::document::Document;
 use crate::facts::Facts;
-use crate::yaml::Node;
+use crate::yaml::{Data, Node};
 
 /// Stands for the policy's output until [`Parts::network`] knows its name.
 const ACTION: &str = "policy.ACTION";
@@ -286,4 +291,62 @@ pub(super) fn gravity(parts: &mut Parts, rule: &str, facts: &mut Facts) -> Resul
 pub(super) fn count(node: &Node) -> Option<usize> {
     let number = node.number()?;
     (number >= 0.0 && number.fract() == 0.0 && number < 1e5).then_some(number as usize)
+}
+
+/// The graph's input and output.
+#[derive(Debug)]
+pub(super) struct Graph {
+    pub(super) file: String,
+    pub(super) input: String,
+    pub(super) input_len: usize,
+    pub(super) output: String,
+    pub(super) actions: usize,
+}
+
+impl Graph {
+    pub(super) fn of(file: &str, signature: &Signature) -> Result<Self> {
+        let choose = |ports: &[(String, Option<usize>)], kind: &str, usual: &str| -> Result<(String, usize)> {
+            let port = match ports {
+                [only] => Some(only),
+                _ => ports.iter().find(|(name, _)| name == usual),
+            };
+            let shown = || ports.iter().map(|(name, _)| printable(name)).collect::<Vec<_>>().join(", ");
+            let (name, len) = port.with_context(|| format!("{file}: none of its {kind} is {usual:?}: {}", shown()))?;
+            let len = len.filter(|len| *len > 0);
+            let len = len.with_context(|| format!("{file}: the length of {:?} is not given", printable(name)))?;
+            Ok((name.clone(), len))
+        };
+        let (input, input_len) = choose(&signature.inputs, "inputs", "obs")?;
+        let (output, actions) = choose(&signature.outputs, "outputs", "actions")?;
+        Ok(Self { file: file.to_owned(), input, input_len, output, actions })
+    }
+}
+
+/// Takes an ONNX file's metadata as a document of texts.
+pub(super) fn metadata_document(file: &str, metadata: &BTreeMap<String, String>) -> Document {
+    let entry =
+        |(key, text): (&String, &String)| (key.clone(), Node { line: 1, data: Data::Scalar(text.clone(), true) });
+    let data = Data::Map(metadata.iter().map(entry).collect());
+    Document::of(&format!("{file} metadata"), Node { line: 1, data })
+}
+
+/// Reads a list with commas between its names.
+pub(super) fn names(meta: &Document, key: &str) -> Result<Vec<String>> {
+    let text = meta.need(key, "names with commas between them", Node::text)?;
+    let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
+    for (i, name) in names.iter().enumerate() {
+        ensure!(!name.is_empty(), "{}: name {i} is empty", meta.at(key));
+        ensure!(!names[..i].contains(name), "{}: {:?} occurs twice", meta.at(key), printable(name));
+    }
+    Ok(names)
+}
+
+/// Reads a list with commas between its numbers.
+pub(super) fn numbers(meta: &Document, key: &str) -> Result<Option<Vec<f64>>> {
+    let Some(text) = meta.maybe(key, "a text", Node::text)? else { return Ok(None) };
+    let number = |word: &str| {
+        let number: Option<f64> = word.trim().parse().ok().filter(|number: &f64| number.is_finite());
+        number.with_context(|| format!("{}: {:?} is not a finite number", meta.at(key), printable(word.trim())))
+    };
+    text.split(',').map(number).collect::<Result<_>>().map(Some)
 }

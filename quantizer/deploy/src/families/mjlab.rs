@@ -7,13 +7,13 @@ use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 use actq_onnx::Signature;
 
-use super::common::{Histories, Parts, gravity};
+use super::common::{Graph, Histories, Parts, gravity, metadata_document, names, numbers};
 use crate::bundle::Bundle;
 use crate::description::{Description, Gains, Op, Operand, Order, TargetKind};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
-use crate::yaml::{Data, Node};
+use crate::yaml::Node;
 
 /// The family.
 #[derive(Debug)]
@@ -73,10 +73,7 @@ impl Family for Mjlab {
             ),
         };
         let (file, metadata) = network;
-        let entry =
-            |(key, text): (&String, &String)| (key.clone(), Node { line: 1, data: Data::Scalar(text.clone(), true) });
-        let data = Data::Map(metadata.iter().map(entry).collect());
-        let mut documents = vec![Document::of(&format!("{file} metadata"), Node { line: 1, data })];
+        let mut documents = vec![metadata_document(file, metadata)];
         if let Some(yaml) = yaml {
             documents.push(Document::read(bundle, yaml)?);
         }
@@ -167,55 +164,6 @@ impl Ros<'_> {
         }
         Ok(numbers)
     }
-}
-
-/// The graph's input and output.
-struct Graph {
-    file: String,
-    input: String,
-    input_len: usize,
-    output: String,
-    actions: usize,
-}
-
-impl Graph {
-    fn of(file: &str, signature: &Signature) -> Result<Self> {
-        let choose = |ports: &[(String, Option<usize>)], kind: &str, usual: &str| -> Result<(String, usize)> {
-            let port = match ports {
-                [only] => Some(only),
-                _ => ports.iter().find(|(name, _)| name == usual),
-            };
-            let shown = || ports.iter().map(|(name, _)| printable(name)).collect::<Vec<_>>().join(", ");
-            let (name, len) = port.with_context(|| format!("{file}: none of its {kind} is {usual:?}: {}", shown()))?;
-            let len = len.filter(|len| *len > 0);
-            let len = len.with_context(|| format!("{file}: the length of {:?} is not given", printable(name)))?;
-            Ok((name.clone(), len))
-        };
-        let (input, input_len) = choose(&signature.inputs, "inputs", "obs")?;
-        let (output, actions) = choose(&signature.outputs, "outputs", "actions")?;
-        Ok(Self { file: file.to_owned(), input, input_len, output, actions })
-    }
-}
-
-/// Reads a list with commas between its names.
-fn names(meta: &Document, key: &str) -> Result<Vec<String>> {
-    let text = meta.need(key, "names with commas between them", Node::text)?;
-    let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
-    for (i, name) in names.iter().enumerate() {
-        ensure!(!name.is_empty(), "{}: name {i} is empty", meta.at(key));
-        ensure!(!names[..i].contains(name), "{}: {:?} occurs twice", meta.at(key), printable(name));
-    }
-    Ok(names)
-}
-
-/// Reads a list with commas between its numbers.
-fn numbers(meta: &Document, key: &str) -> Result<Option<Vec<f64>>> {
-    let Some(text) = meta.maybe(key, "a text", Node::text)? else { return Ok(None) };
-    let number = |word: &str| {
-        let number: Option<f64> = word.trim().parse().ok().filter(|number: &f64| number.is_finite());
-        number.with_context(|| format!("{}: {:?} is not a finite number", meta.at(key), printable(word.trim())))
-    };
-    text.split(',').map(number).collect::<Result<_>>().map(Some)
 }
 
 /// Joints with their numbers, in the policy's order.
