@@ -3,6 +3,7 @@
 mod common;
 mod holosoma;
 mod humanoidverse;
+mod isaaclab;
 mod kinfer;
 mod lerobot;
 mod limx;
@@ -20,6 +21,7 @@ pub(crate) static FAMILIES: &[&dyn Family] = &[
     &humanoidverse::Humanoidverse,
     &holosoma::Holosoma,
     &kinfer::Kinfer,
+    &isaaclab::IsaacLab,
     &mjlab::Mjlab,
     &lerobot::Lerobot,
 ];

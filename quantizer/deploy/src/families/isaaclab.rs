@@ -1,0 +1,123 @@
+//! Isaac Lab: `IO_descriptors.yaml`, the `env.yaml` of a training, or both, beside `policy.onnx`.
+
+mod agree;
+mod describe;
+mod descriptors;
+mod environment;
+mod model;
+mod patterns;
+mod values;
+
+use actq::error::{Context as _, Result, bail};
+use actq_onnx::Signature;
+
+use self::describe::Maker;
+use self::environment::Environment;
+use self::model::{MODULES, Policy};
+use self::patterns::Joints;
+use super::common::{Graph, metadata_document, names};
+use crate::bundle::Bundle;
+use crate::description::Description;
+use crate::document::Document;
+use crate::facts::Facts;
+use crate::family::{Family, Found};
+use crate::yaml::Node;
+
+/// The family.
+#[derive(Debug)]
+pub(super) struct IsaacLab;
+
+/// Key of the ONNX metadata that some exporters add.
+const JOINT_NAMES: &str = "joint_names";
+
+impl Family for IsaacLab {
+    fn profile(&self) -> &'static str {
+        include_str!("isaaclab/profile.toml")
+    }
+
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+        let (mut exported, mut environments) = (Vec::new(), Vec::new());
+        for file in bundle.with_ending("yaml").chain(bundle.with_ending("yml")) {
+            // Only files that name its modules can be of this family; the others need not be YAML that this reader knows.
+            let names_module = |text: String| MODULES.iter().any(|module| text.contains(module));
+            if !bundle.text(file).is_ok_and(names_module) {
+                continue;
+            }
+            let root = bundle.text(file).and_then(|text| Node::parse(&text).context(file.to_owned()))?;
+            let document = Document::of(file, descriptors::numbered(root));
+            if descriptors::is_one(&document) {
+                exported.push(document);
+            } else if environment::is_one(&document) {
+                environments.push(document);
+            }
+        }
+        for documents in [&exported, &environments] {
+            if let [first, second, ..] = &documents[..] {
+                bail!("several policies of this family: {} and {}; name the folder of one", first.file, second.file);
+            }
+        }
+        let mut documents: Vec<Document> = exported.into_iter().chain(environments).collect();
+        let Some(first) = documents.first() else { return Ok(None) };
+        let network = match bundle.find("policy.onnx")? {
+            Some(file) => file,
+            None => match &bundle.with_ending("onnx").collect::<Vec<_>>()[..] {
+                [only] => only,
+                [] => bail!(
+                    "{}: there is no ONNX file with it; export one with Isaac Lab's play.py, which writes exported/policy.onnx",
+                    first.file
+                ),
+                several => bail!("{}: which of {} is its policy? Call it policy.onnx", first.file, several.join(", ")),
+            },
+        };
+        let signature = Signature::read(&bundle.path(network)?)?;
+        if signature.metadata.contains_key(JOINT_NAMES) {
+            documents.push(metadata_document(network, &signature.metadata));
+        }
+        Ok(Some(Found { documents, networks: vec![network.to_owned()], others: Vec::new() }))
+    }
+
+    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+        let file = &found.networks[0];
+        let signature = Signature::read(&bundle.path(file)?)?;
+        let graph = Graph::of(file, &signature)?;
+        let find = |is_one: fn(&Document) -> bool| found.documents.iter().find(|document| is_one(document));
+        let (exported, environment) = (find(descriptors::is_one), find(environment::is_one));
+        let meta = find(|document| document.look(JOINT_NAMES).is_some());
+        let asset = facts.find("asset")?.unwrap_or_else(|| "robot".to_owned());
+        let group = facts.find("group")?.unwrap_or_else(|| "policy".to_owned());
+
+        let mut orders = Vec::new();
+        if let Some(yaml) = exported {
+            orders.push(descriptors::joints(yaml, &asset)?);
+        }
+        if let Some(meta) = meta {
+            orders.push(Joints::new(names(meta, JOINT_NAMES)?, meta.at(JOINT_NAMES))?);
+        }
+        if let [first, second] = &orders[..] {
+            agree::orders(first, second)?;
+        }
+        let joints = match orders.into_iter().next() {
+            Some(joints) => joints,
+            None => match facts.find::<Vec<String>>("joints")? {
+                Some(names) => Joints::new(names, "answer joints".to_owned())?,
+                None => Joints::placeholders(graph.actions),
+            },
+        };
+        let exported = exported.map(|yaml| descriptors::read(yaml, &asset, &group, joints.clone())).transpose()?;
+        let policy: Policy = match (exported, environment) {
+            (exported, Some(yaml)) => {
+                let mut policy = Environment { yaml, asset: &asset, group: &group, joints }.read(facts)?;
+                if let Some(exported) = exported {
+                    agree::with_descriptors(&mut policy, &exported)?;
+                }
+                policy
+            }
+            (Some(exported), None) => exported,
+            (None, None) => bail!("there is neither IO_descriptors.yaml nor env.yaml"),
+        };
+        if let Some(meta) = meta {
+            agree::with_metadata(&policy, meta, environment.is_some())?;
+        }
+        Maker { policy: &policy, graph: &graph, facts }.make(&signature)
+    }
+}

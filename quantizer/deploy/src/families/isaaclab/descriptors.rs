@@ -1,0 +1,211 @@
+//! `IO_descriptors.yaml`: what Isaac Lab exports of an environment's observations and actions.
+
+use actq::error::{Result, ensure};
+use actq::text::printable;
+
+use super::model::{Action, Given, Kind, Policy, Term, What, known, observation, plain};
+use super::patterns::{Joints, MOST};
+use super::values::{bounds, history, numbers};
+use crate::document::Document;
+use crate::facts::Facts;
+use crate::families::common::count;
+use crate::yaml::{Data, Node};
+
+/// Returns `true` if a file has the keys of exported descriptors.
+pub(super) fn is_one(yaml: &Document) -> bool {
+    ["actions", "observations", "articulations", "scene.dt"].iter().all(|key| yaml.look(key).is_some())
+}
+
+/// Makes lists of maps to maps with the keys 0, 1 and so on, so that their values have paths.
+pub(super) fn numbered(node: Node) -> Node {
+    let data = match node.data {
+        Data::List(items) if items.iter().any(|item| matches!(item.data, Data::Map(_))) => {
+            Data::Map(items.into_iter().enumerate().map(|(i, item)| (i.to_string(), numbered(item))).collect())
+        }
+        Data::Map(entries) => Data::Map(entries.into_iter().map(|(key, inner)| (key, numbered(inner))).collect()),
+        other => other,
+    };
+    Node { line: node.line, data }
+}
+
+/// Returns the order of the robot's joints.
+pub(super) fn joints(yaml: &Document, asset: &str) -> Result<Joints> {
+    let path = format!("articulations.{asset}");
+    ensure!(
+        yaml.look(&path).is_some(),
+        "{} is missing; answer asset with one of {}",
+        yaml.at(&path),
+        yaml.keys("articulations").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
+    );
+    for other in yaml.keys("articulations").into_iter().filter(|other| *other != asset) {
+        yaml.get(&format!("articulations.{other}"));
+    }
+    let path = format!("{path}.joint_names");
+    Joints::new(yaml.texts(&path)?, yaml.at(&path))
+}
+
+/// Reads a file.
+pub(super) fn read(yaml: &Document, asset: &str, group: &str, joints: Joints) -> Result<Policy> {
+    let rate = rate(yaml)?;
+    let of_joints = |key: &str| {
+        let path = format!("articulations.{asset}.{key}");
+        let numbers = yaml.numbers(&path)?;
+        ensure!(
+            numbers.len() == joints.len(),
+            "{} has {} values, but joint_names {}",
+            yaml.at(&path),
+            numbers.len(),
+            joints.len()
+        );
+        Ok(Given { numbers, from: yaml.at(&path) })
+    };
+    let (default, default_velocity) = (of_joints("default_joint_pos")?, of_joints("default_joint_vel")?);
+    let gains = [of_joints("default_joint_stiffness")?, of_joints("default_joint_damping")?];
+    let actions = actions(yaml, &joints)?;
+    let terms = terms(yaml, group, &joints, &actions)?;
+    let decimation = yaml.number("scene.decimation")?;
+    Ok(Policy { rate, decimation, joints, default, default_velocity, gains: Some(gains), terms, actions })
+}
+
+fn rate(yaml: &Document) -> Result<Given> {
+    let (dt, step, decimation) =
+        (yaml.number("scene.dt")?, yaml.number("scene.physics_dt")?, yaml.number("scene.decimation")?);
+    ensure!((1e-6..1e6).contains(&dt), "{} = {dt}: give the seconds of a tick", yaml.at("scene.dt"));
+    if (step * decimation - dt).abs() > 1e-6 * dt {
+        return Err(Facts::contradiction(
+            "time of a tick",
+            (&yaml.at("scene.dt"), &format!("{dt} s")),
+            (&yaml.at("scene.physics_dt"), &format!("{step} s, {decimation} times")),
+        ));
+    }
+    Ok(Given { numbers: vec![1.0 / dt], from: yaml.at("scene.dt") })
+}
+
+/// Reads one number for all values or one for each; `otherwise` if it is not there.
+fn each(yaml: &Document, path: &str, len: usize, otherwise: f64) -> Result<Vec<f64>> {
+    let given = yaml.maybe(path, "finite numbers", numbers)?.unwrap_or_else(|| vec![otherwise]);
+    ensure!([1, len].contains(&given.len()), "{} has {} values; {len} joints are named", yaml.at(path), given.len());
+    Ok(if given.len() == len { given } else { vec![given[0]; len] })
+}
+
+fn actions(yaml: &Document, joints: &Joints) -> Result<Vec<Action>> {
+    let mut actions = Vec::new();
+    for item in yaml.keys("actions") {
+        let of = |key: &str| format!("actions.{item}.{key}");
+        let name = yaml.need(&of("name"), "a name", Node::text)?;
+        plain(name, &yaml.at(&of("name")))?;
+        let kind = Kind::of(yaml.need(&of("full_path"), "a class", Node::text)?, &yaml.at(&of("full_path")))?;
+        let names = yaml.texts(&of("joint_names"))?;
+        let places = joints.places(&names, &yaml.at(&of("joint_names")))?;
+        ensure!(!places.is_empty(), "{} is empty", yaml.at(&of("joint_names")));
+        if let Some(len) = yaml.maybe(&of("shape"), "the number of values, as a list", one)? {
+            ensure!(
+                len == places.len(),
+                "{} = [{len}], but joint_names has {} names",
+                yaml.at(&of("shape")),
+                places.len()
+            );
+        }
+        let scale = each(yaml, &of("scale"), places.len(), 1.0)?;
+        let offset = each(yaml, &of("offset"), places.len(), 0.0)?;
+        let pairs = |node: &Node| node.items().iter().map(bounds).collect::<Option<Vec<_>>>();
+        let clip = yaml.maybe(&of("clip"), "pairs of numbers", pairs)?;
+        if let Some(clip) = &clip {
+            ensure!(
+                clip.len() == places.len(),
+                "{} has {} pairs; {} joints are named",
+                yaml.at(&of("clip")),
+                clip.len(),
+                places.len()
+            );
+        }
+        let from = yaml.at(&format!("actions.{item}"));
+        actions.push(Action { name: name.to_owned(), kind, joints: places, scale, offset, clip, from });
+    }
+    ensure!(!actions.is_empty(), "{} has no actions", yaml.at("actions"));
+    Ok(actions)
+}
+
+fn terms(yaml: &Document, group: &str, joints: &Joints, actions: &[Action]) -> Result<Vec<Term>> {
+    let group = format!("observations.{group}");
+    ensure!(
+        yaml.look(&group).is_some(),
+        "{} is missing; answer group with one of {}",
+        yaml.at(&group),
+        yaml.keys("observations").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
+    );
+    for other in yaml.keys("observations").into_iter().map(|other| format!("observations.{other}")) {
+        if other != group {
+            yaml.get(&other);
+        }
+    }
+    let mut terms: Vec<Term> = Vec::new();
+    for item in yaml.keys(&group) {
+        let path = format!("{group}.{item}");
+        let of = |key: &str| format!("{path}.{key}");
+        let name = yaml.need(&of("name"), "a name", Node::text)?;
+        plain(name, &yaml.at(&of("name")))?;
+        let function = yaml.need(&of("full_path"), "a function", Node::text)?.to_owned();
+        let len = yaml.need(&of("shape"), "the number of values, as a list", one)?;
+        let total = actions.iter().map(|action| action.joints.len()).sum::<usize>();
+        let mut why = format!("the function of term {name:?}, {}, is not known to this reader", printable(&function));
+        let mut found = match observation(&function) {
+            Some("generated_commands") => Some((What::Command(name.to_owned(), len, None), false)),
+            Some("last_action") if len == total => Some((What::LastAction(None), false)),
+            Some("last_action") => {
+                why = format!("term {name:?} is a part of the last action, and only env.yaml says which");
+                None
+            }
+            _ => known(&function),
+        };
+        let modifiers = yaml.get(&of("extras.modifiers"));
+        if modifiers.is_some_and(|node| !node.items().is_empty() || !node.entries().is_empty()) {
+            why = format!("term {name:?} has modifiers, which this reader does not know");
+            found = None;
+        }
+        let (what, relative) = found.unwrap_or((What::Unknown(why, Some(len)), false));
+        let (mut places, mut offset) = (Vec::new(), Vec::new());
+        if let What::Joints(input, _) = what {
+            let names = yaml.texts(&of("joint_names"))?;
+            places = joints.places(&names, &yaml.at(&of("joint_names")))?;
+            if relative {
+                let key = if input == "joint_pos" { "joint_pos_offsets" } else { "joint_vel_offsets" };
+                offset = yaml.numbers(&of(key))?;
+                ensure!(
+                    offset.len() == places.len(),
+                    "{} has {} values, but joint_names {}",
+                    yaml.at(&of(key)),
+                    offset.len(),
+                    places.len()
+                );
+            }
+        }
+        // Names are those of functions, which several terms may share.
+        let same = terms.iter().filter(|term| term.function == function).count();
+        let name = if same == 0 { name.to_owned() } else { format!("{name}_{}", same + 1) };
+        let term = Term {
+            what: match what {
+                What::Command(_, len, ranges) => What::Command(name.clone(), len, ranges),
+                other => other,
+            },
+            name,
+            function,
+            joints: places,
+            offset,
+            clip: yaml.maybe(&of("overloads.clip"), "two numbers", bounds)?,
+            scale: yaml.maybe(&of("overloads.scale"), "finite numbers", numbers)?,
+            frames: history(yaml, &of("overloads"))?,
+            from: yaml.at(&path),
+        };
+        let own = term.len(total).unwrap_or(len);
+        ensure!(own == len, "{} = [{len}], but the term has {own} values", yaml.at(&of("shape")));
+        terms.push(term);
+    }
+    Ok(terms)
+}
+
+/// Reads the only axis of a shape.
+fn one(node: &Node) -> Option<usize> {
+    let [len] = node.items() else { return None };
+    count(len).filter(|len| *len > 0)
+}

@@ -1,0 +1,370 @@
+//! `env.yaml`: the configuration of an environment, as a training of Isaac Lab stores it.
+
+use actq::error::{Context as _, Result, bail, ensure};
+use actq::text::printable;
+
+use super::model::{Action, Given, Kind, MODULES, Policy, Term, What, known, observation, parts_of, plain};
+use super::patterns::{Joints, MOST};
+use super::values::{bounds, history, numbers};
+use crate::document::Document;
+use crate::facts::Facts;
+use crate::families::common::count;
+use crate::yaml::Node;
+
+/// Keys of a group of observations that are not terms.
+const SETTINGS: [&str; 5] =
+    ["concatenate_terms", "concatenate_dim", "enable_corruption", "history_length", "flatten_history_dim"];
+
+/// Returns `true` if a file has the keys of an environment.
+pub(super) fn is_one(yaml: &Document) -> bool {
+    let has_terms = |path| yaml.look(path).is_some_and(|node| !node.entries().is_empty());
+    ["decimation", "sim.dt", "scene"].iter().all(|key| yaml.look(key).is_some())
+        && has_terms("observations")
+        && has_terms("actions")
+}
+
+/// A file that is read.
+pub(super) struct Environment<'a> {
+    pub(super) yaml: &'a Document,
+    /// Name of the robot in the scene.
+    pub(super) asset: &'a str,
+    /// Name of the observations that the policy reads.
+    pub(super) group: &'a str,
+    pub(super) joints: Joints,
+}
+
+impl Environment<'_> {
+    pub(super) fn read(self, facts: &mut Facts) -> Result<Policy> {
+        let yaml = self.yaml;
+        let (dt, decimation) = (yaml.number("sim.dt")?, yaml.number("decimation")?);
+        ensure!(
+            (1e-6..1e3).contains(&dt) && (1.0..1e6).contains(&decimation),
+            "{} = {dt} and decimation = {decimation}: give the seconds of a simulation's step, and steps in a tick",
+            yaml.at("sim.dt")
+        );
+        let robot = |key: &str| format!("scene.{}.{key}", self.asset);
+        let path = robot("init_state");
+        ensure!(
+            yaml.look(&path).is_some(),
+            "{} is missing; answer asset with the name of the robot in the scene: {}",
+            yaml.at(&path),
+            yaml.keys("scene").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
+        );
+        let pose = |key: &str, facts: &mut Facts| {
+            let path = robot(&format!("init_state.{key}"));
+            Ok::<_, actq::error::Error>(Given {
+                numbers: self
+                    .by_joint(&path, &self.joints, 0.0, facts)?
+                    .unwrap_or_else(|| vec![0.0; self.joints.len()]),
+                from: yaml.at(&path),
+            })
+        };
+        let (default, default_velocity) = (pose("joint_pos", facts)?, pose("joint_vel", facts)?);
+        let gains = self.gains(&robot("actuators"), facts)?;
+        // The rest of the robot is for the simulation.
+        yaml.get(&format!("scene.{}", self.asset));
+        let actions = self.actions(&default, &default_velocity, facts)?;
+        let terms = self.terms(&actions, &default, &default_velocity)?;
+        let rate = Given {
+            numbers: vec![1.0 / (dt * decimation)],
+            from: format!("{}; {}", yaml.at("sim.dt"), yaml.at("decimation")),
+        };
+        Ok(Policy { rate, decimation, joints: self.joints, default, default_velocity, gains, terms, actions })
+    }
+
+    /// Reads a number for all joints, or numbers by pattern; `otherwise` is that of joints that none matches.
+    fn by_joint(&self, path: &str, joints: &Joints, otherwise: f64, facts: &mut Facts) -> Result<Option<Vec<f64>>> {
+        let Some(node) = self.yaml.get(path) else { return Ok(None) };
+        let what = "a finite number, or finite numbers by patterns of joints";
+        if let Some(number) = node.number() {
+            return Ok(Some(vec![number; joints.len()]));
+        }
+        let pairs = node.entries().iter().map(|(pattern, number)| Some((pattern.clone(), number.number()?)));
+        let pairs: Option<Vec<(String, f64)>> = pairs.collect();
+        let pairs = pairs.filter(|pairs| !pairs.is_empty());
+        let pairs = pairs.with_context(|| format!("{} (line {}) must be {what}", self.yaml.at(path), node.line))?;
+        let found = joints.resolve(&pairs, &self.yaml.at(path))?;
+        self.unmatched(&found, joints, path, facts)?;
+        Ok(Some(found.into_iter().map(|number| number.unwrap_or(otherwise)).collect()))
+    }
+
+    /// Asks for the rule of joints that no pattern matches, if there are some.
+    fn unmatched<T>(&self, found: &[Option<T>], joints: &Joints, path: &str, facts: &mut Facts) -> Result<()> {
+        let Some(place) = found.iter().position(Option::is_none) else { return Ok(()) };
+        let holds: Option<bool> = facts.find("unmatched")?;
+        ensure!(
+            joints.open || holds != Some(false),
+            "{}: no pattern matches joint {:?}; add one",
+            self.yaml.at(path),
+            joints.names[place]
+        );
+        Ok(())
+    }
+
+    /// Reads the gains of all actuators; nothing if the USD file has some of them.
+    fn gains(&self, path: &str, facts: &mut Facts) -> Result<Option<[Given; 2]>> {
+        let yaml = self.yaml;
+        let mut gains = ["stiffness", "damping"]
+            .map(|key| Given { numbers: vec![0.0; self.joints.len()], from: yaml.at(&format!("{path}.*.{key}")) });
+        let mut actuated = vec![None; self.joints.len()];
+        let mut is_complete = !yaml.keys(path).is_empty();
+        for actuator in yaml.keys(path) {
+            let of = |key: &str| format!("{path}.{actuator}.{key}");
+            let patterns = texts(yaml, &of("joint_names_expr"))?;
+            let at = yaml.at(&of("joint_names_expr"));
+            let places = self.joints.select(&patterns.with_context(|| format!("{at} is missing"))?, false, &at)?;
+            for place in &places {
+                ensure!(
+                    self.joints.open || actuated[*place].is_none(),
+                    "{at}: joint {:?} has another actuator, too; let one of them move it",
+                    self.joints.names[*place]
+                );
+                actuated[*place] = Some(());
+            }
+            let joints = self.joints.at(&places);
+            for (gain, key) in gains.iter_mut().zip(["stiffness", "damping"]) {
+                match self.by_joint(&of(key), &joints, 0.0, facts)? {
+                    Some(numbers) => {
+                        places.iter().zip(numbers).for_each(|(place, number)| gain.numbers[*place] = number);
+                    }
+                    None => is_complete = false,
+                }
+            }
+        }
+        if is_complete {
+            self.unmatched(&actuated, &self.joints, path, facts)?;
+        }
+        Ok(is_complete.then_some(gains))
+    }
+
+    fn actions(&self, default: &Given, default_velocity: &Given, facts: &mut Facts) -> Result<Vec<Action>> {
+        let yaml = self.yaml;
+        let mut actions = Vec::new();
+        for name in yaml.keys("actions") {
+            let of = |key: &str| format!("actions.{name}.{key}");
+            let from = yaml.at(&format!("actions.{name}"));
+            if yaml.look(&format!("actions.{name}")).is_some_and(Node::is_null) {
+                yaml.get(&format!("actions.{name}"));
+                continue;
+            }
+            plain(name, &from)?;
+            let class = yaml.need(&of("class_type"), "a class", Node::text)?;
+            let kind = Kind::of(&class.replace(':', "."), &yaml.at(&of("class_type")))?;
+            let asset = yaml.need(&of("asset_name"), "the name of the robot", Node::text)?;
+            ensure!(
+                asset == self.asset,
+                "{} = {:?}: the robot is {:?}; answer asset with its name in the scene",
+                yaml.at(&of("asset_name")),
+                printable(asset),
+                self.asset
+            );
+            let path = of("joint_names");
+            let patterns = texts(yaml, &path)?.with_context(|| format!("{} is missing", yaml.at(&path)))?;
+            let in_their_order = yaml.maybe(&of("preserve_order"), "true or false", Node::truth)?.unwrap_or(false);
+            let places = self.joints.select(&patterns, in_their_order, &yaml.at(&path))?;
+            let joints = self.joints.at(&places);
+            let scale = self.by_joint(&of("scale"), &joints, 1.0, facts)?.unwrap_or_else(|| vec![1.0; joints.len()]);
+            let own = self.by_joint(&of("offset"), &joints, 0.0, facts)?.unwrap_or_else(|| vec![0.0; joints.len()]);
+            let needs = |key: &str| yaml.need(&of(key), "true or false", Node::truth);
+            let of_default = |all: &Given| places.iter().map(|place| all.numbers[*place]).collect();
+            let offset = match kind {
+                Kind::Position if needs("use_default_offset")? => of_default(default),
+                Kind::Velocity if needs("use_default_offset")? => of_default(default_velocity),
+                Kind::Relative if needs("use_zero_offset")? => vec![0.0; joints.len()],
+                _ => own,
+            };
+            let clip = self.clip(&of("clip"), &joints)?;
+            actions.push(Action { name: name.to_owned(), kind, joints: places, scale, offset, clip, from });
+        }
+        ensure!(!actions.is_empty(), "{} has no actions", yaml.at("actions"));
+        Ok(actions)
+    }
+
+    /// Reads the limits of an action by patterns of its joints.
+    fn clip(&self, path: &str, joints: &Joints) -> Result<Option<Vec<[f64; 2]>>> {
+        let Some(node) = self.yaml.get(path) else { return Ok(None) };
+        let pairs = node.entries().iter().map(|(pattern, pair)| Some((pattern.clone(), bounds(pair)?)));
+        let pairs: Option<Vec<(String, [f64; 2])>> = pairs.collect();
+        let pairs = pairs.filter(|pairs| !pairs.is_empty()).with_context(|| {
+            format!("{} (line {}) must be pairs of numbers by patterns of joints", self.yaml.at(path), node.line)
+        })?;
+        let found = joints.resolve(&pairs, &self.yaml.at(path))?;
+        Ok(Some(found.into_iter().map(|pair| pair.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])).collect()))
+    }
+
+    fn terms(&self, actions: &[Action], default: &Given, default_velocity: &Given) -> Result<Vec<Term>> {
+        let (yaml, group) = (self.yaml, format!("observations.{}", self.group));
+        let in_group = |key: &str| format!("{group}.{key}");
+        ensure!(
+            yaml.look(&group).is_some_and(|node| !node.is_null()),
+            "{} is missing; answer group with one of {}",
+            yaml.at(&group),
+            yaml.keys("observations").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
+        );
+        for other in yaml.keys("observations").into_iter().filter(|other| *other != self.group) {
+            yaml.get(&format!("observations.{other}"));
+        }
+        let joined = yaml.maybe(&in_group("concatenate_terms"), "true or false", Node::truth)?.unwrap_or(true);
+        ensure!(
+            joined,
+            "{} = false: the policy reads each term by itself, which is not supported",
+            yaml.at(&in_group("concatenate_terms"))
+        );
+        let of_group = yaml.maybe(&in_group("history_length"), "a number of frames", count)?;
+        let mut terms = Vec::new();
+        for name in yaml.keys(&group).into_iter().filter(|name| !SETTINGS.contains(name)) {
+            let path = in_group(name);
+            let of = |key: &str| format!("{path}.{key}");
+            if yaml.look(&path).is_some_and(Node::is_null) {
+                yaml.get(&path);
+                continue;
+            }
+            plain(name, &yaml.at(&path))?;
+            let function = yaml.need(&of("func"), "a function", Node::text)?.replace(':', ".");
+            let (what, relative) = self.what(name, &function, &path, actions)?;
+            let joints =
+                if matches!(what, What::Joints(..)) { self.observed(&of("params.asset_cfg"))? } else { Vec::new() };
+            yaml.get(&of("params"));
+            let offset = match what {
+                What::Joints("joint_pos", _) if relative => default,
+                What::Joints(..) if relative => default_velocity,
+                _ => &Given { numbers: Vec::new(), from: String::new() },
+            };
+            let offset =
+                if relative { joints.iter().map(|place| offset.numbers[*place]).collect() } else { Vec::new() };
+            let settings = if of_group.is_some() { &group } else { &path };
+            let frames = history(yaml, settings)?;
+            // A group's settings replace those of its terms.
+            for key in ["history_length", "flatten_history_dim"] {
+                yaml.get(&of(key));
+            }
+            terms.push(Term {
+                name: name.to_owned(),
+                function,
+                what,
+                joints,
+                offset,
+                clip: yaml.maybe(&of("clip"), "two numbers", bounds)?,
+                scale: yaml.maybe(&of("scale"), "finite numbers", numbers)?,
+                frames,
+                from: yaml.at(&path),
+            });
+        }
+        yaml.get(&in_group("flatten_history_dim"));
+        Ok(terms)
+    }
+
+    /// Returns what a term is, and whether a default is subtracted from it.
+    fn what(&self, name: &str, function: &str, path: &str, actions: &[Action]) -> Result<(What, bool)> {
+        let yaml = self.yaml;
+        let unknown = |why: String| Ok((What::Unknown(why, None), false));
+        let modifiers = yaml.get(&format!("{path}.modifiers"));
+        if modifiers.is_some_and(|node| !node.items().is_empty() || !node.entries().is_empty()) {
+            return unknown(format!("term {name:?} has modifiers, which this reader does not know"));
+        }
+        let param = |key: &str| yaml.get(&format!("{path}.params.{key}"));
+        let text = |key: &str| yaml.maybe(&format!("{path}.params.{key}"), "a name", Node::text);
+        let own = yaml.keys(&format!("{path}.params"));
+        let other = own.iter().find(|key| !["asset_cfg", "command_name", "action_name"].contains(*key));
+        if let Some(other) = other.filter(|other| param(other).is_some()) {
+            return unknown(format!(
+                "term {name:?} has the parameter {:?}, which this reader does not know",
+                printable(other)
+            ));
+        }
+        let asset = text("asset_cfg.name")?.unwrap_or(self.asset);
+        match observation(function) {
+            Some("last_action") => {
+                let Some(of) = text("action_name")? else { return Ok((What::LastAction(None), false)) };
+                let part = actions.iter().position(|action| action.name == of);
+                let part = part.with_context(|| {
+                    format!("{}.params.action_name = {:?}: there is no such action", yaml.at(path), printable(of))
+                })?;
+                Ok((What::LastAction(parts_of(actions).into_iter().nth(part)), false))
+            }
+            Some("generated_commands") => match text("command_name")? {
+                Some(command) => self.command(command, name),
+                None => unknown(format!("term {name:?} names no command")),
+            },
+            // An IMU's configuration names the sensor instead.
+            Some(own) if asset == self.asset || own.starts_with("imu_") => match known(function) {
+                Some(found) => Ok(found),
+                None => unknown(format!(
+                    "the function of term {name:?}, {}, is not known to this reader",
+                    printable(function)
+                )),
+            },
+            Some(_) => unknown(format!("term {name:?} is of {:?}, not of the robot", printable(asset))),
+            None => {
+                unknown(format!("the function of term {name:?}, {}, is not known to this reader", printable(function)))
+            }
+        }
+    }
+
+    /// Returns a velocity command with its ranges; any other command is unknown.
+    fn command(&self, command: &str, term: &str) -> Result<(What, bool)> {
+        let yaml = self.yaml;
+        let class = yaml.maybe(&format!("commands.{command}.class_type"), "a class", Node::text)?.unwrap_or_default();
+        let class = class.replace(':', ".");
+        let is_velocity = MODULES.iter().any(|module| {
+            let own = class.strip_prefix(module).and_then(|rest| rest.strip_prefix("commands.velocity_command."));
+            matches!(own, Some("UniformVelocityCommand" | "NormalVelocityCommand"))
+        });
+        if !is_velocity {
+            let why = format!("command {:?} of term {term:?} is not one of Isaac Lab's velocities", printable(command));
+            return Ok((What::Unknown(why, None), false));
+        }
+        plain(command, &yaml.at("commands"))?;
+        let range = |axis: &str| yaml.maybe(&format!("commands.{command}.ranges.{axis}"), "two numbers", bounds);
+        let ranges = [range("lin_vel_x")?, range("lin_vel_y")?, range("ang_vel_z")?];
+        Ok((What::Command(command.to_owned(), 3, ranges.into_iter().collect()), false))
+    }
+
+    /// Returns the places of the joints that a term observes.
+    fn observed(&self, path: &str) -> Result<Vec<usize>> {
+        let yaml = self.yaml;
+        let (names, ids) = (format!("{path}.joint_names"), format!("{path}.joint_ids"));
+        let in_their_order = format!("{path}.preserve_order");
+        let in_their_order = yaml.maybe(&in_their_order, "true or false", Node::truth)?.unwrap_or(false);
+        let places = match texts(yaml, &names)? {
+            Some(patterns) => self.joints.select(&patterns, in_their_order, &yaml.at(&names))?,
+            None => (0..self.joints.len()).collect(),
+        };
+        // A slice of all joints is a list of three nothings.
+        let listed = yaml.get(&ids).filter(|node| node.items().iter().any(|item| !item.is_null()));
+        let Some(listed) = listed else { return Ok(places) };
+        let listed: Option<Vec<usize>> = listed.items().iter().map(count).collect();
+        let listed = listed.with_context(|| format!("{} must be places of joints", yaml.at(&ids)))?;
+        if self.joints.open {
+            return Ok(listed.iter().map(|_| 0).collect());
+        }
+        if yaml.get(&names).is_none() {
+            ensure!(
+                listed.iter().all(|place| *place < self.joints.len()) && listed.len() <= self.joints.len(),
+                "{}: the robot has {} joints ({})",
+                yaml.at(&ids),
+                self.joints.len(),
+                self.joints.from
+            );
+            return Ok(listed);
+        }
+        if listed != places {
+            return Err(Facts::contradiction(
+                "joints of a term",
+                (&yaml.at(&ids), &format!("{listed:?}")),
+                (&format!("{} with the joints of {}", yaml.at(&names), self.joints.from), &format!("{places:?}")),
+            ));
+        }
+        Ok(places)
+    }
+}
+
+/// Reads a text or a list of texts, if it is there.
+fn texts(yaml: &Document, path: &str) -> Result<Option<Vec<String>>> {
+    let one_or_more = |node: &Node| node.texts().or_else(|| Some(vec![node.text()?.to_owned()]));
+    let texts = yaml.maybe(path, "a text or a list of texts", one_or_more)?;
+    if texts.as_ref().is_some_and(Vec::is_empty) {
+        bail!("{} is empty", yaml.at(path));
+    }
+    Ok(texts)
+}

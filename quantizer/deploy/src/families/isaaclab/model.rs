@@ -1,0 +1,175 @@
+//! What Isaac Lab's files say of a policy, whichever of them says it.
+
+use actq::error::{Result, ensure};
+
+use super::patterns::Joints;
+
+/// Modules whose functions are known: today's name, and that of versions before 2.0.
+pub(super) const MODULES: [&str; 2] = ["isaaclab.envs.mdp.", "omni.isaac.lab.envs.mdp."];
+
+/// A policy with what surrounds it.
+#[derive(Debug)]
+pub(super) struct Policy {
+    pub(super) rate: Given,
+    /// Steps of the simulation in a tick.
+    pub(super) decimation: f64,
+    /// All joints of the robot, in the simulation's order.
+    pub(super) joints: Joints,
+    /// Default positions and velocities of all joints.
+    pub(super) default: Given,
+    pub(super) default_velocity: Given,
+    /// Stiffness and damping of all joints, unless only the robot's USD file has them.
+    pub(super) gains: Option<[Given; 2]>,
+    pub(super) terms: Vec<Term>,
+    pub(super) actions: Vec<Action>,
+}
+
+/// Numbers and where they are.
+#[derive(Clone, Debug)]
+pub(super) struct Given {
+    pub(super) numbers: Vec<f64>,
+    pub(super) from: String,
+}
+
+/// A term of the observation.
+#[derive(Debug)]
+pub(super) struct Term {
+    /// Name of its value.
+    pub(super) name: String,
+    /// Module and name of its function, with a point between them.
+    pub(super) function: String,
+    pub(super) what: What,
+    /// Places of its joints, if it is of joints.
+    pub(super) joints: Vec<usize>,
+    /// What is subtracted from the joints' values; empty for nothing.
+    pub(super) offset: Vec<f64>,
+    pub(super) clip: Option<[f64; 2]>,
+    /// One number, or one for each value.
+    pub(super) scale: Option<Vec<f64>>,
+    pub(super) frames: usize,
+    /// Where it is.
+    pub(super) from: String,
+}
+
+/// What a term's function gives.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum What {
+    /// A raw input of this name, length and unit.
+    Raw(String, usize, &'static str),
+    /// A command: a raw input of this name and length, and the ranges of its values, if they are given.
+    Command(String, usize, Option<Vec<[f64; 2]>>),
+    /// The direction of gravity in the frame of the robot's root.
+    Gravity,
+    /// Values of joints: a raw input of this name and unit.
+    Joints(&'static str, &'static str),
+    /// The action before, or the part of it at these places.
+    LastAction(Option<Vec<usize>>),
+    /// Something that the application must compute: the reason, and the length, if it is given.
+    Unknown(String, Option<usize>),
+}
+
+impl Term {
+    /// Returns the number of its values in a frame, if it is known.
+    pub(super) fn len(&self, actions: usize) -> Option<usize> {
+        match &self.what {
+            What::Raw(_, len, _) | What::Command(_, len, _) => Some(*len),
+            What::Gravity => Some(3),
+            What::Joints(..) => Some(self.joints.len()),
+            What::LastAction(places) => Some(places.as_ref().map_or(actions, Vec::len)),
+            What::Unknown(_, len) => *len,
+        }
+    }
+}
+
+/// Returns the name of a function of Isaac Lab's own observations; `None` for any other function.
+pub(super) fn observation(function: &str) -> Option<&str> {
+    MODULES.iter().find_map(|module| function.strip_prefix(module)?.strip_prefix("observations."))
+}
+
+/// Returns what a function of Isaac Lab's observations gives without parameters of its own, and whether a default is
+/// subtracted from it.
+pub(super) fn known(function: &str) -> Option<(What, bool)> {
+    let raw = |name: &str, len, unit| (What::Raw(name.to_owned(), len, unit), false);
+    Some(match observation(function)? {
+        "base_pos_z" => raw("base_pos_z", 1, "m"),
+        name @ ("base_lin_vel" | "root_lin_vel_w") => raw(name, 3, "m/s"),
+        name @ ("base_ang_vel" | "root_ang_vel_w" | "imu_ang_vel") => raw(name, 3, "rad/s"),
+        "root_pos_w" => raw("root_pos_w", 3, "m"),
+        "imu_lin_acc" => raw("imu_lin_acc", 3, "m/s^2"),
+        "imu_projected_gravity" => raw("imu_projected_gravity", 3, ""),
+        "projected_gravity" => (What::Gravity, false),
+        "joint_pos" => (What::Joints("joint_pos", "rad"), false),
+        "joint_pos_rel" => (What::Joints("joint_pos", "rad"), true),
+        "joint_vel" => (What::Joints("joint_vel", "rad/s"), false),
+        "joint_vel_rel" => (What::Joints("joint_vel", "rad/s"), true),
+        "joint_effort" => (What::Joints("joint_effort", "N m"), false),
+        _ => return None,
+    })
+}
+
+/// A part of the action.
+#[derive(Debug)]
+pub(super) struct Action {
+    pub(super) name: String,
+    pub(super) kind: Kind,
+    /// Places of its joints, in the order of its values.
+    pub(super) joints: Vec<usize>,
+    /// One number for each value.
+    pub(super) scale: Vec<f64>,
+    pub(super) offset: Vec<f64>,
+    pub(super) clip: Option<Vec<[f64; 2]>>,
+    pub(super) from: String,
+}
+
+/// What an action is sent as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Position,
+    /// A position relative to that of this moment.
+    Relative,
+    Velocity,
+    Effort,
+}
+
+impl Kind {
+    /// Finds the kind by the class of Isaac Lab.
+    ///
+    /// # Errors
+    ///
+    /// If it is another class.
+    pub(super) fn of(class: &str, at: &str) -> Result<Self> {
+        let own = MODULES.iter().find_map(|module| class.strip_prefix(module)?.strip_prefix("actions.joint_actions."));
+        Ok(match own {
+            Some("JointPositionAction") => Self::Position,
+            Some("RelativeJointPositionAction") => Self::Relative,
+            Some("JointVelocityAction") => Self::Velocity,
+            Some("JointEffortAction") => Self::Effort,
+            _ => {
+                return Err(actq::error::Error::input(format!(
+                    "{at} = {:?}: this action is not known to this reader, which knows JointPositionAction, \
+                     RelativeJointPositionAction, JointVelocityAction and JointEffortAction of \
+                     isaaclab.envs.mdp.actions.joint_actions; write deploy.toml by docs/DEPLOY.md",
+                    actq::text::printable(class)
+                )));
+            }
+        })
+    }
+}
+
+/// Refuses a name that a description cannot have.
+pub(super) fn plain(name: &str, at: &str) -> Result<()> {
+    let is_plain = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+    ensure!(is_plain, "{at}: {:?} is not a name of letters, digits and _", actq::text::printable(name));
+    Ok(())
+}
+
+/// Returns the places of each action's values in the whole action.
+pub(super) fn parts_of(actions: &[Action]) -> Vec<Vec<usize>> {
+    let mut start = 0;
+    let part = |action: &Action| {
+        let places = (start..start + action.joints.len()).collect();
+        start += action.joints.len();
+        places
+    };
+    actions.iter().map(part).collect()
+}

@@ -1,0 +1,38 @@
+//! Values that both files have.
+
+use actq::error::{Result, ensure};
+
+use crate::document::Document;
+use crate::families::common::count;
+use crate::yaml::Node;
+
+/// Most frames of a history.
+const MOST_FRAMES: usize = 1000;
+
+/// Reads a lowest and a highest number, either of which may be infinite.
+pub(super) fn bounds(node: &Node) -> Option<[f64; 2]> {
+    let bound = |node: &Node| match node.text()? {
+        ".inf" | "+.inf" | ".Inf" | "inf" => Some(f64::INFINITY),
+        "-.inf" | "-.Inf" | "-inf" => Some(f64::NEG_INFINITY),
+        _ => node.number(),
+    };
+    let [low, high] = node.items() else { return None };
+    let (low, high) = (bound(low)?, bound(high)?);
+    (low <= high).then_some([low, high])
+}
+
+/// Reads one number or several.
+pub(super) fn numbers(node: &Node) -> Option<Vec<f64>> {
+    let numbers = node.numbers().or_else(|| Some(vec![node.number()?]))?;
+    (!numbers.is_empty()).then_some(numbers)
+}
+
+/// Reads the number of frames that a term or a group observes.
+pub(super) fn history(yaml: &Document, at: &str) -> Result<usize> {
+    let (length, flat) = (format!("{at}.history_length"), format!("{at}.flatten_history_dim"));
+    let frames = yaml.maybe(&length, "a number of frames", count)?.unwrap_or(0).max(1);
+    ensure!(frames <= MOST_FRAMES, "{} = {frames}: at most {MOST_FRAMES} frames are read", yaml.at(&length));
+    let is_flat = yaml.maybe(&flat, "true or false", Node::truth)?.unwrap_or(true);
+    ensure!(frames == 1 || is_flat, "{} = false: a history with an axis of its own is not supported", yaml.at(&flat));
+    Ok(frames)
+}

@@ -1,0 +1,424 @@
+//! Isaac Lab's exports: env.yaml, IO_descriptors.yaml, and both.
+
+#[path = "common/isaaclab.rs"]
+mod isaaclab;
+#[path = "common/made.rs"]
+mod made;
+#[path = "common/onnx.rs"]
+mod onnx;
+
+use actq::error::{Context as _, Result, ensure};
+use actq_deploy::{Answers, Plan, Reading, Runner, read};
+use isaaclab::{DESCRIPTORS, ENVIRONMENT, JOINTS, LEN};
+use made::{Made, message};
+
+/// Files of a bundle: text files by name, and the network.
+struct Files {
+    texts: Vec<(&'static str, String)>,
+    network: Vec<u8>,
+}
+
+impl Files {
+    fn environment() -> Self {
+        let texts = vec![("params/env.yaml", ENVIRONMENT.to_owned())];
+        Self { texts, network: onnx::linear(LEN + 2, 4, &[]) }
+    }
+
+    /// Descriptors lack the term gait_phase, whose function has none.
+    fn descriptors() -> Self {
+        let texts = vec![("io_descriptors/IO_descriptors.yaml", DESCRIPTORS.to_owned())];
+        Self { texts, network: onnx::linear(LEN, 4, &[]) }
+    }
+
+    fn both() -> Self {
+        let texts = [Self::environment().texts, Self::descriptors().texts].concat();
+        Self { texts, network: onnx::linear(LEN + 2, 4, &[]) }
+    }
+
+    /// Replaces a text that occurs one time in one of the files.
+    fn with(mut self, from: &str, to: &str) -> Self {
+        let found: usize = self.texts.iter().map(|(_, text)| text.matches(from).count()).sum();
+        assert_eq!(found, 1, "{from:?} must occur one time");
+        self.texts.iter_mut().for_each(|(_, text)| *text = text.replace(from, to));
+        self
+    }
+
+    fn made(&self) -> Result<Made> {
+        let made = Made::new()?;
+        for (name, text) in &self.texts {
+            made.write(name, text.as_bytes())?;
+        }
+        made.write("exported/policy.onnx", &self.network)?;
+        Ok(made)
+    }
+
+    fn reading(&self, answers: &str) -> Result<Reading> {
+        read(&self.made()?.bundle()?, true, Answers::parse(answers)?)
+    }
+
+    /// Runs 20 ticks; returns observations and targets.
+    fn run(&self, answers: &str) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
+        let made = self.made()?;
+        let reading = read(&made.bundle()?, true, Answers::parse(answers)?)?;
+        ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
+        let mut runner = Runner::new(Plan::new(&reading.description, &made.bundle()?)?);
+        let names: Vec<(String, usize)> = runner.plan().inputs().to_vec();
+        let mut ticks = Vec::new();
+        for tick in 0..20 {
+            let raw: Vec<Vec<f64>> = names.iter().map(|(name, len)| isaaclab::raw(name, *len, tick)).collect();
+            let made = runner.step(&raw);
+            ticks.push((made.observation, made.targets.into_iter().next().context("a target")?.1));
+        }
+        Ok(ticks)
+    }
+}
+
+fn answers(joints: &[&str]) -> String {
+    format!("joints = {joints:?}\nraw.gait_phase = 2\n")
+}
+
+/// Returns the first tick that differs from the reference.
+fn differs(ticks: &[(Vec<f64>, Vec<f64>)], gait: bool) -> Option<String> {
+    let reference = isaaclab::reference(gait, ticks.len());
+    let near = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
+    let differ = |(own, other): (&(Vec<f64>, Vec<f64>), &(Vec<f64>, Vec<f64>))| {
+        !near(&own.0, &other.0) || !near(&own.1, &other.1)
+    };
+    let tick = ticks.iter().zip(&reference).position(differ)?;
+    Some(format!("tick {tick}: {:?}, not {:?}", ticks[tick], reference[tick]))
+}
+
+#[test]
+fn an_environment_agrees_with_its_code() -> Result<()> {
+    let files = Files::environment();
+    let differs = differs(&files.run(&answers(&JOINTS))?, true);
+    ensure!(differs.is_none(), "{differs:?}");
+    let reading = files.reading(&answers(&JOINTS))?;
+    ensure!(reading.unread.is_empty(), "{:?}", reading.unread);
+    let description = reading.description;
+    ensure!((description.rate_hz - 50.0).abs() < 1e-9, "{}", description.rate_hz);
+    let gains = description.gains.context("gains")?;
+    ensure!(gains.stiffness == [25.0, 25.0, 30.0, 30.0] && gains.damping == [0.5; 4], "{gains:?}");
+    Ok(())
+}
+
+#[test]
+fn descriptors_agree_with_the_code() -> Result<()> {
+    let files = Files::descriptors();
+    let differs = differs(&files.run("")?, false);
+    ensure!(differs.is_none(), "{differs:?}");
+    let reading = files.reading("")?;
+    ensure!(reading.unread.is_empty(), "{:?}", reading.unread);
+    ensure!(reading.description.joints["robot"] == JOINTS, "{:?}", reading.description.joints);
+    Ok(())
+}
+
+#[test]
+fn both_files_together_need_no_order() -> Result<()> {
+    let files = Files::both();
+    let differs = differs(&files.run("raw.gait_phase = 2")?, true);
+    ensure!(differs.is_none(), "{differs:?}");
+    ensure!(files.reading("raw.gait_phase = 2")?.unread.is_empty(), "unread keys");
+    Ok(())
+}
+
+#[test]
+fn rules_are_questions_until_accepted() -> Result<()> {
+    let keys = |files: &Files, accepted| -> Result<Vec<String>> {
+        let reading = read(&files.made()?.bundle()?, accepted, Answers::default())?;
+        Ok(reading.questions.into_iter().map(|question| question.key).collect())
+    };
+    ensure!(keys(&Files::environment(), true)? == ["joints", "raw.gait_phase"], "accepted");
+    ensure!(keys(&Files::descriptors(), true)?.is_empty(), "accepted");
+    let mut all = keys(&Files::environment(), false)?;
+    all.sort();
+    let expected = [
+        "action.clip",
+        "asset",
+        "clamp_commands",
+        "clip_first",
+        "gravity",
+        "group",
+        "history.fill",
+        "history.first",
+        "history.layout",
+        "joints",
+        "last_action",
+        "raw.gait_phase",
+        "unmatched",
+    ];
+    ensure!(all == expected, "{all:?}");
+    Ok(())
+}
+
+#[test]
+fn each_convention_changes_the_result() -> Result<()> {
+    let own = answers(&JOINTS);
+    let with = |rule: &str| Files::environment().run(&format!("{own}{rule}\n"));
+    for rule in [
+        "clip_first = false",
+        "history.first = \"newest\"",
+        "history.fill = \"zero\"",
+        "last_action = \"processed\"",
+        "action.clip = \"action\"",
+        "clamp_commands = true",
+    ] {
+        ensure!(differs(&with(rule)?, true).is_some(), "{rule}: nothing differs");
+    }
+    let [a, b, c, d] = JOINTS;
+    ensure!(differs(&Files::environment().run(&answers(&[b, a, c, d]))?, true).is_some(), "another order of joints");
+    ensure!(differs(&with("gravity = \"rpy\"")?, true).is_some(), "gravity of an orientation");
+    for (rule, expected) in [
+        ("history.layout = \"frame\"", "different lengths"),
+        ("unmatched = false", "no pattern matches joint \"FL_knee\""),
+        ("asset = \"arm\"", "params/env.yaml: scene.arm.init_state is missing; answer asset"),
+        (
+            "group = \"actor\"",
+            "params/env.yaml: observations.actor is missing; answer group with one of policy, critic",
+        ),
+    ] {
+        let error = message(Files::environment().reading(&format!("{own}{rule}\n")));
+        ensure!(error.contains(expected), "{rule}: {error}");
+    }
+    Ok(())
+}
+
+#[test]
+fn several_actions_become_several_targets() -> Result<()> {
+    let legs = "  joint_pos:\n    class_type: isaaclab.envs.mdp.actions.joint_actions:JointPositionAction";
+    let wheels = "  wheels:\n    class_type: isaaclab.envs.mdp.actions.joint_actions:JointVelocityAction\n    asset_name: robot\n    \
+        joint_names: .*_knee\n    scale: 5.0\n    offset: 0.0\n    use_default_offset: true\n    clip: null\n";
+    let files = Files { network: onnx::linear(LEN + 2 + 2, 6, &[]), ..Files::environment() };
+    let files = files.with(legs, &format!("{wheels}{legs}"));
+    let description = files.reading(&answers(&JOINTS))?.description;
+    let kinds: Vec<String> = description.targets.iter().map(|target| format!("{:?}", target.kind)).collect();
+    ensure!(kinds == ["Velocity", "Position"], "{kinds:?}");
+    ensure!(description.joints["action_0"] == ["FL_knee", "FR_knee"], "{:?}", description.joints);
+    let made = files.made()?;
+    let mut runner = Runner::new(Plan::new(&description, &made.bundle()?)?);
+    let raw: Vec<Vec<f64>> = runner.plan().inputs().iter().map(|(name, len)| isaaclab::raw(name, *len, 3)).collect();
+    let tick = runner.step(&raw);
+    let expected: Vec<f64> = tick.action[..2].iter().map(|action| 5.0 * action).collect();
+    ensure!(tick.targets[0].1.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-9), "{:?}", tick.targets);
+    Ok(())
+}
+
+#[test]
+fn relative_actions_are_asked() -> Result<()> {
+    let files = Files::environment()
+        .with("joint_actions:JointPositionAction", "joint_actions:RelativeJointPositionAction")
+        .with("use_default_offset: true", "use_zero_offset: true");
+    let asked = files.reading(&answers(&JOINTS))?.questions;
+    ensure!(asked.len() == 1 && asked[0].key == "relative.once", "{asked:?}");
+    let ticks = files.run(&format!("{}relative.once = true\n", answers(&JOINTS)))?;
+    let network = isaaclab::network(&ticks[0].0, 4);
+    // The first joint of the action is FR_hip, whose scale is 0.25 and whose limits are -2 and 0.3.
+    let expected = (0.25 * network[0]).clamp(-2.0, 0.3) + isaaclab::raw("joint_pos", 4, 0)[1];
+    ensure!((ticks[0].1[0] - expected).abs() < 1e-5, "{} is not {expected}", ticks[0].1[0]);
+    Ok(())
+}
+
+#[test]
+fn metadata_of_the_network_is_used_and_checked() -> Result<()> {
+    let metadata = |names: &'static str, default: &'static str| {
+        [
+            ("joint_names", names),
+            ("default_joint_pos", default),
+            ("joint_stiffness", "25,25,30,30"),
+            ("action_scale", "0.25,0.5,0.25,0.5"),
+        ]
+    };
+    let files =
+        |metadata: &[(&str, &str)], files: Files| Files { network: onnx::linear(LEN + 2, 4, metadata), ..files };
+    let own = "FL_hip,FR_hip,FL_knee,FR_knee";
+    let good = metadata(own, "0.1,-0.1,0.0,-1.5");
+    ensure!(differs(&files(&good, Files::environment()).run("raw.gait_phase = 2")?, true).is_none(), "differs");
+    for (metadata, other, expected) in [
+        (metadata(own, "0.1,-0.1,0.2,-1.5"), Files::environment(), "default positions: the bundle contradicts itself"),
+        (metadata("FR_hip,FL_hip,FL_knee,FR_knee", "0.1,-0.1,0,-1.5"), Files::both(), "order of the joints"),
+        (metadata("FL_hip,FR_hip,FL_knee", "0.1,-0.1,0"), Files::both(), "3 joints"),
+    ] {
+        let error = message(files(&metadata, other).reading("raw.gait_phase = 2"));
+        ensure!(error.contains(expected) && error.contains("policy.onnx metadata"), "{expected}: {error}");
+    }
+    Ok(())
+}
+
+#[test]
+fn bad_environments_are_refused() -> Result<()> {
+    let own = answers(&JOINTS);
+    let cases = [
+        ("dt: 0.005", "dt: .nan", "params/env.yaml: sim.dt (line 9) must be a finite number"),
+        ("dt: 0.005", "dt: 0", "params/env.yaml: sim.dt = 0"),
+        ("decimation: 4", "decimation: -4", "decimation = -4"),
+        (".*L_hip: 0.1", ".*L_hip: .nan", "must be a finite number, or finite numbers by patterns of joints"),
+        (".*L_hip: 0.1", "L_hip: 0.1", "init_state.joint_pos: \"L_hip\" matches none of the joints FL_hip"),
+        (".*L_hip: 0.1", ".*_hip: 0.1", "\".*_hip\" and \".*R_hip\" match both joint \"FR_hip\""),
+        (".*L_hip: 0.1", "'[': 0.1", "\"[\" is not a regular expression that this reader knows"),
+        (".*L_hip: 0.1", "'(?=FL).*': 0.1", "is not a regular expression that this reader knows"),
+        ("joint_names_expr:\n        - .*_hip\n        - .*_knee", "joint_names_expr: []", "joint_names_expr is empty"),
+        ("asset_name: robot\n    debug", "asset_name: arm\n    debug", "actions.joint_pos.asset_name = \"arm\""),
+        ("joint_actions:JointPosition", "joint_actions_to_limits:JointPositionToLimits", "this action is not known"),
+        ("use_default_offset: true", "use_default_offset: 3", "use_default_offset (line"),
+        ("- FR_.*\n    - FL_.*", "- FR_.*", "length of the action: the bundle contradicts itself"),
+        ("- -2.0\n      - 0.3", "- 2.0\n      - 0.3", "actions.joint_pos.clip (line"),
+        ("concatenate_terms: true\n    enable", "concatenate_terms: false\n    enable", "concatenate_terms = false"),
+        (
+            "scale: 0.25\n      history_length: 3",
+            "scale: [1, 2]\n      history_length: 3",
+            "scale has 2 values, and the term 3",
+        ),
+        ("scale: 0.25\n      history_length: 3", "scale: 0.25\n      history_length: 1e4", "at most 1000 frames"),
+        (
+            "history_length: 3\n      flatten_history_dim: true",
+            "history_length: 3\n      flatten_history_dim: false",
+            "an axis of its own",
+        ),
+        ("history_length: null\n    flatten", "history_length: 2\n    flatten", "length of the observation"),
+        ("gait_phase:\n", "\"gait\\e\":\n", "\"gait\\\\u{1b}\" is not a name of letters, digits and _"),
+        ("func: isaaclab.envs.mdp.observations:base_ang_vel\n", "func: null\n", "base_ang_vel.func is missing"),
+        ("- .*_knee\n          - FR_hip", "- .*_ankle", "\".*_ankle\" matches none of the joints"),
+        ("scene:\n", "scene:\n  robot: 1\n", "occurs twice"),
+    ];
+    let mut wrong = Vec::new();
+    for (from, to, expected) in cases {
+        let error = message(Files::environment().with(from, to).reading(&own));
+        if !error.contains(expected) {
+            wrong.push(format!("{to}: {error}"));
+        }
+    }
+    for (answers, expected) in [
+        (answers(&["FL_hip", "FL_hip", "FL_knee", "FR_knee"]), "answer joints: \"FL_hip\" occurs twice"),
+        (answers(&[]), "answer joints: 0 joints"),
+        (own.replace("FR_knee", r"FR\u001b"), "is not a name"),
+        (answers(&["FL_hip", "FR_hip", "FL_knee"]), "matches none of the joints"),
+        (own.replace("phase = 2", "phase = 3"), "length of the observation"),
+        (format!("{own}joint = 1\n"), "nothing asks for joint"),
+    ] {
+        let error = message(Files::environment().reading(&answers));
+        if !error.contains(expected) {
+            wrong.push(format!("{answers}: {error}"));
+        }
+    }
+    ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
+    Ok(())
+}
+
+#[test]
+fn bad_descriptors_are_refused() -> Result<()> {
+    let cases = [
+        ("  dt: 0.02\n", "  dt: 0.01\n", "time of a tick: the bundle contradicts itself"),
+        (
+            "  - 0.1\n    - -0.1\n    - 0.0\n    - -1.5\n    default_joint_vel",
+            "  - 0.1\n    default_joint_vel",
+            "default_joint_pos has 1 values, but joint_names 4",
+        ),
+        ("scale: [0.25, 0.5, 0.25, 0.5]", "scale: [0.25, .nan, 0.25, 0.5]", "actions.0.scale (line"),
+        ("scale: [0.25, 0.5, 0.25, 0.5]", "scale: [0.25, 0.5]", "actions.0.scale has 2 values; 4 joints are named"),
+        (
+            "joint_names: [FR_hip, FR_knee, FL_hip, FL_knee]",
+            "joint_names: [FR_hip, FR_hip, FL_hip, FL_knee]",
+            "\"FR_hip\" occurs twice",
+        ),
+        (
+            "joint_names: [FR_hip, FR_knee, FL_hip, FL_knee]",
+            "joint_names: [FR_hip, arm, FL_hip, FL_knee]",
+            "\"arm\" is none of the joints",
+        ),
+        (
+            "joint_pos_offsets: [0.1, -0.1, 0.0, -1.5]",
+            "joint_pos_offsets: [0.1]",
+            "joint_pos_offsets has 1 values, but joint_names 4",
+        ),
+        ("name: base_ang_vel", "name: \"base\\e\"", "\"base\\\\u{1b}\" is not a name"),
+        (
+            "full_path: isaaclab.envs.mdp.actions.joint_actions.JointPositionAction",
+            "full_path: mine.Action",
+            "this action is not known",
+        ),
+        ("shape: [3] # of base_ang_vel", "shape: []", "must be the number of values, as a list"),
+        (
+            "articulations:\n  robot:",
+            "articulations:\n  arm:",
+            "articulations.robot is missing; answer asset with one of arm",
+        ),
+    ];
+    let mut wrong = Vec::new();
+    for (from, to, expected) in cases {
+        let error = message(Files::descriptors().with(from, to).reading(""));
+        if !error.contains(expected) {
+            wrong.push(format!("{to}: {error}"));
+        }
+    }
+    ensure!(wrong.is_empty(), "{}", wrong.join("\n"));
+    // The exporter left out a term.
+    let longer = Files { network: onnx::linear(LEN + 2, 4, &[]), ..Files::descriptors() };
+    let error = message(longer.reading(""));
+    ensure!(error.contains("add env.yaml, which has all") && error.contains(&format!("{LEN} values")), "{error}");
+    Ok(())
+}
+
+#[test]
+fn files_that_contradict_each_other_are_refused() -> Result<()> {
+    let cases = [
+        ("dt: 0.005\n  render", "dt: 0.01\n  render", "ticks a second"),
+        (".*L_hip: 0.1", ".*L_hip: 0.2", "default positions"),
+        (".*_knee: 30.0", ".*_knee: 31.0", "stiffness"),
+        ("damping: 0.5", "damping: 0.6", "damping"),
+        (".*_knee: 0.5", ".*_knee: 0.6", "scale of \"joint_pos\""),
+        ("- FR_.*\n    - FL_.*", "- FL_.*\n    - FR_.*", "joints of \"joint_pos\""),
+        ("- -2.0\n      - 0.3", "- -2.0\n      - 0.4", "limits of \"joint_pos\""),
+        ("scale: 0.25\n      history_length: 3", "scale: 0.5\n      history_length: 3", "scale of \"base_ang_vel\""),
+        (
+            "scale: 0.25\n      history_length: 3",
+            "scale: 0.25\n      history_length: 2",
+            "number of frames of \"base_ang_vel\"",
+        ),
+        (
+            "- -1.0\n      - 1.0\n      scale: 0.25",
+            "- -1.0\n      - 2.0\n      scale: 0.25",
+            "limits of \"base_ang_vel\"",
+        ),
+        ("- .*_knee\n          - FR_hip", "- FR_hip\n          - .*_knee", "joints of \"joint_vel\""),
+        (
+            "func: isaaclab.envs.mdp.observations:joint_vel_rel",
+            "func: isaaclab.envs.mdp.observations:joint_vel",
+            "terms of the observation",
+        ),
+    ];
+    for (from, to, expected) in cases {
+        let error = message(Files::both().with(from, to).reading("raw.gait_phase = 2"));
+        let sources = error.contains("params/env.yaml") && error.contains("io_descriptors/IO_descriptors.yaml");
+        ensure!(error.contains(expected) && error.contains("contradicts itself") && sources, "{to}: {error}");
+    }
+    Ok(())
+}
+
+#[test]
+fn bundles_without_or_with_many_policies_are_refused() -> Result<()> {
+    let made = Made::new()?;
+    made.write("params/env.yaml", ENVIRONMENT.as_bytes())?;
+    let error = message(read(&made.bundle()?, true, Answers::default()));
+    ensure!(error.contains("params/env.yaml: there is no ONNX file with it"), "{error}");
+    let files = Files::environment();
+    made.write("a.onnx", &files.network)?;
+    made.write("b.onnx", &files.network)?;
+    let error = message(read(&made.bundle()?, true, Answers::default()));
+    ensure!(error.contains("which of a.onnx, b.onnx is its policy?"), "{error}");
+    let made = files.made()?;
+    made.write("other/env.yaml", ENVIRONMENT.as_bytes())?;
+    let error = message(read(&made.bundle()?, true, Answers::default()));
+    ensure!(error.contains("several policies of this family"), "{error}");
+    Ok(())
+}
+
+/// A bundle of unitree_rl_lab has the training's env.yaml, too.
+#[test]
+fn other_families_keep_their_bundles() -> Result<()> {
+    let made = Files::environment().made()?;
+    let deploy = "joint_ids_map: [0, 1, 2, 3]\nstep_dt: 0.02\nactions: {}\nobservations: {}\n";
+    made.write("params/deploy.yaml", deploy.as_bytes())?;
+    let error = message(read(&made.bundle()?, true, Answers::default()));
+    ensure!(error.contains("unitree_rl_lab bundle"), "{error}");
+    Ok(())
+}
