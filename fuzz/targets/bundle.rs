@@ -8,13 +8,14 @@ use actq_deploy::{Answers, Bundle, read};
 use libfuzzer_sys::fuzz_target;
 
 /// Files of each family that has text files, the network last.
-const NAMES: [&[&str]; 6] = [
+const NAMES: [&[&str]; 7] = [
     &["params/deploy.yaml", "exported/policy.onnx"],
     &["params.yaml", "policy/isaaclab/policy.onnx", "policy/isaaclab/encoder.onnx"],
     &["config.yaml", "robot.xml", "models/policy.kinfer"],
     &["config.yaml", "policy.onnx"],
     &["config.json", "policy_preprocessor.json", "policy_postprocessor.json", "meta/info.json", "policy.onnx"],
     &["base.yaml", "walk/config.yaml", "walk/policy.onnx"],
+    &["params/env.yaml", "io_descriptors/IO_descriptors.yaml", "exported/policy.onnx"],
 ];
 
 fuzz_target!(|bytes: &[u8]| {

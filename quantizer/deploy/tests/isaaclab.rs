@@ -12,6 +12,9 @@ use actq_deploy::{Answers, Plan, Reading, Runner, read};
 use isaaclab::{DESCRIPTORS, ENVIRONMENT, JOINTS, LEN};
 use made::{Made, message};
 
+/// Observation and target of a tick.
+type Tick = (Vec<f64>, Vec<f64>);
+
 /// Files of a bundle: text files by name, and the network.
 struct Files {
     texts: Vec<(&'static str, String)>,
@@ -57,7 +60,7 @@ impl Files {
     }
 
     /// Runs 20 ticks; returns observations and targets.
-    fn run(&self, answers: &str) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
+    fn run(&self, answers: &str) -> Result<Vec<Tick>> {
         let made = self.made()?;
         let reading = read(&made.bundle()?, true, Answers::parse(answers)?)?;
         ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
@@ -78,12 +81,10 @@ fn answers(joints: &[&str]) -> String {
 }
 
 /// Returns the first tick that differs from the reference.
-fn differs(ticks: &[(Vec<f64>, Vec<f64>)], gait: bool) -> Option<String> {
+fn differs(ticks: &[Tick], gait: bool) -> Option<String> {
     let reference = isaaclab::reference(gait, ticks.len());
     let near = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
-    let differ = |(own, other): (&(Vec<f64>, Vec<f64>), &(Vec<f64>, Vec<f64>))| {
-        !near(&own.0, &other.0) || !near(&own.1, &other.1)
-    };
+    let differ = |(own, other): (&Tick, &Tick)| !near(&own.0, &other.0) || !near(&own.1, &other.1);
     let tick = ticks.iter().zip(&reference).position(differ)?;
     Some(format!("tick {tick}: {:?}, not {:?}", ticks[tick], reference[tick]))
 }

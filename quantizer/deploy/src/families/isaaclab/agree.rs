@@ -13,6 +13,9 @@ const F32: f64 = 1e-5;
 /// Largest difference from a number of the ONNX metadata, which has 3 decimals.
 const DECIMALS: f64 = 5.1e-4;
 
+/// Gives what is compared of a term with this number of values.
+type OfTerm = fn(&Term, usize) -> Vec<f64>;
+
 /// Checks an environment by the exported descriptors of it, and takes from them the lengths of terms that only they have.
 pub(super) fn with_descriptors(environment: &mut Policy, descriptors: &Policy) -> Result<()> {
     same("ticks a second", &environment.rate, &descriptors.rate, F32)?;
@@ -63,7 +66,7 @@ fn of_term(own: &Term, other: &Term, actions: usize) -> Result<()> {
     let lens = (own.len(actions), other.len(actions));
     let len = lens.0.or(lens.1).unwrap_or(1);
     let of = |term: &Term, numbers: Vec<f64>| Given { numbers, from: term.from.clone() };
-    let pairs: [(&str, fn(&Term, usize) -> Vec<f64>); 5] = [
+    let pairs: [(&str, OfTerm); 5] = [
         ("number of joints", |term, _| vec![term.joints.len() as f64]),
         ("joints", |term, _| term.joints.iter().map(|place| *place as f64).collect()),
         ("offset", |term, _| if term.offset.iter().all(|n| *n == 0.0) { Vec::new() } else { term.offset.clone() }),

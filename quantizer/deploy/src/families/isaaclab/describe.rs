@@ -76,10 +76,10 @@ impl Maker<'_> {
             added.push(("joint_pos", "rad"));
         }
         for term in terms {
-            if let What::Joints(input, unit) = term.what {
-                if !added.contains(&(input, unit)) {
-                    added.push((input, unit));
-                }
+            if let What::Joints(input, unit) = term.what
+                && !added.contains(&(input, unit))
+            {
+                added.push((input, unit));
             }
         }
         added.into_iter().for_each(|(input, unit)| parts.raw_joints(input, "robot", unit));
@@ -180,14 +180,14 @@ impl Maker<'_> {
             };
             let meaning = format!("{why}; how many values of it does the application compute? ({hint})");
             let len: Option<usize> = self.facts.missing(&key, &meaning)?;
-            if let (Some(answer), Some(given)) = (len, given) {
-                if answer != *given {
-                    return Err(Facts::contradiction(
-                        &format!("length of {:?}", term.name),
-                        (&format!("answer {key}"), &answer.to_string()),
-                        (&term.from, &given.to_string()),
-                    ));
-                }
+            if let (Some(answer), Some(given)) = (len, given)
+                && answer != *given
+            {
+                return Err(Facts::contradiction(
+                    &format!("length of {:?}", term.name),
+                    (&format!("answer {key}"), &answer.to_string()),
+                    (&term.from, &given.to_string()),
+                ));
             }
             let len = len.or(*given).unwrap_or(1);
             ensure!((1..=MOST).contains(&len), "{key} = {len}: give 1 to {MOST}");
