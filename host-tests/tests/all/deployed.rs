@@ -393,25 +393,27 @@ fn an_image_names_its_inputs_its_targets_and_their_joints() -> Result<()> {
     Ok(())
 }
 
+/// Counts the episodes that a policy succeeds in; without raw values, `step` resets it.
+fn balanced(episodes: u64, mut step: impl FnMut(Option<&[f32]>) -> Result<Vec<f32>>) -> Result<u64> {
+    let mut successes = 0;
+    for seed in 0..episodes {
+        step(None)?;
+        let torques = |raw: &[f32]| step(Some(raw))?.as_slice().try_into().context("two torques");
+        successes += u64::from(actq_balancer::run_episode(seed, torques)?.success);
+    }
+    Ok(successes)
+}
+
 /// The bundle of the repository keeps the robot up: as it is described, and as an image.
 #[test]
 fn the_balancer_stands_by_its_description_and_by_an_image() -> Result<()> {
     const EPISODES: u64 = 10;
     let folder = actq_balancer::bundle();
-    let stands = |mut step: Box<dyn FnMut(Option<&[f32]>) -> Result<Vec<f32>> + '_>| -> Result<usize> {
-        let mut successes = 0;
-        for seed in 0..EPISODES {
-            step(None)?;
-            let torques = |raw: &[f32]| step(Some(raw))?.as_slice().try_into().context("two torques");
-            successes += usize::from(actq_balancer::run_episode(seed, torques)?.success);
-        }
-        Ok(successes)
-    };
     let bundle = Bundle::open(folder)?;
     let plan = Plan::new(&Description::parse(&bundle.text(DESCRIPTION)?)?, &bundle)?;
     let lens: Vec<usize> = plan.inputs().iter().map(|(_, len)| *len).collect();
     let mut runner = Runner::new(plan);
-    let described = stands(Box::new(|raw| {
+    let described = balanced(EPISODES, |raw| {
         let Some(raw) = raw else {
             runner.reset();
             return Ok(Vec::new());
@@ -419,20 +421,19 @@ fn the_balancer_stands_by_its_description_and_by_an_image() -> Result<()> {
         let mut rest = raw.iter().map(|x| f64::from(*x));
         let inputs: Vec<Vec<f64>> = lens.iter().map(|len| rest.by_ref().take(*len).collect()).collect();
         Ok(runner.step(&inputs).targets[0].1.iter().map(|x| *x as f32).collect())
-    }))?;
+    })?;
     let bytes = four_bits(&Deployment::load(folder)?.policy)?;
     let buffer = ImageBuffer::new(&bytes);
     let of_image = with_head(buffer.image(folder)?, |head| {
-        stands(Box::new(|raw| {
+        balanced(EPISODES, |raw| {
             let Some(raw) = raw else {
                 head.reset();
                 return Ok(Vec::new());
             };
             Ok(head.step(raw)?.to_vec())
-        }))
+        })
     })?;
-    println!("{described} and {of_image} of {EPISODES} episodes succeed");
-    ensure!(described == EPISODES as usize && of_image == EPISODES as usize, "{described} and {of_image}");
+    ensure!([described, of_image] == [EPISODES; 2], "{described} and {of_image} of {EPISODES}");
     Ok(())
 }
 
