@@ -19,7 +19,7 @@ const YAW_INERTIA: f64 = 0.01;
 const ROLLING_FRICTION: f64 = 0.5;
 const TURNING_FRICTION: f64 = 0.01;
 
-/// What the robot does.
+/// State of the robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State {
     /// Forward speed.

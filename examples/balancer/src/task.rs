@@ -29,7 +29,7 @@ const SUCCESS: [f64; 2] = [0.1, 0.2];
 /// Standard deviations of the sensors' noise: angular velocity, lean, wheel velocities.
 const NOISE: [f64; 3] = [0.02, 0.003, 0.1];
 
-/// How an episode ended.
+/// Outcome of an episode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
     /// It stood, and followed each command at its end.

@@ -41,17 +41,17 @@ pub(super) struct Term {
     pub(super) what: What,
     /// Places of its joints, if it is of joints.
     pub(super) joints: Vec<usize>,
-    /// What is subtracted from the joints' values; empty for nothing.
+    /// Offsets that are subtracted from the joints' values; empty for none.
     pub(super) offset: Vec<f64>,
     pub(super) clip: Option<[f64; 2]>,
     /// One number, or one for each value.
     pub(super) scale: Option<Vec<f64>>,
     pub(super) frames: usize,
-    /// Where it is.
+    /// Its file and key.
     pub(super) from: String,
 }
 
-/// What a term's function gives.
+/// Content of a term.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum What {
     /// A raw input of this name, length and unit.
@@ -121,7 +121,7 @@ pub(super) struct Action {
     pub(super) from: String,
 }
 
-/// What an action is sent as.
+/// Quantity of an action's target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Position,

@@ -12,7 +12,7 @@ pub(super) const MOST: usize = 1000;
 #[derive(Clone, Debug)]
 pub(super) struct Joints {
     pub(super) names: Vec<String>,
-    /// Where they are, for reports and errors.
+    /// Their file and key, for reports and errors.
     pub(super) from: String,
     /// Set while the order is a question: the names are placeholders, which no pattern needs to match.
     pub(super) open: bool,
