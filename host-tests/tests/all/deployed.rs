@@ -411,15 +411,13 @@ fn the_balancer_stands_by_its_description_and_by_an_image() -> Result<()> {
     let folder = actq_balancer::bundle();
     let bundle = Bundle::open(folder)?;
     let plan = Plan::new(&Description::parse(&bundle.text(DESCRIPTION)?)?, &bundle)?;
-    let lens: Vec<usize> = plan.inputs().iter().map(|(_, len)| *len).collect();
     let mut runner = Runner::new(plan);
     let described = balanced(EPISODES, |raw| {
         let Some(raw) = raw else {
             runner.reset();
             return Ok(Vec::new());
         };
-        let mut rest = raw.iter().map(|x| f64::from(*x));
-        let inputs: Vec<Vec<f64>> = lens.iter().map(|len| rest.by_ref().take(*len).collect()).collect();
+        let inputs = runner.plan().split(raw);
         Ok(runner.step(&inputs).targets[0].1.iter().map(|x| *x as f32).collect())
     })?;
     let bytes = four_bits(&Deployment::load(folder)?.policy)?;

@@ -81,21 +81,14 @@ pub fn observed(folder: &Path, raw: &Dataset) -> Result<Dataset> {
     let description = Description::parse(&bundle.text(DESCRIPTION)?).context(DESCRIPTION)?;
     let plan = Plan::new(&description, &bundle).context(DESCRIPTION)?;
     let columns = Deployment::new(&description.name, description.rate_hz as f32, &plan)?.columns;
-    let lens: Vec<usize> = plan.inputs().iter().map(|(_, len)| *len).collect();
-    let (len, given) = (lens.iter().sum::<usize>(), raw.obs.dim().2);
+    let (len, given) = (plan.inputs().iter().map(|(_, len)| len).sum::<usize>(), raw.obs.dim().2);
     ensure!(given == len, "{}: it has {given} values a step, and the raw inputs {len}", raw.path.display());
     let mut runner = Runner::new(plan);
     let mut obs = Array3::zeros((raw.length.len(), raw.obs.dim().1, columns.len()));
     for (episode, steps) in raw.length.iter().enumerate() {
         runner.reset();
         for (step, values) in raw.episode(episode).take(*steps).enumerate() {
-            let mut rest = &values[..];
-            let mut inputs = Vec::new();
-            for len in &lens {
-                let (input, after) = rest.split_at(*len);
-                inputs.push(input.iter().map(|value| f64::from(*value)).collect());
-                rest = after;
-            }
+            let inputs = runner.plan().split(&values);
             let tick = runner.step(&inputs);
             for (i, column) in columns.iter().enumerate() {
                 obs[[episode, step, i]] = tick.observation[*column] as f32;

@@ -71,10 +71,10 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
         check::run(&CheckArgs { image: image.clone(), reference: reference.clone(), max_nmse: args.max_nmse })?;
     }
     step(4, "constants")?;
+    let gains = has_gains(&description)?.then_some(description);
     for ending in ["rs", "h"] {
-        let out = args.out.join(IMAGE).with_extension(ending);
-        let gains = has_gains(&description)?.then(|| description.clone());
-        constants::run(&ConstantsArgs { image: image.clone(), out, gains })?;
+        let out = image.with_extension(ending);
+        constants::run(&ConstantsArgs { image: image.clone(), out, gains: gains.clone() })?;
     }
     if let Some(board) = &args.board {
         step(5, "firmware")?;

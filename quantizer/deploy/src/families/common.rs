@@ -330,6 +330,16 @@ pub(super) fn metadata_document(file: &str, metadata: &BTreeMap<String, String>)
     Document::of(&format!("{file} metadata"), Node { line: 1, data })
 }
 
+/// Refuses names that are empty, occur twice, or have characters that a report cannot show.
+pub(super) fn check_names(names: &[String], at: &str) -> Result<()> {
+    for (i, name) in names.iter().enumerate() {
+        let shown = printable(name);
+        ensure!(!name.is_empty() && shown == *name, "{at}: {shown:?} is not a name");
+        ensure!(!names[..i].contains(name), "{at}: {name:?} occurs twice");
+    }
+    Ok(())
+}
+
 /// Reads a list with commas between its names.
 pub(super) fn names(meta: &Document, key: &str) -> Result<Vec<String>> {
     let text = meta.need(key, "names with commas between them", Node::text)?;

@@ -39,11 +39,9 @@ impl Family for IsaacLab {
         let (mut exported, mut environments) = (Vec::new(), Vec::new());
         for file in bundle.with_ending("yaml").chain(bundle.with_ending("yml")) {
             // Only files that name its modules can be of this family; the others need not be YAML that this reader knows.
-            let names_module = |text: String| MODULES.iter().any(|module| text.contains(module));
-            if !bundle.text(file).is_ok_and(names_module) {
-                continue;
-            }
-            let root = bundle.text(file).and_then(|text| Node::parse(&text).context(file.to_owned()))?;
+            let names_module = |text: &String| MODULES.iter().any(|module| text.contains(module));
+            let Some(text) = bundle.text(file).ok().filter(names_module) else { continue };
+            let root = Node::parse(&text).context(file.to_owned())?;
             let document = Document::of(file, descriptors::numbered(root));
             if descriptors::is_one(&document) {
                 exported.push(document);

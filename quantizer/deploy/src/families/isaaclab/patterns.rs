@@ -5,6 +5,8 @@ use actq::error::{Error, Result, ensure};
 use actq::text::printable;
 use regex_lite::Regex;
 
+use crate::families::common::check_names;
+
 /// Most joints of a robot, and most patterns for them.
 pub(super) const MOST: usize = 1000;
 
@@ -26,10 +28,7 @@ impl Joints {
     /// If it is empty or too long, or a name occurs twice or has characters that a report cannot show.
     pub(super) fn new(names: Vec<String>, from: String) -> Result<Self> {
         ensure!((1..=MOST).contains(&names.len()), "{from}: {} joints; give 1 to {MOST}", names.len());
-        for (i, name) in names.iter().enumerate() {
-            ensure!(!name.is_empty() && printable(name) == *name, "{from}: {:?} is not a name", printable(name));
-            ensure!(!names[..i].contains(name), "{from}: {name:?} occurs twice");
-        }
+        check_names(&names, &from)?;
         Ok(Self { names, from, open: false })
     }
 

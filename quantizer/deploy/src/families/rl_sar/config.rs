@@ -3,7 +3,7 @@
 use actq::error::{Context as _, Result, ensure};
 use actq::text::printable;
 
-use super::super::common::count;
+use super::super::common::{check_names, count};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::yaml::Node;
@@ -27,13 +27,11 @@ impl Section<'_> {
     /// Returns a list of names, if it has one.
     pub(super) fn names(self, key: &str) -> Result<Option<Vec<String>>> {
         let path = self.path(key);
-        let Some(names) = self.document.maybe(&path, "a list of names", Node::texts)? else { return Ok(None) };
-        for (i, name) in names.iter().enumerate() {
-            let shown = printable(name);
-            ensure!(shown == *name && !name.is_empty(), "{}: {shown:?} is not a name", self.at(key));
-            ensure!(!names[..i].contains(name), "{}: {name:?} occurs twice", self.at(key));
+        let names = self.document.maybe(&path, "a list of names", Node::texts)?;
+        if let Some(names) = &names {
+            check_names(names, &self.at(key))?;
         }
-        Ok(Some(names))
+        Ok(names)
     }
 
     pub(super) fn at(self, key: &str) -> String {

@@ -94,29 +94,22 @@ pub(crate) fn run(counter: &Counter, episodes: u64, qemu_episodes: u64) -> Resul
 }
 
 /// The policy as its bundle describes it, in f32.
-struct F32 {
-    runner: Runner,
-    /// Lengths of the raw inputs.
-    lens: Vec<usize>,
-}
+struct F32(Runner);
 
 impl F32 {
     fn open() -> Result<Self> {
         let opened = Bundle::open(bundle())?;
         let description = Description::parse(&opened.text(DESCRIPTION)?)?;
-        let plan = Plan::new(&description, &opened)?;
-        let lens = plan.inputs().iter().map(|(_, len)| *len).collect();
-        Ok(Self { runner: Runner::new(plan), lens })
+        Ok(Self(Runner::new(Plan::new(&description, &opened)?)))
     }
 
     /// Runs an episode; `see` gets the raw values of each step.
     fn episode(&mut self, seed: u64, mut see: impl FnMut(&[f32])) -> Result<Outcome> {
-        self.runner.reset();
+        self.0.reset();
         run_episode(seed, |raw| {
             see(raw);
-            let mut rest = raw.iter().map(|x| f64::from(*x));
-            let inputs: Vec<Vec<f64>> = self.lens.iter().map(|len| rest.by_ref().take(*len).collect()).collect();
-            let tick = self.runner.step(&inputs);
+            let inputs = self.0.plan().split(raw);
+            let tick = self.0.step(&inputs);
             let (_, torque) = tick.targets.first().context("the bundle has no target")?;
             torques(&torque.iter().map(|x| *x as f32).collect::<Vec<_>>())
         })
