@@ -12,7 +12,7 @@ mod disturbance;
 mod line;
 mod rig;
 
-pub use bits::count_foreign;
+pub use bits::{Compared, Log};
 pub use disturbance::{Disturbance, Run};
 pub use line::{Line, Noise, Tally};
 pub use rig::{Progress, Reaction, Rig};

@@ -1,55 +1,92 @@
-//! Compares the board's actions with those of the host's executor.
+//! Compares the board's actions with those of the host's executor, by the rule in docs/LINK.md ("State of the head").
 
 use std::collections::HashMap;
 
 use actq_kernels::{Head, Image};
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 
 use crate::bits;
 
-/// An action of the board's head.
+/// What the board sent, as far as it tells the state of its head.
 #[derive(Clone, Debug)]
-pub struct HeadAction {
-    /// Number of the observation.
-    pub of: u32,
-    /// Bits of the values.
-    pub bits: Vec<u32>,
+pub(super) enum Sent {
+    /// A status.
+    Status {
+        /// The token, and `true` if the board was reset: the token is then new, whatever its value.
+        token: u32,
+        was_reset: bool,
+        /// CRC-32 of the running image's header.
+        image: u32,
+    },
+    /// An action: the number of its observation, and the bits of its values.
+    Action { of: u32, bits: Vec<u32> },
+    /// Frames that the board dropped, because its port had no room.
+    Dropped,
 }
 
-/// Counts the board's actions, in their order, that no head of these images computes on their observations: continued
-/// from the previous action, from a reset, or as the first action of the next image. Also counts the restarts of a
-/// head.
-pub fn count_foreign(
-    reported: &[HeadAction],
-    shown: &HashMap<u32, Vec<f32>>,
-    images: &[Image<'_>],
-) -> Result<(usize, usize)> {
-    let mut memory: Vec<Vec<u32>> = images.iter().map(|image| vec![0; image.scratch_words()]).collect();
-    let mut heads = images
-        .iter()
-        .zip(&mut memory)
-        .map(|(image, scratch)| Head::new(*image, scratch))
-        .collect::<Result<Vec<_>, _>>()?;
-    let (mut foreign, mut anew, mut current) = (0, 0, 0);
-    for reported in reported {
-        let Some(observation) = shown.get(&reported.of) else {
-            foreign += 1;
-            continue;
-        };
-        if bits(heads[current].step(observation)?) == reported.bits {
-            continue;
+/// What a board sent, and the observations that it was sent.
+#[derive(Clone, Debug, Default)]
+pub struct Log {
+    pub(super) sent: Vec<Sent>,
+    /// The observations by their numbers.
+    pub(super) observations: HashMap<u32, Vec<f32>>,
+}
+
+/// The actions of a board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Compared {
+    /// All.
+    pub actions: usize,
+    /// Those whose bits differ from the host executor's.
+    pub foreign: usize,
+    /// Those not compared: the board had dropped frames, and the state of its head was not known again.
+    pub unknown: usize,
+}
+
+impl Log {
+    /// Compares the actions with those of executors of `images`: those that the board ran.
+    ///
+    /// # Errors
+    ///
+    /// If an image cannot run, or the board ran another one.
+    pub fn compare(&self, images: &[Image<'_>]) -> Result<Compared> {
+        let mut memory: Vec<Vec<u32>> = images.iter().map(|image| vec![0; image.scratch_words()]).collect();
+        let mut heads = images
+            .iter()
+            .zip(&mut memory)
+            .map(|(image, scratch)| Head::new(*image, scratch))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut compared = Compared::default();
+        let (mut last_token, mut running) = (None, None);
+        // Frames were dropped since the last status: a token that comes next may be in use already.
+        let mut dropped = false;
+        for sent in &self.sent {
+            match sent {
+                Sent::Dropped => (dropped, running) = (true, None),
+                Sent::Status { token, was_reset, image } => {
+                    if last_token != Some(*token) || *was_reset {
+                        running = None;
+                        if !dropped {
+                            let which = images.iter().position(|known| known.crc() == *image);
+                            let which = which.with_context(|| format!("the board runs an unknown image, {image:#x}"))?;
+                            heads[which].reset();
+                            running = Some(which);
+                        }
+                    }
+                    (last_token, dropped) = (Some(*token), false);
+                }
+                Sent::Action { of, bits: given } => {
+                    compared.actions += 1;
+                    let Some(which) = running else {
+                        compared.unknown += 1;
+                        continue;
+                    };
+                    let observation = self.observations.get(of);
+                    let expected = observation.map(|values| heads[which].step(values).map(bits)).transpose()?;
+                    compared.foreign += usize::from(expected.as_ref() != Some(given));
+                }
+            }
         }
-        anew += 1;
-        let found = (current..heads.len()).find_map(|which| {
-            let head = heads.get_mut(which)?;
-            head.reset();
-            let same = head.step(observation).is_ok_and(|action| bits(action) == reported.bits);
-            same.then_some(which)
-        });
-        match found {
-            Some(which) => current = which,
-            None => foreign += 1,
-        }
+        Ok(compared)
     }
-    Ok((foreign, anew))
 }

@@ -41,6 +41,13 @@ pub struct Tally {
     pub corrupted: u32,
 }
 
+/// A message of the board.
+pub(super) struct Heard {
+    pub(super) event: Event,
+    /// Frames before it that the board dropped, because its port had no room: the host reads too slowly.
+    pub(super) dropped: u32,
+}
+
 /// A line with faults. Both its ends are in this process: [`Line::host_end`] is the host's port; the board's end is the
 /// port that the line was created with.
 #[derive(Clone)]
@@ -50,7 +57,9 @@ struct Wires {
     board: Box<dyn Port>,
     /// Frames from the board, before any fault.
     tap: Receiver<{ frame::bytes(frame::MAX_PAYLOAD) }>,
-    heard: VecDeque<Event>,
+    heard: VecDeque<Heard>,
+    /// Sequence number of the board's next frame.
+    next: u32,
     /// The board's time in µs, summed over its resets. It is the time of the line, as a busy machine stops QEMU now and
     /// then.
     now: u64,
@@ -153,10 +162,15 @@ impl Wires {
             // Accept all frames: after a reset the board counts from 0.
             self.tap.reopen();
             let Some(received) = self.tap.push(*byte) else { continue };
-            // After a reset the board's time starts at 0.
-            let passed = received.micros.checked_sub(self.micros).unwrap_or(received.micros);
+            // After a reset the board's time and numbers start at 0.
+            let (passed, dropped) = match received.micros.checked_sub(self.micros) {
+                Some(passed) => (passed, received.sequence.wrapping_sub(self.next)),
+                None => (received.micros, received.sequence),
+            };
             (self.now, self.micros) = (self.now + u64::from(passed), received.micros);
-            self.heard.extend(Event::of(&received.message, received.micros));
+            self.next = received.sequence.wrapping_add(1);
+            let event = Event::of(&received.message, received.micros);
+            self.heard.extend(event.map(|event| Heard { event, dropped }));
         }
         self.up.take(bytes, self.now, &self.noise, self.cut, &mut self.random);
         Ok(())
@@ -170,6 +184,7 @@ impl Line {
             board,
             tap: Receiver::new(),
             heard: VecDeque::new(),
+            next: 0,
             now: 0,
             micros: 0,
             down: Wire::default(),
@@ -212,7 +227,7 @@ impl Line {
     }
 
     /// Returns the board's messages since the last call, before any fault.
-    pub fn heard(&self) -> VecDeque<Event> {
+    pub(super) fn heard(&self) -> VecDeque<Heard> {
         mem::take(&mut self.wires().heard)
     }
 

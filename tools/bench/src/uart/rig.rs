@@ -1,6 +1,5 @@
 //! The arm, the controller and the host.
 
-use std::collections::HashMap;
 use std::path::Path;
 use std::time::Instant;
 
@@ -18,8 +17,8 @@ use actq_ur3::task::{EPISODE_STEPS, Outcome};
 use anyhow::{Context as _, Result, ensure};
 
 use super::arm::{Arm, TICKS};
-use super::bits::HeadAction;
-use super::line::Line;
+use super::bits::{Log, Sent};
+use super::line::{Heard, Line};
 use crate::bits;
 use crate::controller::{Controller, HANG_TIMEOUT};
 
@@ -92,8 +91,9 @@ pub struct Rig {
     /// The host's last reading if it changed, and the ticks of the previous one.
     read: Option<Status>,
     read_ticks: u32,
-    reported: Vec<HeadAction>,
-    shown: HashMap<u32, Vec<f32>>,
+    log: Log,
+    /// Number of the observation that the last action answers.
+    answered: Option<u32>,
     /// The time at which the last observation was sent.
     sent: u64,
     /// `true` if this machine has delayed the host since the episode began: a missed deadline then tells nothing about
@@ -112,11 +112,16 @@ impl Rig {
         let clock = line.clone();
         connection.set_clock(Box::new(move || clock.now() as u32));
         let mut client = Client::new(connection, HANG_TIMEOUT);
-        let status = client.status()?;
+        client.status()?;
         set_up(&mut client)?;
-        line.heard();
+        let heard = line.heard();
+        let status = heard.iter().find_map(|heard| match heard.event {
+            Event::Status(status) => Some(status),
+            _ => None,
+        });
+        let status = status.context("the board has sent no status")?;
         let axes: [Axis; ACT_DIM] = actq_firmware_demo::image::axes(Some(image), &[], TICK_HZ);
-        Ok(Self {
+        let mut rig = Self {
             controller,
             line,
             client,
@@ -129,11 +134,13 @@ impl Rig {
             applied: 0,
             read: None,
             read_ticks: 0,
-            reported: Vec::new(),
-            shown: HashMap::new(),
+            log: Log::default(),
+            answered: None,
             sent: 0,
             disturbed: false,
-        })
+        };
+        heard.into_iter().for_each(|heard| rig.hear(heard));
+        Ok(rig)
     }
 
     /// Returns the line, to inject faults.
@@ -141,9 +148,9 @@ impl Rig {
         &self.line
     }
 
-    /// Returns the actions of the board's head since the start, and the observations by their numbers.
-    pub const fn log(&self) -> (&Vec<HeadAction>, &HashMap<u32, Vec<f32>>) {
-        (&self.reported, &self.shown)
+    /// Returns what the board sent and was sent since the start.
+    pub const fn log(&self) -> &Log {
+        &self.log
     }
 
     /// Begins an episode: arms the controller anew. The arm stands still until then. With `exact`, its time is known to
@@ -183,14 +190,13 @@ impl Rig {
     fn exchange(&mut self) -> Result<()> {
         let observation = self.arm.task.observe();
         let number = self.client.observe(&observation)?;
-        self.shown.insert(number, observation.to_vec());
+        self.log.observations.insert(number, observation.to_vec());
         let (begun, from) = (Instant::now(), self.time);
         self.disturbed |= from - self.sent > DELAYED_HOST;
         self.sent = from;
         loop {
             let passed = self.time - from;
-            let answered = self.reported.last().is_some_and(|reported| reported.of == number);
-            if passed >= TICKS.into() && (answered || passed >= ANSWER_TIMEOUT) {
+            if passed >= TICKS.into() && (self.answered == Some(number) || passed >= ANSWER_TIMEOUT) {
                 break;
             }
             self.listen()?;
@@ -209,26 +215,34 @@ impl Rig {
                 self.read = Some(status);
             }
         }
-        for event in self.line.heard() {
-            match event {
-                Event::Status(status) => self.reported(status),
-                Event::Action { of, applied, values, .. } => {
-                    self.reported.push(HeadAction { of, bits: bits(&values) });
-                    if applied && let Ok(values) = values.try_into() {
-                        self.arm.target = values;
-                        self.applied += 1;
-                    }
-                }
-                _ => {}
-            }
-        }
+        self.line.heard().into_iter().for_each(|heard| self.hear(heard));
         Ok(())
+    }
+
+    /// Handles a message as sent by the board.
+    fn hear(&mut self, Heard { event, dropped }: Heard) {
+        if dropped > 0 {
+            self.log.sent.push(Sent::Dropped);
+        }
+        match event {
+            Event::Status(status) => self.reported(status),
+            Event::Action { of, applied, values, .. } => {
+                self.log.sent.push(Sent::Action { of, bits: bits(&values) });
+                self.answered = Some(of);
+                if applied && let Ok(values) = values.try_into() {
+                    self.arm.target = values;
+                    self.applied += 1;
+                }
+            }
+            _ => {}
+        }
     }
 
     /// Handles a status as sent by the board.
     fn reported(&mut self, status: Status) {
         let before = std::mem::replace(&mut self.status, status);
         let was_reset = status.ticks < before.ticks;
+        self.log.sent.push(Sent::Status { token: status.token, was_reset, image: status.image });
         let passed = if was_reset { status.ticks } else { status.ticks - before.ticks };
         if was_reset {
             self.resets += 1;

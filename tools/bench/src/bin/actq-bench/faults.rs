@@ -8,7 +8,7 @@ use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq_bench::uart::{Disturbance, Rig, Run, count_foreign};
+use actq_bench::uart::{Compared, Disturbance, Rig, Run};
 use actq_bench::{Target, firmware, ur3};
 use actq_cli::report::table::table;
 use actq_kernels::Image;
@@ -20,10 +20,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 const FIRST_SEED: u64 = 3000;
 /// Seed of the faults.
 const SEED: u64 = 1;
-/// Attempts at an episode that fails, each undisturbed by this machine, before it counts as failed; and attempts of any
-/// kind, after which it is not judged.
+/// Failed attempts at an episode before it counts as failed, each undisturbed by this machine; and disturbed attempts
+/// before it is not judged.
 const ATTEMPTS: usize = 5;
-const MAX_ATTEMPTS: usize = 12;
+const DISTURBED_ATTEMPTS: usize = 3;
 
 /// Runs all faults, with the UR3 policy in 3 bits, and an update to another image of it.
 pub(crate) fn all() -> Result<()> {
@@ -70,9 +70,11 @@ pub(crate) fn run(target: Target, image: &Path, disturbances: &[Disturbance<'_>]
             busy.join(", ")
         );
     }
-    let (reported, shown) = rig.log();
-    let (foreign, _) = count_foreign(reported, shown, images)?;
-    println!("{} actions of the controller, {foreign} of them differ in bits from the host executor's", reported.len());
+    let Compared { actions, foreign, unknown } = rig.log().compare(images)?;
+    println!("{actions} actions of the controller, {foreign} of them differ in bits from the host executor's");
+    if unknown > 0 {
+        println!("not compared: {unknown}, after frames that the controller dropped because the host read too slowly");
+    }
     ensure!(foreign == 0, "the controller sent {foreign} actions that its head does not compute");
     ensure!(failures.is_empty(), "{}", failures.join("\n"));
     Ok(())
@@ -88,16 +90,15 @@ enum Verdict {
 
 /// The last attempt at an episode, and the verdict of all.
 fn judged(rig: &mut Rig, seed: u64, disturbance: &Disturbance<'_>) -> Result<(Run, Verdict)> {
-    let (mut attempts, mut undisturbed) = (0, 0);
+    let (mut undisturbed, mut disturbed) = (0, 0);
     loop {
         let run = episode(rig, seed, disturbance)?;
         let Err(why) = run.check(disturbance) else { return Ok((run, Verdict::Passed)) };
-        attempts += 1;
-        undisturbed += usize::from(!run.disturbed);
+        *(if run.disturbed { &mut disturbed } else { &mut undisturbed }) += 1;
         if undisturbed == ATTEMPTS {
             return Ok((run, Verdict::Failed(why)));
         }
-        if attempts == MAX_ATTEMPTS {
+        if disturbed == DISTURBED_ATTEMPTS {
             return Ok((run, Verdict::Disturbed));
         }
         let busy = if run.disturbed { ", while this machine delayed it" } else { "" };
