@@ -1,12 +1,10 @@
 //! The shipped policy: closed-loop success, and the recorded outputs that a quantizer relies on.
 
-use std::fs::File;
-
+use actq::data::arrays;
+use actq::import::values::Values;
 use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::task::run_episode;
 use actq_ur3::{OBS_DIM, flow_folder, policy_folder};
-use ndarray::{Array1, Array3, Axis};
-use ndarray_npy::NpzReader;
 
 #[test]
 fn shipped_policies_solve_the_task() {
@@ -26,18 +24,16 @@ fn shipped_policies_solve_the_task() {
 fn recorded_outputs_match_the_policy() {
     let mut policy = PolicyF32::load(policy_folder()).unwrap();
     for name in ["calib.npz", "heldout.npz"] {
-        let mut npz = NpzReader::new(File::open(policy_folder().join(name)).unwrap()).unwrap();
-        let obs: Array3<f32> = npz.by_name("obs").unwrap();
-        let action: Array3<f32> = npz.by_name("action").unwrap();
-        let length: Array1<i64> = npz.by_name("length").unwrap();
-        let seed: Array1<i64> = npz.by_name("seed").unwrap();
-        assert_eq!((length.len(), seed.len()), (obs.len_of(Axis(0)), obs.len_of(Axis(0))));
-        assert!(length.iter().all(|&length| length == obs.len_of(Axis(1)) as i64));
+        let recording = arrays(&policy_folder().join(name)).unwrap();
+        let [episodes, steps, OBS_DIM] = recording["obs"].shape[..] else { panic!("{:?}", recording["obs"].shape) };
+        let Values::I64(length) = &recording["length"].values else { panic!("length must be int64") };
+        assert_eq!((length.len(), &recording["seed"].shape[..]), (episodes, &[episodes][..]));
+        assert!(length.iter().all(|&length| length == steps as i64));
 
-        let steps = obs.rows().into_iter().zip(action.rows());
-        for (obs, action) in steps {
-            assert_eq!(obs.len(), OBS_DIM);
-            let raw = policy.raw(&obs.to_vec());
+        let [obs, action] = ["obs", "action"].map(|name| recording[name].values.to_f32().unwrap());
+        let width = action.len() / (episodes * steps);
+        for (obs, action) in obs.chunks_exact(OBS_DIM).zip(action.chunks_exact(width)) {
+            let raw = policy.raw(obs);
             assert_eq!(raw.len(), action.len());
             // Tolerance for another order of summation only.
             let worst = raw.iter().zip(action).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);

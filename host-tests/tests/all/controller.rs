@@ -11,6 +11,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 use std::{fs, thread};
 
+use actq::data::arrays;
 use actq::runtime::ImageBuffer;
 use actq_bench::bits;
 use actq_bench::command::{actq, failed, run, succeeded};
@@ -27,8 +28,7 @@ use actq_link::frame;
 use actq_link::report::{BUILT_IN, Timing};
 use anyhow::{Context, Result};
 use embedded_storage::nor_flash::ReadNorFlash as _;
-use ndarray::{Array2, Array3};
-use ndarray_npy::NpzReader;
+use ndarray::Array3;
 use tempfile::TempDir;
 
 use crate::folder::write_observations;
@@ -268,15 +268,15 @@ fn the_command_watches_streams_and_updates() -> Result<()> {
 
 /// Requires that every action has the same bits as the image on this host.
 fn check_log(log: &str, image: &[u8]) -> Result<()> {
-    let mut npz = NpzReader::new(fs::File::open(log)?)?;
-    let (obs, actions): (Array2<f32>, Array2<f32>) = (npz.by_name("obs")?, npz.by_name("action")?);
-    assert_eq!((obs.dim(), actions.dim()), ((40, OBS), (40, ACT)));
+    let log = arrays(Path::new(log))?;
+    assert_eq!((&log["obs"].shape[..], &log["action"].shape[..]), (&[40, OBS][..], &[40, ACT][..]));
+    let [obs, actions] = ["obs", "action"].map(|name| log[name].values.to_f32().expect("numbers"));
     let buffer = ImageBuffer::new(image);
     actq::runtime::with_head::<_, anyhow::Error>(buffer.image(Path::new("image"))?, |head| {
         let mut answered = 0;
-        for (obs, action) in obs.outer_iter().zip(actions.outer_iter()).filter(|(_, action)| !action[0].is_nan()) {
-            let expected = head.step(&obs.to_vec())?;
-            assert_eq!(bits(&action.to_vec()), bits(expected));
+        let steps = obs.chunks_exact(OBS).zip(actions.chunks_exact(ACT));
+        for (obs, action) in steps.filter(|(_, action)| !action[0].is_nan()) {
+            assert_eq!(bits(action), bits(head.step(obs)?));
             answered += 1;
         }
         assert_eq!(answered, 40);

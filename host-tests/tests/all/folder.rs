@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
+use actq::data::NpzWriter;
 use anyhow::Result;
 use ndarray::{Array, Dimension};
-use ndarray_npy::NpzWriter;
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
 use serde_json::Value;
@@ -38,7 +38,7 @@ pub(crate) fn write_tensors<N: AsRef<str>>(folder: &Path, tensors: &[(N, Tensor)
 /// Writes a recording of observations only.
 pub(crate) fn write_observations<D: Dimension>(path: &Path, observations: &Array<f32, D>) -> Result<()> {
     let mut npz = NpzWriter::new(File::create(path)?);
-    npz.add_array("obs", observations)?;
+    npz.array("obs", observations.shape(), observations.iter().copied())?;
     npz.finish()?;
     Ok(())
 }

@@ -23,4 +23,4 @@ pub use npy::npy_header;
 pub use origin::{CRC32, driven_by};
 pub use range::{Outside, Range, runs};
 pub use recording::{Recording, Recordings, files_of};
-pub use save::{Element, NpzWriter};
+pub use save::{Element, NpzWriter, write_npy};

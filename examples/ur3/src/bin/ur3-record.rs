@@ -2,16 +2,16 @@
 //! for quantization.
 
 use std::fs::{self, File};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
+use actq::data::NpzWriter;
 use actq_ur3::policy_f32::PolicyF32;
 use actq_ur3::random::Random;
 use actq_ur3::task::{EPISODE_STEPS, Task};
 use actq_ur3::{ACT_DIM, CHUNK, OBS_DIM};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Parser;
-use ndarray::{Array1, Array2, Array3};
-use ndarray_npy::NpzWriter;
 
 /// Episodes of the policy in the shipped calib.npz. Seeds count from 0.
 const SHIPPED_EPISODES: u32 = 12;
@@ -91,9 +91,9 @@ fn record_expert(seeds: std::ops::Range<u64>, path: &Path) -> Result<()> {
         }
     }
     let steps = obs.len() / OBS_DIM;
-    let mut npz = create(path, NpzWriter::new)?;
-    npz.add_array("obs", &Array2::from_shape_vec((steps, OBS_DIM), obs)?)?;
-    npz.add_array("action", &Array3::from_shape_vec((steps, CHUNK, ACT_DIM), action)?)?;
+    let mut npz = create(path)?;
+    npz.array("obs", &[steps, OBS_DIM], obs)?;
+    npz.array("action", &[steps, CHUNK, ACT_DIM], action)?;
     npz.finish()?;
     println!("{}: {steps} steps", path.display());
     Ok(())
@@ -117,21 +117,21 @@ fn record_policy(policy: &mut PolicyF32, seeds: std::ops::Range<u64>, path: &Pat
             task.step(&policy.act(&observation));
         }
     }
-    let seeds: Array1<i64> = seeds.map(|seed| seed as i64).collect();
-    let episodes = seeds.len();
-    let mut npz = create(path, NpzWriter::new_compressed)?;
-    npz.add_array("obs", &Array3::from_shape_vec((episodes, EPISODE_STEPS, OBS_DIM), obs)?)?;
+    let episodes = seeds.clone().count();
+    let mut npz = create(path)?;
+    npz.array("obs", &[episodes, EPISODE_STEPS, OBS_DIM], obs)?;
     if !policy.draws() {
         let outputs = action.len() / (episodes * EPISODE_STEPS);
-        npz.add_array("action", &Array3::from_shape_vec((episodes, EPISODE_STEPS, outputs), action)?)?;
+        npz.array("action", &[episodes, EPISODE_STEPS, outputs], action)?;
     }
-    npz.add_array("length", &Array1::from_elem(episodes, EPISODE_STEPS as i64))?;
-    npz.add_array("seed", &seeds)?;
+    npz.array("length", &[episodes], vec![EPISODE_STEPS as i64; episodes])?;
+    npz.array("seed", &[episodes], seeds.map(|seed| seed as i64))?;
     npz.finish()?;
     println!("{}: {episodes} episodes", path.display());
     Ok(())
 }
 
-fn create(path: &Path, writer: fn(File) -> NpzWriter<File>) -> Result<NpzWriter<File>> {
-    Ok(writer(File::create(path).with_context(|| format!("create {}", path.display()))?))
+fn create(path: &Path) -> Result<NpzWriter<BufWriter<File>>> {
+    let file = File::create(path).with_context(|| format!("create {}", path.display()))?;
+    Ok(NpzWriter::new(BufWriter::new(file)))
 }

@@ -5,13 +5,13 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use actq::data::{self, NpzWriter};
 use actq::graph::Evaluator;
 use actq::policy::Policy;
 use actq_bench::command::{actq, run, succeeded};
 use actq_bench::golden::Random;
 use anyhow::{Context, Result, ensure};
-use ndarray::{Array1, Array3};
-use ndarray_npy::{NpzWriter, WriteNpyExt as _};
+use ndarray::Array3;
 use safetensors::Dtype;
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -147,11 +147,11 @@ pub(super) fn write_recording(
     length: [i64; EPISODES],
 ) -> Result<()> {
     let mut npz = NpzWriter::new(File::create(path)?);
-    npz.add_array("obs", obs)?;
+    npz.array("obs", obs.shape(), obs.iter().copied())?;
     if let Some(action) = action {
-        npz.add_array("action", action)?;
+        npz.array("action", action.shape(), action.iter().copied())?;
     }
-    npz.add_array("length", &Array1::from(length.to_vec()))?;
+    npz.array("length", &[EPISODES], length)?;
     npz.finish()?;
     Ok(())
 }
@@ -190,7 +190,7 @@ pub(super) fn cut(path: &Path, len: usize) -> Result<()> {
 
 /// Writes a recording of observations only.
 pub(super) fn write_npy(path: &Path, obs: &Array3<f32>) -> Result<()> {
-    Ok(obs.write_npy(File::create(path)?)?)
+    Ok(data::write_npy(&mut File::create(path)?, obs.shape(), obs.iter().copied())?)
 }
 
 /// Lines on standard error, all of them notes, except the progress lines of a slow run.

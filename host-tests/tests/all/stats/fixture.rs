@@ -5,13 +5,13 @@ use std::fs::{self, File};
 use std::path::PathBuf;
 use std::process::Output;
 
+use actq::data::NpzWriter;
 use actq::graph::Evaluator;
 use actq::policy::Policy;
 use actq_bench::command::{actq, research, run, succeeded};
 use actq_bench::golden::Random;
 use anyhow::{Context, Result};
 use ndarray::Array3;
-use ndarray_npy::NpzWriter;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -55,8 +55,8 @@ impl Fixture {
             let actions = obs.rows().into_iter().flat_map(|row| evaluator.step(&row.to_vec(), &mut |_, _| {}));
             let action = Array3::from_shape_vec((2, 150, ACT), actions.collect())?;
             let mut npz = NpzWriter::new(File::create(dir.join(name))?);
-            npz.add_array("obs", &obs)?;
-            npz.add_array("action", &action)?;
+            npz.array("obs", obs.shape(), obs.iter().copied())?;
+            npz.array("action", action.shape(), action.iter().copied())?;
             npz.finish()?;
         }
         Ok(fixture)

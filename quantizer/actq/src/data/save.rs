@@ -34,7 +34,21 @@ macro_rules! elements {
     };
 }
 
-elements!(f32: "<f4", f64: "<f8", i64: "<i8", u8: "|u1");
+elements!(f32: "<f4", f64: "<f8", i32: "<i4", i64: "<i8", u8: "|u1");
+
+/// Writes an array in numpy's format .npy, its values in row-major order.
+///
+/// # Errors
+///
+/// Errors of `to`.
+pub fn write_npy<T: Element>(
+    to: &mut impl Write,
+    shape: &[usize],
+    values: impl IntoIterator<Item = T>,
+) -> io::Result<()> {
+    to.write_all(&npy_header(T::DESCR, shape))?;
+    values.into_iter().try_for_each(|value| value.write(to))
+}
 
 /// A writer of an .npz archive, uncompressed.
 pub struct NpzWriter<W: Write + Seek>(ZipWriter<W>);
@@ -58,8 +72,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     ) -> Result<()> {
         // The archive sums every write by itself: not element by element.
         let mut member = BufWriter::new(self.begin(name)?);
-        member.write_all(&npy_header(T::DESCR, shape))?;
-        values.into_iter().try_for_each(|value| value.write(&mut member))?;
+        write_npy(&mut member, shape, values)?;
         Ok(member.flush()?)
     }
 

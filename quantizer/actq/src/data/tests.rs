@@ -2,7 +2,6 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use ndarray::{Array1, Array2, Array3, ArrayD, IxDyn, ShapeBuilder as _, s};
-use ndarray_npy::{NpzWriter, WriteNpyExt as _};
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
 use tempfile::TempDir;
@@ -47,21 +46,21 @@ fn write(dir: &TempDir, name: &str, arrays: &[Named]) -> PathBuf {
         let mut npz = NpzWriter::new(File::create(&path).expect("a file"));
         for (name, array) in arrays {
             match array {
-                Array::F32(a) => npz.add_array(*name, a),
-                Array::F64(a) => npz.add_array(*name, a),
-                Array::I32(a) => npz.add_array(*name, a),
-                Array::I64(a) => npz.add_array(*name, a),
+                Array::F32(a) => npz.array(name, a.shape(), a.iter().copied()),
+                Array::F64(a) => npz.array(name, a.shape(), a.iter().copied()),
+                Array::I32(a) => npz.array(name, a.shape(), a.iter().copied()),
+                Array::I64(a) => npz.array(name, a.shape(), a.iter().copied()),
             }
             .expect("an array");
         }
         npz.finish().expect("an archive");
     } else if name.ends_with(".npy") {
-        let file = File::create(&path).expect("a file");
+        let mut file = File::create(&path).expect("a file");
         match &arrays[0].1 {
-            Array::F32(a) => a.write_npy(file),
-            Array::F64(a) => a.write_npy(file),
-            Array::I32(a) => a.write_npy(file),
-            Array::I64(a) => a.write_npy(file),
+            Array::F32(a) => write_npy(&mut file, a.shape(), a.iter().copied()),
+            Array::F64(a) => write_npy(&mut file, a.shape(), a.iter().copied()),
+            Array::I32(a) => write_npy(&mut file, a.shape(), a.iter().copied()),
+            Array::I64(a) => write_npy(&mut file, a.shape(), a.iter().copied()),
         }
         .expect("an array");
     } else {

@@ -5,14 +5,14 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use actq::data::{Element, write_npy};
 use actq::import::Importer as _;
 use actq::policy::Policy;
 use actq_bench::command::{actq, binary, failed, succeeded};
 use actq_bench::skipped;
 use actq_onnx::{Onnx, proto};
 use anyhow::{Result, ensure};
-use ndarray::{Array2, Array3};
-use ndarray_npy::WriteNpyExt as _;
+use ndarray::{Array, Array2, Array3, Dimension};
 use tempfile::TempDir;
 
 use super::file::{File, tensor};
@@ -21,6 +21,10 @@ const OBS: usize = 6;
 
 fn text(path: &Path) -> &str {
     path.to_str().expect("a name")
+}
+
+fn write<D: Dimension>(path: &Path, array: &Array<impl Element, D>) -> Result<()> {
+    Ok(write_npy(&mut fs::File::create(path)?, array.shape(), array.iter().copied())?)
 }
 
 /// A folder with `model.onnx` and `obs.npy`.
@@ -32,7 +36,7 @@ fn folder() -> Result<TempDir> {
     file.output("actions", &[1, 2]);
     fs::write(dir.path().join("model.onnx"), file.bytes())?;
     let obs = Array2::from_shape_fn((300, OBS), |(i, k)| ((7 * i + 3 * k) as f64 / 11.0).sin());
-    obs.write_npy(fs::File::create(dir.path().join("obs.npy"))?)?;
+    write(&dir.path().join("obs.npy"), &obs)?;
     Ok(dir)
 }
 
@@ -57,7 +61,7 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     succeeded(&import(&["--force"])?)?;
     // Frames with a batch axis look like episodes.
     let (rows, out) = (dir.path().join("rows.npy"), dir.path().join("rows"));
-    Array3::from_shape_fn((9, 1, OBS), |(i, _, k)| (i * k) as f32).write_npy(fs::File::create(&rows)?)?;
+    write(&rows, &Array3::from_shape_fn((9, 1, OBS), |(i, _, k)| (i * k) as f32))?;
     let noted = actq(&["import", text(&model), "--out", text(&out), "--calib", text(&rows)]).output()?;
     let stderr = String::from_utf8_lossy(&noted.stderr);
     ensure!(

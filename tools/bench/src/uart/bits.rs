@@ -68,7 +68,8 @@ impl Log {
                         running = None;
                         if !dropped {
                             let which = images.iter().position(|known| known.crc() == *image);
-                            let which = which.with_context(|| format!("the board runs an unknown image, {image:#x}"))?;
+                            let which =
+                                which.with_context(|| format!("the board runs an unknown image, {image:#x}"))?;
                             heads[which].reset();
                             running = Some(which);
                         }
