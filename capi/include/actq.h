@@ -147,7 +147,7 @@ typedef int32_t actq_status;
  * memory, and must not be moved or copied.
  */
 typedef struct actq_head {
-  size_t opaque[28];
+  size_t opaque[40];
 } actq_head;
 
 /**

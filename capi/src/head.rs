@@ -15,7 +15,7 @@ const MAGIC: u32 = u32::from_le_bytes(*b"ACTH");
 #[derive(Debug)]
 #[repr(C)]
 pub struct ActqHead {
-    opaque: [usize; 28],
+    opaque: [usize; 40],
 }
 
 /// What an initialized [`ActqHead`] holds.
@@ -59,6 +59,19 @@ impl Running {
         // SAFETY: as the caller promises.
         unsafe { slice(observation, len) }
     }
+}
+
+/// Writes an action.
+///
+/// # Safety
+///
+/// As [`slice_mut`].
+unsafe fn write(to: *mut f32, len: usize, action: &[f32]) -> Result<(), Code> {
+    // SAFETY: as the caller promises.
+    let to = unsafe { slice_mut(to, len) }?;
+    // The lengths are equal, which `copy_from_slice` would check again, with a panic.
+    to.iter_mut().zip(action).for_each(|(to, value)| *to = *value);
+    Ok(())
 }
 
 /// Borrows an initialized head, and runs `run` with it.
@@ -153,7 +166,7 @@ pub unsafe extern "C" fn actq_step(
             }
             running.check_action(action, action_len)?;
             let computed = running.head.step(running.observation(observation, observation_len)?)?;
-            slice_mut(action, action_len)?.copy_from_slice(computed);
+            write(action, action_len, computed)?;
             Ok(())
         })
     }
@@ -195,7 +208,7 @@ pub unsafe extern "C" fn actq_poll(
             match running.head.poll(budget) {
                 Ok(Poll::Pending) => Err(Code::Pending),
                 Ok(Poll::Ready(computed)) => {
-                    slice_mut(action, action_len)?.copy_from_slice(computed);
+                    write(action, action_len, computed)?;
                     running.polling = false;
                     Ok(())
                 }
@@ -228,7 +241,7 @@ pub unsafe extern "C" fn actq_play(head: *mut ActqHead, action: *mut f32, action
     unsafe {
         with(head, |running| {
             running.check_action(action, action_len)?;
-            slice_mut(action, action_len)?.copy_from_slice(running.head.play()?);
+            write(action, action_len, running.head.play()?)?;
             Ok(())
         })
     }

@@ -96,6 +96,14 @@ pub(crate) enum Command {
     ///
     /// Example: actq constants walker.actq --out walker.h
     Constants(ConstantsArgs),
+    /// Write an image as source code of C, to be linked into a firmware
+    ///
+    /// OUT gets NAME.c with the image as a constant array, NAME.h with its lengths, names, scratch memory and digests
+    /// as macros, and manifest.json with the SHA-256 of each file. docs/C.md tells how to build and run them.
+    ///
+    /// Example: actq export-c walker.actq --golden heldout.npz --out firmware/policy
+    #[command(name = "export-c")]
+    ExportC(ExportCArgs),
     /// Compare an image of a deploy bundle with a run of the deploy code
     ///
     /// Runs the image on the raw inputs of a reference and compares its targets, tick by tick: the error is that of the
@@ -371,6 +379,25 @@ pub(crate) struct ConstantsArgs {
     /// A deploy.toml, whose [gains] are added
     #[arg(long, value_name = "FILE")]
     pub(crate) gains: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct ExportCArgs {
+    /// The image
+    pub(crate) image: PathBuf,
+    /// The folder for the files; created if it does not exist
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// What the files and their names begin with
+    #[arg(long, default_value = "policy")]
+    pub(crate) name: String,
+    /// A recording: also write NAME_golden.c, its first observations with the bits of this host's actions, which a
+    /// board must give too
+    #[arg(long, value_name = "FILE")]
+    pub(crate) golden: Option<PathBuf>,
+    /// Observations of the golden run, at most
+    #[arg(long, default_value_t = 100, value_name = "N")]
+    pub(crate) steps: usize,
 }
 
 #[derive(clap::Args)]

@@ -7,6 +7,7 @@ pub(crate) mod constants;
 pub(crate) mod deploy;
 mod drive;
 pub(crate) mod eval;
+pub(crate) mod export_c;
 pub(crate) mod import;
 pub(crate) mod inspect;
 pub(crate) mod link;

@@ -61,6 +61,7 @@ fn run_command(command: &Command) -> Result<()> {
         Command::Eval(args) => eval::run(args),
         Command::Check(args) => commands::check::run(args),
         Command::Constants(args) => commands::constants::run(args),
+        Command::ExportC(args) => commands::export_c::run(args),
         Command::Deploy(args) => commands::deploy::run(args),
         Command::Tune(args) => tune::run(args),
         Command::Sweep { args, methods } => {

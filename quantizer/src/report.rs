@@ -2,6 +2,7 @@
 
 pub mod constants;
 pub mod deployment;
+pub mod export;
 pub mod imported;
 pub mod inspect;
 pub mod learned;

@@ -45,7 +45,7 @@ struct Code {
 
 impl Code {
     fn begin(&mut self, image: &Image<'_>) {
-        let about = format!("Constants of the image {}, made by `actq constants`. Do not edit.", quoted(image.name()));
+        let about = format!("Constants of the image {}, made by actq. Do not edit.", quoted(image.name()));
         match self.language {
             Language::Rust => {
                 let _ = writeln!(self.text, "//! {about}\n");
@@ -184,11 +184,11 @@ fn float(value: f64) -> String {
     format!("{:?}", value as f32)
 }
 
-fn quoted(name: &str) -> String {
+pub(super) fn quoted(name: &str) -> String {
     Value::from(name).to_string()
 }
 
 /// Returns a text that neither ends a comment of C nor begins another.
-fn comment(text: &str) -> String {
+pub(super) fn comment(text: &str) -> String {
     text.replace("*/", "* /").replace("/*", "/ *")
 }

@@ -1,0 +1,48 @@
+//! `actq export-c`
+
+use std::fs;
+use std::path::PathBuf;
+
+use actq::data::{Dataset, Sizes};
+use actq::runtime::{ImageBuffer, with_head};
+use actq_kernels::Image;
+use anyhow::{Context as _, Result, ensure};
+
+use crate::args::ExportCArgs;
+use crate::report::export::{Golden, files};
+use crate::terminal::{print, reserve};
+
+/// Writes an image as source code of C.
+pub(crate) fn run(args: &ExportCArgs) -> Result<()> {
+    let name = &args.name;
+    let is_identifier = name.starts_with(|c: char| c.is_ascii_lowercase())
+        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+    ensure!(is_identifier, "--name {name:?}: use lower-case letters, digits and underscores, a letter first");
+    let buffer = ImageBuffer::read(&args.image)?;
+    let image = buffer.image(&args.image)?;
+    let golden = args.golden.as_ref().map(|recording| replay(image, recording, args.steps)).transpose()?;
+    let bytes = fs::read(&args.image).with_context(|| args.image.display().to_string())?;
+    let files = files(&image, &bytes, name, golden.as_ref());
+
+    fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
+    let paths: Vec<PathBuf> = files.iter().map(|(name, _)| args.out.join(name)).collect();
+    let inputs: Vec<PathBuf> = std::iter::once(args.image.clone()).chain(args.golden.clone()).collect();
+    let outputs = reserve(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>(), &inputs)?;
+    outputs.write(&files.iter().map(|(_, text)| text).collect::<Vec<_>>())?;
+    let list: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+    print(&format!("{}\n", list.join("\n")))
+}
+
+/// Runs the image from a reset on the first `steps` observations of a recording's first episode.
+fn replay(image: Image<'_>, recording: &PathBuf, steps: usize) -> Result<Golden> {
+    let recording = Dataset::load(recording, Sizes::of_image(&image))?;
+    let mut golden = Golden { observations: Vec::new(), actions: Vec::new() };
+    with_head::<_, anyhow::Error>(image, |head| {
+        for observation in recording.episode(0).take(steps) {
+            golden.actions.extend(head.step(&observation)?.iter().map(|value| value.to_bits()));
+            golden.observations.extend(observation);
+        }
+        Ok(())
+    })?;
+    Ok(golden)
+}
