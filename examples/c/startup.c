@@ -6,13 +6,15 @@ extern uint32_t stack_top, data_load, data_start, data_end, bss_start, bss_end;
 int main(void);
 void reset(void);
 static void fault(void);
+/* SysTick's handler, for a program that has one. */
+__attribute__((weak)) void tick(void);
 
 typedef void (*handler)(void);
 
 __attribute__((section(".vectors"), used)) static const struct {
     uint32_t *stack;
     handler handlers[15];
-} vectors = {&stack_top, {reset, fault, fault, fault, fault, fault, 0, 0, 0, 0, fault, fault, 0, fault, fault}};
+} vectors = {&stack_top, {reset, fault, fault, fault, fault, fault, 0, 0, 0, 0, fault, fault, 0, fault, tick}};
 
 void reset(void) {
 #ifdef __ARM_FP
@@ -29,6 +31,8 @@ void reset(void) {
     }
     end(main());
 }
+
+void tick(void) {}
 
 static void fault(void) {
     print("an exception stopped the program\n");

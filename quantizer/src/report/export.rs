@@ -40,7 +40,7 @@ fn header(image: &Image<'_>, bytes: &[u8], name: &str, golden: Option<&Golden>) 
         "/* SHA-256 of the image, and of the policy it was made from. */\n#define {capitals}_SHA256 \"{}\"\n\
          #define {capitals}_SOURCE_SHA256 \"{}\"\n\n#include <stdint.h>\n\n#ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
          /* The image: pass it and {capitals}_IMAGE_BYTES to actq_image_open. */\nextern const uint32_t {name}_image[{words}];\n",
-        hex(&Sha256::digest(bytes)),
+        sha256(bytes),
         hex(&image.digest())
     );
     if let Some(golden) = golden {
@@ -94,7 +94,7 @@ fn array(of: &str, name: &str, values: impl Iterator<Item = String>) -> String {
 
 fn manifest(image: &Image<'_>, bytes: &[u8], files: &Files) -> Value {
     let digests: serde_json::Map<_, _> =
-        files.iter().map(|(name, text)| (name.clone(), hex(&Sha256::digest(text)).into())).collect();
+        files.iter().map(|(name, text)| (name.clone(), sha256(text.as_bytes()).into())).collect();
     json!({
         "schema": 1,
         "actq": env!("CARGO_PKG_VERSION"),
@@ -102,13 +102,18 @@ fn manifest(image: &Image<'_>, bytes: &[u8], files: &Files) -> Value {
         "image": {
             "bytes": bytes.len(),
             "crc32": image.crc(),
-            "sha256": hex(&Sha256::digest(bytes)),
+            "sha256": sha256(bytes),
             "source_sha256": hex(&image.digest()),
             "scratch_bytes": 4 * image.scratch_words(),
         },
         "sha256": digests,
         "not_measured": ["time, stack and power on a real board"],
     })
+}
+
+/// Returns the SHA-256 of bytes, as hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
 }
 
 fn hex(bytes: &[u8]) -> String {

@@ -20,9 +20,13 @@ use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 use crate::ur3;
 
 pub(crate) fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<()> {
+    cargo(what, &[&["build", "--quiet"], arguments].concat(), environment)
+}
+
+/// Runs cargo, to build something.
+pub(crate) fn cargo(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<()> {
     let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(root())
-        .args(["build", "--quiet"])
         .args(arguments)
         .envs(environment.iter().copied())
         .output()

@@ -3,6 +3,7 @@
 //! closed loops.
 #![forbid(unsafe_code)]
 
+pub mod capi;
 pub mod closed_loop;
 pub mod command;
 pub mod controller;

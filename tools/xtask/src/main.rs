@@ -1,6 +1,6 @@
 //! The commands for users and CI: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`,
 //! `cargo xtask fit`, `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`,
-//! `cargo xtask doctor`.
+//! `cargo xtask capi`, `cargo xtask doctor`.
 //!
 //! This crate has few dependencies, so that it builds fast and prints soon. The binaries of `actq-bench` and
 //! `actq-research` measure.
@@ -30,6 +30,7 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   stack    Compute the maximum stack of the controller from the calls in its ELF file: --board NAME, or --elf FILE
   fit      Measure the cost model's rates again (after every change of the kernels)
   verify   Format, lints, tests, a smoke run in QEMU; with --all everything that CI checks
+  capi     Package the C interface: --target CORE --out DIR
   doctor   Check and install the other commands' requirements: Rust targets and QEMU
 
 demo, verify, bench, budgets, compare, faults, fit, firmware and stack show their options with --help.";
@@ -54,6 +55,10 @@ fn main() -> ExitCode {
             }
         },
         ["compare", ..] => measuring("actq-research", &words),
+        ["capi", ..] => Target::ALL
+            .iter()
+            .try_for_each(|target| setup::rust_target(target.triple()))
+            .and_then(|()| measuring("actq-bench", &words)),
         ["stack", ..] => firmware::boards()
             .try_for_each(|(target, _)| setup::rust_target(target.triple()))
             .and_then(|()| measuring("actq-bench", &words)),

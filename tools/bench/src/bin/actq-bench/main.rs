@@ -14,9 +14,11 @@ mod kernels;
 mod stack;
 mod trials;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use actq_bench::capi::{CORES, Core};
+use anyhow::{Context as _, Result};
 use clap::{Parser, Subcommand};
 
 /// Measure the runtime on a Cortex-M4 in QEMU
@@ -74,6 +76,25 @@ enum Command {
     },
     /// Measure the cost model's rates again (after every change of the kernels)
     Fit,
+    /// Package the C interface: header, static library, files for build systems, licences and a manifest
+    Capi {
+        /// The core: cortex-m0plus, cortex-m3, cortex-m4, cortex-m4f, cortex-m7, cortex-m33, rv32imac or host
+        #[arg(long, value_name = "CORE")]
+        target: String,
+        /// The folder for the package; new, or empty
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+}
+
+/// Packages the C interface for a core.
+fn capi(core: &str, out: &Path) -> Result<()> {
+    let names: Vec<_> = CORES.iter().map(|core| core.name).collect();
+    let known = Core::of(core);
+    let known = known.with_context(|| format!("--target {core}: use one of {}", names.join(", ")))?;
+    known.package(out)?;
+    println!("{}: the C interface for {core}; build with {}", out.display(), known.flags.join(" "));
+    Ok(())
 }
 
 fn main() -> ExitCode {
@@ -83,6 +104,7 @@ fn main() -> ExitCode {
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
         Command::Fit => fit::run(),
+        Command::Capi { target, out } => capi(&target, &out),
         Command::Stack { board: Some(board), .. } => stack::of_board(&board),
         Command::Stack { elf, .. } => stack::show(&elf.unwrap_or_default()),
     };

@@ -1,0 +1,167 @@
+//! Misuse with valid pointers and lengths, and null: each gives its error and changes nothing.
+
+use std::ptr::{null, null_mut};
+
+use actq_c::{
+    ActqHead, ActqImage, CPort, Code, actq_begin, actq_head_init, actq_image_cost, actq_image_open, actq_image_port, actq_image_sizes,
+    actq_poll, actq_reset, actq_restore, actq_save, actq_saved_bytes, actq_set_input, actq_step,
+};
+
+use super::{Aligned, BYTES, OK, Program};
+
+/// Checks the status of each call.
+macro_rules! gives {
+    ($($call:expr => $code:ident;)*) => {
+        // SAFETY: each pointer is null, or valid for its length.
+        $(assert_eq!(unsafe { $call }, Code::$code as i32, stringify!($call));)*
+    };
+}
+
+#[test]
+fn null_misaligned_and_short_buffers_are_errors() {
+    let mut program = Program::start();
+    let (obs, act) = program.lengths();
+    let (observation, mut action) = (vec![0.5f32; obs + 1], vec![7.0f32; act + 1]);
+    let (image, head) = (program.image(), program.head());
+    let (o, a) = (observation.as_ptr(), action.as_mut_ptr());
+    // One byte into a buffer that is longer.
+    let (odd_o, odd_a) = (o.wrapping_byte_add(1), a.wrapping_byte_add(1));
+    let bytes = BYTES.0.as_ptr();
+    let scratch = program.scratch.as_mut_ptr();
+    let words = program.scratch.len();
+    let mut other = Program::start();
+    let other_head = other.head();
+    gives! {
+        actq_step(null_mut(), o, obs, a, act) => Null;
+        actq_step(head, null(), obs, a, act) => Null;
+        actq_step(head, o, obs, null_mut(), act) => Null;
+        actq_step(head, odd_o, obs, a, act) => Alignment;
+        actq_step(head, o, obs, odd_a, act) => Alignment;
+        actq_step(head.wrapping_byte_add(1), o, obs, a, act) => Alignment;
+        actq_step(head, o, obs - 1, a, act) => ObservationLength;
+        actq_step(head, o, 0, a, act) => ObservationLength;
+        actq_step(head, o, usize::MAX, a, act) => Overlap;
+        actq_step(head, o, obs, a, act - 1) => Length;
+        actq_step(head, o, obs, a, act + 1) => Length;
+        actq_poll(head, u32::MAX, a, act) => NotBegun;
+        actq_begin(head, null(), obs) => Null;
+        actq_saved_bytes(head, null_mut()) => Null;
+        actq_save(head, null_mut(), 100) => Null;
+        actq_restore(head, null(), 100) => Null;
+        actq_restore(head, bytes, 3) => SavedLength;
+        actq_image_open(null_mut(), bytes, 100) => Null;
+        actq_image_cost(image, null_mut()) => Null;
+        actq_image_sizes(image, null_mut()) => Null;
+        actq_image_cost(null(), null_mut()) => Null;
+        actq_image_port(image, 0, null_mut()) => NoSuchPort;
+        actq_head_init(other_head, image, null_mut(), words) => Null;
+        actq_head_init(other_head, image, scratch, 1) => ScratchTooSmall;
+    }
+    assert!(action.iter().all(|value| *value == 7.0), "an error writes no action");
+}
+
+#[test]
+fn structures_that_were_not_opened_or_are_copies_are_errors() {
+    let mut program = Program::start();
+    let (obs, act) = program.lengths();
+    let (observation, mut action) = (vec![0.5f32; obs], vec![0.0f32; act]);
+    let (o, a) = (observation.as_ptr(), action.as_mut_ptr());
+    for filling in [0u8, 0xff, 0xa5] {
+        let mut memory = vec![u64::from_ne_bytes([filling; 8]); 128];
+        let (head, image) = (memory.as_mut_ptr().cast::<ActqHead>(), memory.as_ptr().cast::<ActqImage>());
+        let mut port = std::mem::MaybeUninit::<CPort>::uninit();
+        gives! {
+            actq_step(head, o, obs, a, act) => NotInitialized;
+            actq_reset(head) => NotInitialized;
+            actq_image_port(image, 0, port.as_mut_ptr()) => NotInitialized;
+        }
+    }
+    // A copy would share its memory with the original.
+    let mut copy = std::mem::MaybeUninit::<ActqHead>::uninit();
+    // SAFETY: both are valid, and as long.
+    unsafe { std::ptr::copy_nonoverlapping(program.head(), copy.as_mut_ptr(), 1) };
+    gives! {
+        actq_step(copy.as_mut_ptr(), o, obs, a, act) => NotInitialized;
+        actq_step(program.head(), o, obs, a, act) => Ok;
+    }
+    // A failed open closes what was open; so does a failed init.
+    let (image, head) = (program.image(), program.head());
+    gives! {
+        actq_image_open(image, BYTES.0.as_ptr(), 8) => ImageTooShort;
+        actq_image_cost(image, null_mut()) => NotInitialized;
+        actq_head_init(head, image, program.scratch.as_mut_ptr(), program.scratch.len()) => NotInitialized;
+        actq_step(head, o, obs, a, act) => NotInitialized;
+    }
+}
+
+#[test]
+fn overlapping_buffers_are_errors_and_an_action_may_replace_its_observation() {
+    let mut program = Program::start();
+    let (obs, act) = program.lengths();
+    let mut values = vec![0.5f32; obs.max(act)];
+    let (image, head) = (program.image(), program.head());
+    let scratch = program.scratch.as_mut_ptr();
+    let words = program.scratch.len();
+    let (in_scratch, in_head) = (scratch.cast::<f32>(), head.cast::<f32>());
+    let v = values.as_mut_ptr();
+    gives! {
+        actq_step(head, in_scratch, obs, v, act) => Overlap;
+        actq_step(head, v, obs, in_scratch, act) => Overlap;
+        actq_step(head, v, obs, in_head, act) => Overlap;
+        actq_begin(head, in_head, obs) => Overlap;
+        actq_save(head, scratch.cast(), 4) => Overlap;
+        actq_step(head, v, obs, v, act) => Ok;
+        actq_head_init(head, image, image.cast(), 4) => Overlap;
+        actq_head_init(head, image, BYTES.0.as_ptr().cast::<u32>().cast_mut(), 4) => Overlap;
+        actq_head_init(head, image, scratch, words) => Ok;
+        actq_image_open(image, image.cast(), 40) => Overlap;
+    }
+}
+
+#[test]
+fn a_step_during_polls_is_an_error_until_the_action_or_a_reset() {
+    let mut program = Program::start();
+    let (obs, act) = program.lengths();
+    let (observation, mut action) = (vec![0.5f32; obs], vec![0.0f32; act]);
+    let (head, o, a) = (program.head(), observation.as_ptr(), action.as_mut_ptr());
+    let mut saved = vec![0; 1 << 16];
+    let mut len = 0;
+    gives! {
+        actq_saved_bytes(head, &mut len) => Ok;
+        actq_begin(head, o, obs) => Ok;
+        actq_poll(head, 1, a, act) => Budget;
+        actq_step(head, o, obs, a, act) => Polling;
+        actq_save(head, saved.as_mut_ptr(), len) => SavedBegun;
+        actq_begin(head, o, obs) => Ok;
+        actq_poll(head, u32::MAX, a, act) => Ok;
+        actq_poll(head, u32::MAX, a, act) => Ok;
+        actq_step(head, o, obs, a, act) => Ok;
+        actq_begin(head, o, obs) => Ok;
+        actq_reset(head) => Ok;
+        actq_poll(head, u32::MAX, a, act) => NotBegun;
+        actq_step(head, o, obs, a, act) => Ok;
+    }
+}
+
+#[test]
+fn a_damaged_image_and_values_that_are_not_finite_are_errors() {
+    let mut damaged = Box::new(Aligned(BYTES.0));
+    let middle = damaged.0.len() / 2;
+    damaged.0[middle] ^= 1;
+    let mut program = Program::start();
+    let (obs, act) = program.lengths();
+    let (mut observation, mut action) = (vec![0.5f32; obs], vec![7.0f32; act]);
+    observation[obs - 1] = f32::NAN;
+    let (image, head) = (program.image(), program.head());
+    gives! {
+        actq_step(head, observation.as_ptr(), obs, action.as_mut_ptr(), act) => ObservationNotFinite;
+        actq_set_input(image, c"velocity".as_ptr(), observation.as_ptr(), 1, action.as_mut_ptr(), act) => NoSuchPort;
+        actq_set_input(image, null(), observation.as_ptr(), 1, action.as_mut_ptr(), act) => Null;
+        actq_image_open(image, damaged.0.as_ptr(), damaged.0.len()) => ImageChecksum;
+        actq_image_open(image, BYTES.0.as_ptr().wrapping_add(1), 64) => ImageMisaligned;
+        actq_image_open(image, BYTES.0.as_ptr(), 4) => ImageTooShort;
+    }
+    assert!(action.iter().all(|value| *value == 7.0));
+    // SAFETY: the pointers are valid.
+    assert_eq!(unsafe { actq_image_open(image, BYTES.0.as_ptr(), BYTES.0.len()) }, OK);
+}

@@ -1,0 +1,182 @@
+//! Packages the C interface for a core: header, library, files for build systems, licences and a manifest.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use actq_boards::{Target, root, target_dir, version};
+use actq_cli::report::export::sha256;
+use anyhow::{Context as _, Result, ensure};
+use serde_json::{Value, json};
+
+use crate::firmware::cargo;
+
+/// Version of the packages.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// A core for which there is a package.
+#[derive(Clone, Copy, Debug)]
+pub struct Core {
+    /// Its name.
+    pub name: &'static str,
+    /// Its target; `None` for the host.
+    pub target: Option<Target>,
+    /// Options of arm-none-eabi-gcc, or of riscv64-unknown-elf-gcc.
+    pub flags: &'static [&'static str],
+}
+
+const fn core(name: &'static str, target: Option<Target>, flags: &'static [&'static str]) -> Core {
+    Core { name, target, flags }
+}
+
+/// All of them.
+pub const CORES: &[Core] = &[
+    core("cortex-m0plus", Some(Target::Small), &["-mcpu=cortex-m0plus", "-mthumb"]),
+    core("cortex-m3", Some(Target::NoDsp), &["-mcpu=cortex-m3", "-mthumb"]),
+    core("cortex-m4", Some(Target::NoFpu), &["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=soft"]),
+    core("cortex-m4f", Some(Target::Fpu), &["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]),
+    core("cortex-m7", Some(Target::M7), &["-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"]),
+    core("cortex-m33", Some(Target::M33), &["-mcpu=cortex-m33", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"]),
+    core("rv32imac", Some(Target::Riscv), &["-march=rv32imac", "-mabi=ilp32"]),
+    core("host", None, &[]),
+];
+
+impl Core {
+    /// Returns the core with this name.
+    pub fn of(name: &str) -> Option<Self> {
+        CORES.iter().find(|core| core.name == name).copied()
+    }
+
+    /// Builds the library for this core, and returns its path.
+    ///
+    /// # Errors
+    ///
+    /// If cargo cannot build it.
+    pub fn library(self) -> Result<PathBuf> {
+        let profile = if self.target.is_some_and(Target::has_assembler) { "capi" } else { "capi-portable" };
+        let mut arguments = vec!["rustc", "--quiet", "--package", "actq-capi", "--lib", "--crate-type", "staticlib"];
+        arguments.extend(["--features", "panic-handler", "--profile", profile]);
+        let mut folder = target_dir();
+        if let Some(target) = self.target {
+            arguments.extend(["--target", target.triple()]);
+            folder.push(target.triple());
+        }
+        cargo("the C interface", &arguments, &[])?;
+        Ok(folder.join(profile).join("libactq_c.a"))
+    }
+
+    /// Writes the package into `out`, a folder that does not exist or is empty.
+    ///
+    /// # Errors
+    ///
+    /// If the library cannot be built, or a file cannot be written.
+    pub fn package(self, out: &Path) -> Result<()> {
+        let shown = out.display();
+        let is_free = fs::read_dir(out).map_or(true, |mut entries| entries.next().is_none());
+        ensure!(is_free, "{shown}: is not an empty folder; remove it, or name another one");
+        let mut files = Files { out, written: Vec::new() };
+        files.put("lib/libactq.a", &fs::read(self.library()?)?)?;
+        let capi = root().join("capi");
+        for header in ["actq.h", "actq.hpp"] {
+            files.put(&format!("include/{header}"), &fs::read(capi.join("include").join(header))?)?;
+        }
+        for (from, to) in [
+            ("CMakeLists.txt", "CMakeLists.txt"),
+            ("actqConfig.cmake", "lib/cmake/actq/actqConfig.cmake"),
+            ("actqConfigVersion.cmake", "lib/cmake/actq/actqConfigVersion.cmake"),
+            ("actq.pc", "lib/pkgconfig/actq.pc"),
+            ("zephyr/module.yml", "zephyr/module.yml"),
+            ("zephyr/Kconfig", "zephyr/Kconfig"),
+            ("zephyr/CMakeLists.txt", "zephyr/CMakeLists.txt"),
+            ("library.json", "library.json"),
+            ("library.properties", "library.properties"),
+        ] {
+            let text = fs::read_to_string(capi.join("package").join(from)).with_context(|| from.to_owned())?;
+            files.put(to, text.replace("@VERSION@", VERSION).replace("@CORE@", self.name).as_bytes())?;
+        }
+        let parts = licences(&mut files)?;
+        let digests: serde_json::Map<String, Value> = files.written.iter().cloned().collect();
+        let manifest = json!({
+            "schema": 1,
+            "actq": VERSION,
+            "core": self.name,
+            "flags": self.flags,
+            "compiler": version("rustc")?,
+            "parts": parts,
+            "sha256": digests,
+            "not_measured": ["time, stack and power on a real board"],
+            "not_run": ["the files for Zephyr, ESP-IDF, PlatformIO and Arduino"],
+        });
+        files.put("manifest.json", format!("{manifest:#}\n").as_bytes())
+    }
+}
+
+/// The files of a package.
+struct Files<'a> {
+    out: &'a Path,
+    /// Names and SHA-256.
+    written: Vec<(String, Value)>,
+}
+
+impl Files<'_> {
+    fn put(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        let path = self.out.join(name);
+        let write = || {
+            fs::create_dir_all(path.parent().unwrap_or(self.out))?;
+            fs::write(&path, bytes)
+        };
+        write().with_context(|| path.display().to_string())?;
+        self.written.push((name.to_owned(), sha256(bytes).into()));
+        Ok(())
+    }
+}
+
+/// Adds the licences of the crates in the library; returns these with their versions and licences.
+fn licences(files: &mut Files<'_>) -> Result<Vec<Value>> {
+    for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
+        files.put(name, &fs::read(root().join(name))?)?;
+    }
+    let metadata = output(&["metadata", "--format-version", "1", "--locked"])?;
+    let metadata: Value = serde_json::from_str(&metadata)?;
+    let tree = ["tree", "--package", "actq-capi", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
+    let mut used: Vec<String> = output(&tree)?
+        .lines()
+        .filter_map(|line| Some(line.split(' ').take(2).collect::<Vec<_>>().join(" ").replace(" v", " ")))
+        .collect();
+    used.sort();
+    used.dedup();
+    let mut parts = Vec::new();
+    for package in metadata["packages"].as_array().context("packages")? {
+        let text = |key: &str| package[key].as_str().unwrap_or_default();
+        let (name, number) = (text("name"), text("version"));
+        if used.binary_search(&format!("{name} {number}")).is_err() {
+            continue;
+        }
+        let mut part = json!({ "name": name, "version": number, "licence": text("license") });
+        let folder = Path::new(text("manifest_path")).parent().context("no folder")?;
+        // Some crates have none; the texts of MIT and Apache-2.0 are at the top of the package.
+        let mut found = Vec::new();
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            let file = entry.file_name().to_string_lossy().into_owned();
+            if entry.path().is_file() && ["LICENSE", "COPYING"].iter().any(|start| file.starts_with(start)) {
+                let to = format!("licences/{name}/{file}");
+                files.put(&to, &fs::read(folder.join(&file))?)?;
+                found.push(to);
+            }
+        }
+        part["files"] = found.into();
+        parts.push(part);
+    }
+    let compiled_in = json!({ "name": "core and compiler_builtins of Rust", "licence": "MIT OR Apache-2.0" });
+    parts.push(compiled_in);
+    Ok(parts)
+}
+
+/// Returns the output of cargo.
+fn output(arguments: &[&str]) -> Result<String> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(cargo).current_dir(root()).args(arguments).output().context("cannot start cargo")?;
+    ensure!(output.status.success(), "cargo {}: {}", arguments[0], String::from_utf8_lossy(&output.stderr));
+    Ok(String::from_utf8(output.stdout)?)
+}
