@@ -14,8 +14,11 @@ constexpr uint32_t slice = 20000;
 volatile uint32_t &csr = *reinterpret_cast<volatile uint32_t *>(0xe000e010);
 volatile uint32_t &rvr = *reinterpret_cast<volatile uint32_t *>(0xe000e014);
 volatile uint32_t &cvr = *reinterpret_cast<volatile uint32_t *>(0xe000e018);
-// Cycles of a period: both boards' examples run at 25 MHz or more.
-constexpr uint32_t period = 25000;
+#ifndef CORE_HZ
+#error "give the core's clock: -DCORE_HZ=25000000 for mps2-an386, -DCORE_HZ=168000000 for netduinoplus2"
+#endif
+// Cycles of a period: 1 kHz.
+constexpr uint32_t period = CORE_HZ / 1000;
 
 uint32_t scratch[POLICY_SCRATCH_WORDS];
 actq::Head head;

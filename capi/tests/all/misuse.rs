@@ -3,8 +3,8 @@
 use std::ptr::{null, null_mut};
 
 use actq_c::{
-    ActqHead, ActqImage, CPort, Code, actq_begin, actq_head_init, actq_image_cost, actq_image_open, actq_image_port, actq_image_sizes,
-    actq_poll, actq_reset, actq_restore, actq_save, actq_saved_bytes, actq_set_input, actq_step,
+    ActqHead, ActqImage, CPort, Code, actq_begin, actq_head_init, actq_image_cost, actq_image_open, actq_image_port,
+    actq_image_sizes, actq_poll, actq_reset, actq_restore, actq_save, actq_saved_bytes, actq_set_input, actq_step,
 };
 
 use super::{Aligned, BYTES, OK, Program};

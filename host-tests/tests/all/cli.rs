@@ -3,6 +3,7 @@
 mod bundle;
 mod constants;
 mod eval;
+mod export_c;
 mod fixture;
 mod inspect;
 mod interrupts;

@@ -21,7 +21,10 @@ joints = { motors = ["left/hip", "*/ int x; /*", "left hip"] }
 gains = { joints = "motors", stiffness = [1, 2.5, 1e9], damping = [0, 0.125, 0] }
 "#;
 
-fn compiles(command: &mut Command) -> Result<()> {
+/// Options that accept no warning, and only check.
+pub(super) const STRICT: [&str; 6] = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-fsyntax-only"];
+
+pub(super) fn compiles(command: &mut Command) -> Result<()> {
     let output = command.output()?;
     ensure!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
     ensure!(output.stderr.is_empty(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
@@ -67,7 +70,6 @@ fn constants_compile_and_have_the_places_of_inputs_targets_and_joints() -> Resul
             .arg(dir.path())
             .arg(path("made.rs")),
     )?;
-    let strict = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-fsyntax-only"];
     let use_all = "#include \"walker 2.h\"\nstatic const float gains[] = WALKER_2_STIFFNESS;\n\
                    float at(const float *x);\nfloat at(const float *x) { return x[WALKER_2_INPUT_Q_B] + gains[1]; }\n";
     for (file, standard) in [("use.c", "-std=c99"), ("use.cpp", "-std=c++17")] {
@@ -76,13 +78,13 @@ fn constants_compile_and_have_the_places_of_inputs_targets_and_joints() -> Resul
             println!("not run: no compiler for {file}");
             continue;
         }
-        compiles(Command::new("cc").arg(standard).args(strict).arg(path(file)))?;
+        compiles(Command::new("cc").arg(standard).args(STRICT).arg(path(file)))?;
     }
     Ok(())
 }
 
 /// Returns `true` if the machine's compiler compiles an empty file of this language.
-fn has_compiler(file: &Path, standard: &str) -> Result<bool> {
+pub(super) fn has_compiler(file: &Path, standard: &str) -> Result<bool> {
     let empty = file.with_file_name(format!("empty.{}", file.extension().unwrap_or_default().display()));
     fs::write(&empty, "")?;
     Ok(Command::new("cc")

@@ -21,6 +21,8 @@ const APPLICATION: &str = "actq-firmware-demo";
 const STYLES: &str = "actq-firmware-styles";
 /// The comparison of the ONNX importer with tract, which takes minutes to build.
 const ONNX_TESTS: &str = "actq-onnx-tests";
+/// The check of the C header, whose generator takes long to build, too.
+const C_HEADER: &str = "actq-capi-header";
 
 /// The tests in QEMU that `cargo verify` runs, and those that only `cargo verify --all` runs: modules of
 /// `host-tests/tests/all`.
@@ -73,6 +75,7 @@ pub(super) fn all(installed: Installed) -> Vec<Step> {
     steps.add("budgets", &["run", "--release", "--package", "actq-bench", "--", "budgets"]);
     steps.add("faults on the line", &["run", "--release", "--package", "actq-bench", "--", "faults"]);
     steps.add("ONNX files against tract", &["test", "--release", "--package", ONNX_TESTS]);
+    steps.add("C header", &["test", "--release", "--package", C_HEADER]);
     steps.narrow(installed.narrow);
     steps.oldest(installed.oldest);
     steps.0
@@ -81,10 +84,11 @@ pub(super) fn all(installed: Installed) -> Vec<Step> {
 const TESTS: [&str; 3] = ["test", "--release", "--no-fail-fast"];
 const DENY: [&str; 3] = ["--", "-D", "warnings"];
 
-/// Returns all packages for the host, without those built only for boards, and without the comparison with tract.
+/// Returns all packages for the host, without those built only for boards, and without those that take minutes to
+/// build.
 fn host_packages() -> Vec<&'static str> {
     let [support, benches] = FIRMWARE;
-    vec!["--workspace", "--exclude", support, "--exclude", benches, "--exclude", ONNX_TESTS]
+    vec!["--workspace", "--exclude", support, "--exclude", benches, "--exclude", ONNX_TESTS, "--exclude", C_HEADER]
 }
 
 fn build_for(target: Target) -> [&'static str; 4] {

@@ -1,0 +1,20 @@
+/* The least that runs an image: its size is that of the library with every operation. */
+#include "actq.h"
+#include "policy.h"
+
+static actq_image image;
+static actq_head head;
+static uint32_t scratch[POLICY_SCRATCH_WORDS];
+
+int main(void) {
+    float observation[POLICY_OBSERVATION_LEN] = {0};
+    float action[POLICY_ACTION_LEN];
+    actq_status status = actq_image_open(&image, (const uint8_t *)policy_image, POLICY_IMAGE_BYTES);
+    if (status == ACTQ_OK) {
+        status = actq_head_init(&head, &image, scratch, POLICY_SCRATCH_WORDS);
+    }
+    if (status == ACTQ_OK) {
+        status = actq_step(&head, observation, POLICY_OBSERVATION_LEN, action, POLICY_ACTION_LEN);
+    }
+    return status;
+}

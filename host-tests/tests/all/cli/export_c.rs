@@ -1,0 +1,98 @@
+//! `actq export-c`: sources that strict compilers accept, and the bits in them.
+
+use std::fs;
+use std::process::Command;
+
+use actq::runtime::ImageBuffer;
+use actq_bench::bits;
+use actq_bench::command::{actq, failed, run, succeeded};
+use actq_kernels::Head;
+use anyhow::{Result, ensure};
+use ndarray::Array3;
+use tempfile::TempDir;
+
+use super::constants::{STRICT, compiles, has_compiler};
+use super::fixture::text;
+use crate::deployed::{Made, four_bits};
+use crate::folder::write_observations;
+
+/// Uses all that the files declare.
+const USE: &str = "#include \"walker.h\"\n#include \"actq.h\"\nint main(void);\nint main(void) {\n\
+                   return (walker_image[0] ^ walker_golden_actions[0]) == 0 && walker_golden_observations[0] > 0.0f \
+                   && WALKER_GOLDEN_STEPS > 0 && sizeof(WALKER_SHA256) == 65;\n}\n";
+
+/// Returns the numbers of an array in a source file.
+fn numbers(source: &str, array: &str) -> Vec<u32> {
+    let (_, rest) = source.split_once(&format!("{array}[")).expect("the array");
+    let (_, rest) = rest.split_once('{').expect("its begin");
+    let (list, _) = rest.split_once('}').expect("its end");
+    let hexadecimal = |number: &str| number.trim().strip_prefix("0x")?.strip_suffix('u').map(str::to_owned);
+    list.split(',').filter_map(hexadecimal).map(|n| u32::from_str_radix(&n, 16).expect("a number")).collect()
+}
+
+#[test]
+fn exported_sources_compile_and_have_the_image_and_the_actions_of_this_host() -> Result<()> {
+    let dir = TempDir::new()?;
+    let at = |name: &str| dir.path().join(name);
+    let bytes = four_bits(&Made::deployment()?.1.policy)?;
+    fs::write(at("made.actq"), &bytes)?;
+    let buffer = ImageBuffer::new(&bytes);
+    let image = buffer.image(&at("made.actq"))?;
+    let observations = Array3::from_shape_fn((1, 9, image.obs_len()), |(_, i, k)| ((i + 2 * k) as f32 / 7.0).sin());
+    write_observations(&at("runs.npz"), &observations)?;
+    let [from, recording, out] = ["made.actq", "runs.npz", "new/folder"].map(|name| text(&at(name)));
+    let options = ["--golden", &recording, "--steps", "5", "--name", "walker"];
+    let exported = run(actq(&[&["export-c", &from, "--out", &out], &options[..]].concat()), b"")?;
+    let printed = succeeded(&exported)?;
+    ensure!(printed.lines().count() == 4 && printed.contains("walker_golden.c"), "{printed}");
+
+    let read = |name: &str| fs::read_to_string(at("new/folder").join(name));
+    let words: Vec<u8> = numbers(&read("walker.c")?, "walker_image").iter().flat_map(|w| w.to_le_bytes()).collect();
+    ensure!(words == bytes, "the words of the image differ");
+    let mut scratch = vec![0; image.scratch_words()];
+    let mut head = Head::new(image, &mut scratch)?;
+    let mut expected = Vec::new();
+    for observation in observations.rows().into_iter().take(5) {
+        expected.extend(bits(head.step(&observation.to_vec())?));
+    }
+    assert_eq!(numbers(&read("walker_golden.c")?, "walker_golden_actions"), expected);
+    let manifest: serde_json::Value = serde_json::from_str(&read("manifest.json")?)?;
+    assert_eq!(manifest["image"]["crc32"], image.crc());
+    assert_eq!(manifest["sha256"].as_object().map(serde_json::Map::len), Some(3));
+
+    for (file, standard) in [("use.c", "-std=c99"), ("use.cpp", "-std=c++17")] {
+        fs::write(at(file), USE)?;
+        if !has_compiler(&at(file), standard)? {
+            println!("not run: no compiler for {file}");
+            continue;
+        }
+        let language = if file == "use.c" { "c" } else { "c++" };
+        let include = actq_bench::root().join("capi/include");
+        let sources = ["walker.c", "walker_golden.c"].map(|name| at("new/folder").join(name));
+        let mut command = Command::new("cc");
+        command.args([standard, "-x", language]).args(STRICT).arg("-I").arg(at("new/folder")).arg("-I").arg(&include);
+        compiles(command.args(sources).arg(at(file)))?;
+        if language == "c++" {
+            fs::write(at("wrapper.cpp"), "#include \"actq.hpp\"\n")?;
+            let mut command = Command::new("cc");
+            compiles(command.arg(standard).args(STRICT).arg("-I").arg(&include).arg(at("wrapper.cpp")))?;
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn names_that_are_no_identifiers_and_files_that_are_no_images_are_refused() -> Result<()> {
+    let dir = TempDir::new()?;
+    let at = |name: &str| text(&dir.path().join(name));
+    fs::write(dir.path().join("made.actq"), four_bits(&Made::deployment()?.1.policy)?)?;
+    fs::write(dir.path().join("text.actq"), "no image")?;
+    let [image, none, out] = ["made.actq", "text.actq", "out"].map(at);
+    for (image, name, message) in
+        [(&image, "2walk", "a letter first"), (&image, "a-b", "use lower-case letters"), (&none, "walker", "text.actq")]
+    {
+        failed(&run(actq(&["export-c", image, "--out", &out, "--name", name]), b"")?, 1, &[message])?;
+    }
+    ensure!(!dir.path().join("out").exists(), "nothing is written");
+    Ok(())
+}
