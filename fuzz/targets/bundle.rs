@@ -8,7 +8,7 @@ use actq_deploy::{Answers, Bundle, read};
 use libfuzzer_sys::fuzz_target;
 
 /// Files of each family that has text files, the network last.
-const NAMES: [&[&str]; 7] = [
+const NAMES: [&[&str]; 8] = [
     &["params/deploy.yaml", "exported/policy.onnx"],
     &["params.yaml", "policy/isaaclab/policy.onnx", "policy/isaaclab/encoder.onnx"],
     &["config.yaml", "robot.xml", "models/policy.kinfer"],
@@ -16,6 +16,7 @@ const NAMES: [&[&str]; 7] = [
     &["config.json", "policy_preprocessor.json", "policy_postprocessor.json", "meta/info.json", "policy.onnx"],
     &["base.yaml", "walk/config.yaml", "walk/policy.onnx"],
     &["params/env.yaml", "io_descriptors/IO_descriptors.yaml", "exported/policy.onnx"],
+    &["walker.yaml", "walker_initial_values.safetensors", "observe.onnx", "policy.onnx"],
 ];
 
 fuzz_target!(|bytes: &[u8]| {

@@ -131,6 +131,11 @@ impl Bundle {
     }
 }
 
+/// Returns the path of a file in the folder of another one.
+pub(crate) fn beside(file: &str, name: &str) -> String {
+    file.rsplit_once('/').map_or_else(|| name.to_owned(), |(folder, _)| format!("{folder}/{name}"))
+}
+
 impl Sources for Bundle {
     fn network(&self, network: &Network, outputs: &[String]) -> Result<Box<dyn Compute>> {
         let key = (network.file.clone(), outputs.to_vec());

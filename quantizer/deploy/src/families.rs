@@ -5,10 +5,12 @@ mod holosoma;
 mod humanoidverse;
 mod isaaclab;
 mod kinfer;
+mod leapp;
 mod lerobot;
 mod limx;
 mod mjlab;
 mod rl_sar;
+mod tensors;
 mod unitree_rl_lab;
 
 use crate::family::Family;
@@ -21,6 +23,7 @@ pub(crate) static FAMILIES: &[&dyn Family] = &[
     &humanoidverse::Humanoidverse,
     &holosoma::Holosoma,
     &kinfer::Kinfer,
+    &leapp::Leapp,
     &isaaclab::IsaacLab,
     &mjlab::Mjlab,
     &lerobot::Lerobot,

@@ -15,6 +15,8 @@ use crate::sources::{Compute, Part};
 #[derive(Clone, Debug)]
 pub(crate) struct OnnxNetwork {
     inputs: Vec<(String, usize)>,
+    /// Inputs that cells keep, and the outputs of their next values.
+    kept: Vec<(String, String)>,
     lens: Vec<usize>,
     outputs: Vec<Output>,
 }
@@ -35,9 +37,9 @@ impl OnnxNetwork {
         ensure!(!outputs.is_empty(), "nothing reads an output of it; remove it");
         let signature = Signature::read(path)?;
         let mut lens = vec![None; signature.inputs.len()];
-        let mut opened = Vec::new();
+        let (mut opened, mut kept) = (Vec::new(), Vec::new());
         for name in outputs {
-            let choice = Choice { output: Some(name.clone()), states: Vec::new() };
+            let choice = Choice { output: Some(name.clone()), states: Vec::new(), is_fed: true };
             let imported = import(path, &choice)?;
             let policy = Policy::of_files(path, [path, path], &imported.json, &imported.weights)?;
             let mut reads = Vec::new();
@@ -47,6 +49,7 @@ impl OnnxNetwork {
                 lens[at] = Some(*len);
                 reads.push(at);
             }
+            kept.extend(imported.states.into_iter().map(|(input, output, _)| (input, output)));
             let (weights, state) = (Weights::of(&policy.graph), zero_state(&policy.graph, 1));
             opened.push(Output { policy: Rc::new(policy), weights: Rc::new(weights), state, reads });
         }
@@ -59,13 +62,17 @@ impl OnnxNetwork {
         }
         let inputs = used.iter().filter_map(|&i| Some((signature.inputs[i].0.clone(), lens[i]?))).collect();
         let lens = opened.iter().map(|output| output.policy.chunk * output.policy.act_len).collect();
-        Ok(Self { inputs, lens, outputs: opened })
+        Ok(Self { inputs, kept, lens, outputs: opened })
     }
 }
 
 impl Compute for OnnxNetwork {
     fn inputs(&self) -> &[(String, usize)] {
         &self.inputs
+    }
+
+    fn kept(&self) -> &[(String, String)] {
+        &self.kept
     }
 
     fn outputs(&self) -> &[usize] {

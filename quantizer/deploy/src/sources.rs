@@ -11,6 +11,11 @@ pub trait Compute {
     /// Returns the graph's inputs that its outputs depend on, in the graph's order, with their lengths.
     fn inputs(&self) -> &[(String, usize)];
 
+    /// Returns the graph's inputs that recurrent cells keep by themselves, from zero, with the outputs of their next values.
+    fn kept(&self) -> &[(String, String)] {
+        &[]
+    }
+
     /// Returns the lengths of the outputs that were asked for.
     fn outputs(&self) -> &[usize];
 

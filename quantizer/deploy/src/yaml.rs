@@ -115,6 +115,18 @@ impl Node {
         }
     }
 
+    /// Makes lists of maps to maps with the keys 0, 1 and so on, so that their values have paths.
+    pub(crate) fn numbered(self) -> Self {
+        let data = match self.data {
+            Data::List(items) if items.iter().any(|item| matches!(item.data, Data::Map(_))) => {
+                Data::Map(items.into_iter().enumerate().map(|(i, item)| (i.to_string(), item.numbered())).collect())
+            }
+            Data::Map(entries) => Data::Map(entries.into_iter().map(|(key, inner)| (key, inner.numbered())).collect()),
+            other => other,
+        };
+        Self { line: self.line, data }
+    }
+
     fn count(&self) -> usize {
         1 + match &self.data {
             Data::Scalar(..) => 0,

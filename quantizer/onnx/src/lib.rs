@@ -16,5 +16,5 @@ mod states;
 mod values;
 
 pub use file::proto;
-pub use network::{Choice, Imported, Onnx, import, import_bytes};
+pub use network::{Choice, Imported, Onnx, constant, import, import_bytes};
 pub use signature::Signature;

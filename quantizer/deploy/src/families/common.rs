@@ -125,9 +125,9 @@ impl Parts {
         self.description.states.push(state);
     }
 
-    /// Adds a state that starts at a number.
-    pub(super) fn kept_from(&mut self, name: &str, len: usize, start: f64, next: &str) {
-        let state = State { name: name.to_owned(), len, start: Numbers::All(start), next: next.to_owned() };
+    /// Adds a state that starts at given numbers.
+    pub(super) fn kept_from(&mut self, name: &str, len: usize, start: Numbers, next: &str) {
+        let state = State { name: name.to_owned(), len, start, next: next.to_owned() };
         self.description.states.push(state);
     }
 
@@ -291,6 +291,12 @@ pub(super) fn gravity(parts: &mut Parts, rule: &str, facts: &mut Facts) -> Resul
 pub(super) fn count(node: &Node) -> Option<usize> {
     let number = node.number()?;
     (number >= 0.0 && number.fract() == 0.0 && number < 1e5).then_some(number as usize)
+}
+
+/// Reads a list of numbers of values or frames.
+pub(super) fn counts(node: &Node) -> Option<Vec<usize>> {
+    node.numbers()?;
+    node.items().iter().map(count).collect()
 }
 
 /// The graph's input and output.

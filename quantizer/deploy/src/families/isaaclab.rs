@@ -42,7 +42,7 @@ impl Family for IsaacLab {
             let names_module = |text: &String| MODULES.iter().any(|module| text.contains(module));
             let Some(text) = bundle.text(file).ok().filter(names_module) else { continue };
             let root = Node::parse(&text).context(file.to_owned())?;
-            let document = Document::of(file, descriptors::numbered(root));
+            let document = Document::of(file, root.numbered());
             if descriptors::is_one(&document) {
                 exported.push(document);
             } else if environment::is_one(&document) {

@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use super::common::{Parts, given_gravity};
 use crate::bundle::Bundle;
-use crate::description::{Clock, Description, Gains, Network, Op, Operand, TargetKind, When};
+use crate::description::{Clock, Description, Gains, Network, Numbers, Op, Operand, TargetKind, When};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
@@ -407,7 +407,7 @@ fn state(
         network.states.insert(input.to_owned(), output.to_owned());
     } else {
         let name = base(input).replace('.', "_");
-        parts.kept_from(&name, len, start, &format!("policy.{output}"));
+        parts.kept_from(&name, len, Numbers::All(start), &format!("policy.{output}"));
         network.inputs.insert(input.to_owned(), name);
     }
     Ok(())

@@ -9,23 +9,11 @@ use super::values::{bounds, history, numbers};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::families::common::count;
-use crate::yaml::{Data, Node};
+use crate::yaml::Node;
 
 /// Returns `true` if a file has the keys of exported descriptors.
 pub(super) fn is_one(yaml: &Document) -> bool {
     ["actions", "observations", "articulations", "scene.dt"].iter().all(|key| yaml.look(key).is_some())
-}
-
-/// Makes lists of maps to maps with the keys 0, 1 and so on, so that their values have paths.
-pub(super) fn numbered(node: Node) -> Node {
-    let data = match node.data {
-        Data::List(items) if items.iter().any(|item| matches!(item.data, Data::Map(_))) => {
-            Data::Map(items.into_iter().enumerate().map(|(i, item)| (i.to_string(), numbered(item))).collect())
-        }
-        Data::Map(entries) => Data::Map(entries.into_iter().map(|(key, inner)| (key, numbered(inner))).collect()),
-        other => other,
-    };
-    Node { line: node.line, data }
 }
 
 /// Returns the order of the robot's joints.

@@ -1,19 +1,16 @@
 //! Statistics of features in .safetensors files.
 
 use std::collections::BTreeMap;
-use std::fs;
 
-use actq::error::{Context as _, Result, ensure};
-use actq::import::tensors::TensorFile;
-use actq::import::values::{Tensor, Values};
+use actq::error::{Context as _, Result};
+use actq::import::values::Tensor;
 use actq::text::printable;
 
 use super::feature::Feature;
 use crate::bundle::Bundle;
 use crate::facts::Facts;
+use crate::families::tensors::{finite, tensors};
 
-/// Most bytes of a file: more than the weights of a network that fits a microcontroller.
-const MOST_BYTES: u64 = 256 << 20;
 /// Most names in a message.
 const MOST_LISTED: usize = 12;
 
@@ -29,7 +26,7 @@ pub(super) struct Statistics {
 impl Statistics {
     /// Reads a processor's state: tensors `FEATURE.STATISTIC`.
     pub(super) fn of_processor(bundle: &Bundle, file: &str) -> Result<Self> {
-        let tensors = read(bundle, file, |_| true)?;
+        let tensors = tensors(bundle, file, |_| true)?;
         Ok(Self { file: file.to_owned(), prefixes: |feature| vec![format!("{feature}.")], tensors })
     }
 
@@ -40,7 +37,7 @@ impl Statistics {
 
     /// Reads the buffers that older policies kept beside their weights; without any, it is empty.
     pub(super) fn of_weights(bundle: &Bundle, file: &str) -> Result<Self> {
-        let tensors = read(bundle, file, |name| {
+        let tensors = tensors(bundle, file, |name| {
             ["normalize_inputs.", "unnormalize_outputs."].iter().any(|p| name.starts_with(p))
         })?;
         let prefixes = |feature: &str| {
@@ -72,11 +69,6 @@ impl Statistics {
             )
         })?;
         let at = format!("{}: {}", self.file, printable(name));
-        let supported = matches!(tensor.values, Values::F32(_) | Values::F64(_) | Values::I64(_));
-        let values = tensor.values.to_f64().filter(|_| supported);
-        let values = values.with_context(|| {
-            format!("{at} is of type {}; use float32, float64 or int64", printable(tensor.values.type_name()))
-        })?;
         if tensor.shape != [feature.len] {
             return Err(Facts::contradiction(
                 &format!("length of {:?}", printable(&feature.name)),
@@ -84,27 +76,7 @@ impl Statistics {
                 (&at, &format!("the shape {:?}", tensor.shape)),
             ));
         }
-        let wrong = values.iter().position(|value| !(*value as f32).is_finite());
-        ensure!(
-            wrong.is_none(),
-            "{at}: value {} (the first is 0) is {}; give finite float32 numbers",
-            wrong.unwrap_or_default(),
-            wrong.map_or(0.0, |i| values[i])
-        );
+        let values = finite(tensor, &at)?;
         Ok((values, at))
     }
-}
-
-/// Reads the tensors with some names.
-fn read(bundle: &Bundle, file: &str, keep: impl Fn(&str) -> bool) -> Result<BTreeMap<String, Tensor>> {
-    let path = bundle.path(file)?;
-    let read = || -> Result<_> {
-        let bytes = fs::metadata(&path).context("cannot read the file")?.len();
-        ensure!(bytes <= MOST_BYTES, "it has {bytes} bytes, and at most {MOST_BYTES} are read");
-        let bytes = fs::read(&path).context("cannot read the file")?;
-        let tensors = TensorFile::new(&bytes).context("not a .safetensors file, or a truncated one")?;
-        let names = tensors.names().into_iter().filter(|name| keep(name));
-        Ok(names.filter_map(|name| Some((name.clone(), tensors.get(&name)?))).collect())
-    };
-    read().with_context(|| file.to_owned())
 }

@@ -3,7 +3,8 @@
 use actq::error::{Context as _, Result, ensure};
 use actq::text::printable;
 
-use super::super::common::{check_names, count};
+use super::super::common::{check_names, count, counts};
+use crate::bundle::beside;
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::yaml::Node;
@@ -131,16 +132,9 @@ impl<'a> Config<'a> {
     /// Returns the network's file: `model_name` beside the policy's config.yaml, with the ending .onnx.
     pub(super) fn model(&self) -> Result<(String, String)> {
         let name = self.need("model_name", "the name of a file", Node::text)?;
-        let folder = self.own.document.file.rsplit_once('/').map_or("", |(folder, _)| folder);
-        let file = if folder.is_empty() { name.to_owned() } else { format!("{folder}/{name}") };
+        let file = beside(&self.own.document.file, name);
         let stem = file.rsplit_once('.').map(|(stem, _)| stem);
         let stem = stem.with_context(|| format!("{}: {:?} has no ending", self.at("model_name"), printable(name)))?;
         Ok((format!("{stem}.onnx"), file))
     }
-}
-
-/// Reads a list of numbers of values or frames.
-pub(super) fn counts(node: &Node) -> Option<Vec<usize>> {
-    node.numbers()?;
-    node.items().iter().map(count).collect()
 }

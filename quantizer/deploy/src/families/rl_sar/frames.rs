@@ -2,8 +2,8 @@
 
 use actq::error::{Result, ensure};
 
-use super::super::common::Histories;
-use super::config::{Config, counts};
+use super::super::common::{Histories, counts};
+use super::config::Config;
 use crate::description::First;
 use crate::facts::Facts;
 

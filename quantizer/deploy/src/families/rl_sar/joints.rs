@@ -2,8 +2,8 @@
 
 use actq::error::{Result, bail, ensure};
 
-use super::super::common::Parts;
-use super::config::{Config, Section, counts};
+use super::super::common::{Parts, counts};
+use super::config::{Config, Section};
 use crate::description::{Gains, Op, Order, TargetKind};
 use crate::facts::Facts;
 
