@@ -124,6 +124,29 @@ fn both_files_together_need_no_order() -> Result<()> {
 }
 
 #[test]
+fn gains_of_zero_in_descriptors_are_no_gains() -> Result<()> {
+    let zero = |files: Files, both: bool| {
+        let files = files
+            .with("default_joint_stiffness: [25.0, 25.0, 30.0, 30.0]", "default_joint_stiffness: [0.0, 0.0, 0.0, 0.0]");
+        let damping = if both { "[0.0, 0.0, 0.0, 0.0]" } else { "[0.5, 0.0, 0.0, 0.0]" };
+        files.with("default_joint_damping: [0.5, 0.5, 0.5, 0.5]", &format!("default_joint_damping: {damping}"))
+    };
+    let description = zero(Files::descriptors(), true).reading("")?.description;
+    ensure!(description.gains.is_none(), "{:?}", description.gains);
+    let gains = zero(Files::both(), true).reading("raw.gait_phase = 2")?.description.gains.context("gains")?;
+    ensure!(gains.stiffness == [25.0, 25.0, 30.0, 30.0] && gains.damping == [0.5; 4], "{gains:?}");
+    // A joint with one gain of 0 has the other one.
+    let error = message(zero(Files::both(), false).reading("raw.gait_phase = 2"));
+    ensure!(error.contains("stiffness: the bundle contradicts itself"), "{error}");
+    let some = Files::both()
+        .with("default_joint_stiffness: [25.0, 25.0, 30.0, 30.0]", "default_joint_stiffness: [0.0, 25.0, 30.0, 30.0]")
+        .with("default_joint_damping: [0.5, 0.5, 0.5, 0.5]", "default_joint_damping: [0.0, 0.5, 0.5, 0.5]");
+    let gains = some.reading("raw.gait_phase = 2")?.description.gains.context("gains")?;
+    ensure!(gains.stiffness == [25.0, 25.0, 30.0, 30.0], "{gains:?}");
+    Ok(())
+}
+
+#[test]
 fn rules_are_questions_until_accepted() -> Result<()> {
     let keys = |files: &Files, accepted| -> Result<Vec<String>> {
         let reading = read(&files.made()?.bundle()?, accepted, Answers::default())?;

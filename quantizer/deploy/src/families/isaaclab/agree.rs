@@ -22,11 +22,19 @@ pub(super) fn with_descriptors(environment: &mut Policy, descriptors: &Policy) -
     same("default positions", &environment.default, &descriptors.default, F32)?;
     same("default velocities", &environment.default_velocity, &descriptors.default_velocity, F32)?;
     match (&mut environment.gains, &descriptors.gains) {
-        (Some([stiffness, damping]), Some([other_stiffness, other_damping])) => {
-            same("stiffness", stiffness, other_stiffness, F32)?;
-            same("damping", damping, other_damping, F32)?;
+        (Some(own), Some(other)) => {
+            let mut other = other.clone();
+            for place in 0..own[0].numbers.len().min(other[0].numbers.len()) {
+                // Joints whose actuators are computed outside of PhysX.
+                if other.iter().all(|gain| gain.numbers[place] == 0.0) {
+                    other.iter_mut().zip(&*own).for_each(|(gain, own)| gain.numbers[place] = own.numbers[place]);
+                }
+            }
+            same("stiffness", &own[0], &other[0], F32)?;
+            same("damping", &own[1], &other[1], F32)?;
         }
-        (own, other) => own.clone_from(other),
+        (Some(_), None) => {}
+        (own @ None, other) => own.clone_from(other),
     }
     of_actions(&environment.actions, &descriptors.actions)?;
     let total = environment.actions.iter().map(|action| action.joints.len()).sum();

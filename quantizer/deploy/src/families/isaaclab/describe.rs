@@ -53,7 +53,7 @@ impl Maker<'_> {
                 let joints = Some("robot".to_owned());
                 parts.gains(Gains { joints, stiffness: stiffness.numbers, damping: damping.numbers });
             }
-            None => self.facts.note("gains", "none: only the robot's USD file has them"),
+            None => self.facts.note("gains", "none: only the robot's USD file, or the code of its actuators, has them"),
         }
         Ok(parts.finish())
     }

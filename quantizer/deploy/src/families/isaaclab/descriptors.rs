@@ -49,10 +49,12 @@ pub(super) fn read(yaml: &Document, asset: &str, group: &str, joints: Joints) ->
     };
     let (default, default_velocity) = (of_joints("default_joint_pos")?, of_joints("default_joint_vel")?);
     let gains = [of_joints("default_joint_stiffness")?, of_joints("default_joint_damping")?];
+    // Actuators that are networks, and in later versions all that are computed outside of PhysX, have gains of 0 here.
+    let gains = gains.iter().any(|gain| gain.numbers.iter().any(|number| *number != 0.0)).then_some(gains);
     let actions = actions(yaml, &joints)?;
     let terms = terms(yaml, group, &joints, &actions)?;
     let decimation = yaml.number("scene.decimation")?;
-    Ok(Policy { rate, decimation, joints, default, default_velocity, gains: Some(gains), terms, actions })
+    Ok(Policy { rate, decimation, joints, default, default_velocity, gains, terms, actions })
 }
 
 fn rate(yaml: &Document) -> Result<Given> {
