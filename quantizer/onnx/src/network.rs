@@ -34,7 +34,8 @@ pub struct Choice {
     pub output: Option<String>,
     /// Inputs that hold recurrent state, with the outputs of their next values.
     pub states: Vec<(String, String)>,
-    /// `true` if the caller gives each input its value, also those that hold a state without a cell.
+    /// `true` if the caller gives each input its value in each step, and takes the values of the output one after the other.
+    /// An input may then hold a state without a cell, and the output's axes mean nothing.
     pub is_fed: bool,
 }
 
@@ -231,8 +232,12 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
         })
         .collect();
 
-    refuse_batch(model, &read, &act_shape)?;
-    let (chunk, act_len) = actions(&act_shape, open.len())?;
+    let (chunk, act_len) = if choice.is_fed {
+        (1, open.len())
+    } else {
+        refuse_batch(model, &read, &act_shape)?;
+        actions(&act_shape, open.len())?
+    };
     let (root, contract) = action::contract(&exprs, root, act_len);
     let last = contract.iter().flat_map(keys).collect();
     let (contract, bounded) = action::bounded(&exprs, root, contract, act_len);

@@ -35,7 +35,11 @@ impl Pipeline {
     pub(super) fn of(yaml: &Document, models: &[Model]) -> Result<Self> {
         let mut pipeline = Self { sources: BTreeMap::new(), outputs: Vec::new() };
         for (flow, is_feedback) in [("pipeline.data_flow", false), ("pipeline.feedback_flow", true)] {
-            for key in yaml.keys(flow) {
+            let keys = yaml.keys(flow);
+            if keys.is_empty() {
+                yaml.get(flow);
+            }
+            for key in keys {
                 let path = format!("{flow}.{key}");
                 let at = yaml.at(&path);
                 let from = port(key, models, outputs).with_context(|| at.clone())?;
