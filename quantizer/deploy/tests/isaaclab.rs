@@ -208,6 +208,41 @@ fn each_convention_changes_the_result() -> Result<()> {
 }
 
 #[test]
+fn the_agent_limits_the_action() -> Result<()> {
+    let with = |clip: &str| {
+        let mut files = Files::environment();
+        files
+            .texts
+            .push(("params/agent.yaml", format!("seed: 42\nclip_actions: {clip}\npolicy:\n  activation: elu\n")));
+        files
+    };
+    let own = answers(&JOINTS);
+    ensure!(differs(&with("null").run(&own)?, true).is_none(), "no limit");
+    ensure!(differs(&with("100.0").run(&own)?, true).is_none(), "a limit that no action reaches");
+    ensure!(
+        differs(&with("0.5").run(&format!("{own}clip_actions = false\n"))?, true).is_none(),
+        "the rule does not hold"
+    );
+    let ticks = with("0.5").run(&own)?;
+    for (tick, (observation, target)) in ticks.iter().enumerate() {
+        let action = isaaclab::network(observation, 4).into_iter().map(|action| action.clamp(-0.5, 0.5));
+        let action: Vec<f64> = action.collect();
+        // Scale and offset of FR_hip, whose limits are -2 and 0.3.
+        let expected = (0.25 * action[0] - 0.1).clamp(-2.0, 0.3);
+        ensure!((target[0] - expected).abs() < 1e-5, "tick {tick}: {target:?}, not {expected}");
+        if let Some((next, _)) = ticks.get(tick + 1) {
+            let fed_back = &next[next.len() - 6..next.len() - 2];
+            let same = fed_back.iter().zip(&action).all(|(a, b)| (a - b).abs() < 1e-5);
+            ensure!(same, "tick {tick}: {fed_back:?}, not {action:?}");
+        }
+    }
+    ensure!(differs(&ticks, true).is_some(), "the limit changes nothing");
+    let error = message(with("-1").reading(&own));
+    ensure!(error.contains("params/agent.yaml: clip_actions (line 2) must be a number above 0"), "{error}");
+    Ok(())
+}
+
+#[test]
 fn several_actions_become_several_targets() -> Result<()> {
     let legs = "  joint_pos:\n    class_type: isaaclab.envs.mdp.actions.joint_actions:JointPositionAction";
     let wheels = "  wheels:\n    class_type: isaaclab.envs.mdp.actions.joint_actions:JointVelocityAction\n    asset_name: robot\n    \

@@ -15,7 +15,7 @@ use crate::facts::Facts;
 use crate::yaml::{Data, Node};
 
 /// Stands for the policy's output until [`Parts::network`] knows its name.
-const ACTION: &str = "policy.ACTION";
+pub(super) const ACTION: &str = "policy.ACTION";
 
 /// How a family keeps histories.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,10 +13,10 @@ use actq_onnx::Signature;
 
 use self::describe::Maker;
 use self::environment::Environment;
-use self::model::{MODULES, Policy};
+use self::model::{Given, MODULES, Policy};
 use self::patterns::Joints;
-use super::common::{Graph, metadata_document, names};
-use crate::bundle::Bundle;
+use super::common::{ACTION, Graph, metadata_document, names};
+use crate::bundle::{Bundle, beside};
 use crate::description::Description;
 use crate::document::Document;
 use crate::facts::Facts;
@@ -116,6 +116,19 @@ impl Family for IsaacLab {
         if let Some(meta) = meta {
             agree::with_metadata(&policy, meta, environment.is_some())?;
         }
-        Maker { policy: &policy, graph: &graph, facts }.make(&signature)
+        let clip = environment.map(|yaml| action_clip(bundle, yaml)).transpose()?.flatten();
+        Maker { policy: &policy, graph: &graph, clip, action: ACTION, facts }.make(&signature)
     }
+}
+
+/// Returns the limit of the action in the `agent.yaml` that a training with RSL-RL stores beside its `env.yaml`.
+fn action_clip(bundle: &Bundle, environment: &Document) -> Result<Option<Given>> {
+    let file = beside(&environment.file, "agent.yaml");
+    if !bundle.has(&file) {
+        return Ok(None);
+    }
+    let yaml = Document::read(bundle, &file)?;
+    let limit = |node: &Node| node.number().filter(|limit| *limit > 0.0);
+    let limit = yaml.maybe("clip_actions", "a number above 0, or null", limit)?;
+    Ok(limit.map(|limit| Given { numbers: vec![limit], from: yaml.at("clip_actions") }))
 }

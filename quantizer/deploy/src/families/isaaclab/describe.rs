@@ -5,22 +5,28 @@ use std::collections::BTreeMap;
 use actq::error::{Result, ensure};
 use actq_onnx::Signature;
 
-use super::model::{Action, Kind, Policy, Term, What, parts_of};
+use super::model::{Action, Given, Kind, Policy, Term, What, parts_of};
 use crate::description::{Description, Gains, Network, Op, Operand, Order, TargetKind};
 use crate::facts::Facts;
-use crate::families::common::{Graph, Histories, Parts, given_gravity};
+use crate::families::common::{ACTION, Graph, Histories, Parts, given_gravity};
 
 /// Most values of a term that the application computes.
 const MOST: usize = 1 << 16;
 /// Recurrent inputs of the exporter of `isaaclab_rl`, and the outputs that they take.
 const RECURRENT: [(&str, &str); 2] = [("h_in", "h_out"), ("c_in", "c_out")];
 /// Names of values that this reader adds.
-const RESERVED: [&str; 5] = ["default", "observation", "processed", "target", "policy"];
+const RESERVED: [&str; 6] = [CLIPPED, "default", "observation", "processed", "target", "policy"];
+/// Name of the action within its limit.
+const CLIPPED: &str = "clipped_action";
 
 /// A description in the making.
 pub(super) struct Maker<'a> {
     pub(super) policy: &'a Policy,
     pub(super) graph: &'a Graph,
+    /// Limit of the action, which the training's wrapper of the environment applies.
+    pub(super) clip: Option<Given>,
+    /// Name of the action that is fed back and becomes targets.
+    pub(super) action: &'static str,
     pub(super) facts: &'a mut Facts,
 }
 
@@ -35,6 +41,7 @@ impl Maker<'_> {
         self.facts.note("default", policy.default.from.clone());
         self.raw_joints(&mut parts)?;
         self.check_actions()?;
+        self.clip_action(&mut parts)?;
         self.observe(&mut parts)?;
         let states = RECURRENT.iter().filter(|(input, _)| signature.inputs.iter().any(|(name, _)| name == input));
         let states: BTreeMap<String, String> =
@@ -99,6 +106,18 @@ impl Maker<'_> {
                     &format!("{} values", self.graph.actions),
                 ),
             ));
+        }
+        Ok(())
+    }
+
+    /// Adds the action within its limit, if it has one and the rule holds.
+    fn clip_action(&mut self, parts: &mut Parts) -> Result<()> {
+        let Some(limit) = self.clip.take() else { return Ok(()) };
+        if self.facts.get("clip_actions")? {
+            let limits = [-limit.numbers[0], limit.numbers[0]].map(Operand::Number);
+            parts.value(CLIPPED, ACTION, vec![Op::Clip(limits)]);
+            self.facts.note(CLIPPED, format!("{}; {}", limit.from, self.facts.source("clip_actions")));
+            self.action = CLIPPED;
         }
         Ok(())
     }
@@ -225,7 +244,7 @@ impl Maker<'_> {
             What::Joints(input, _) => {
                 parts.begin(&name, input);
                 let mut ops = self.select(&term.joints);
-                if !term.offset.is_empty() {
+                if term.offset.iter().any(|offset| *offset != 0.0) {
                     let is_default = *input == "joint_pos" && term.offset == self.policy.default.numbers;
                     let offset = if is_default { Operand::Name("default".to_owned()) } else { operand(&term.offset) };
                     ops.push(Op::Subtract(offset));
@@ -235,7 +254,7 @@ impl Maker<'_> {
             What::LastAction(places) => {
                 let which: Option<String> = self.facts.find("last_action")?;
                 also(self.facts, "last_action");
-                let next = if which.as_deref() == Some("processed") { "processed" } else { "policy.ACTION" };
+                let next = if which.as_deref() == Some("processed") { "processed" } else { self.action };
                 let ops = parts.state(&name, total, next);
                 let select = places.iter().map(|places| Op::Select(Order::Places(places.clone())));
                 ops.into_iter().chain(select).collect()
@@ -267,7 +286,7 @@ impl Maker<'_> {
             ops.extend(before);
             ops.extend([Op::Scale(operand(&action.scale)), Op::Add(operand(&action.offset))]);
             ops.extend(after);
-            parts.value(&processed, "policy.ACTION", ops);
+            parts.value(&processed, self.action, ops);
             self.facts.note(&processed, format!("{}; {}", action.from, self.facts.source("action.clip")));
             self.target(parts, action, &processed, &suffix);
             made.push(processed);
