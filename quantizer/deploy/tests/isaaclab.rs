@@ -243,6 +243,34 @@ fn the_agent_limits_the_action() -> Result<()> {
 }
 
 #[test]
+fn the_agent_names_the_group_of_observations() -> Result<()> {
+    let with = |groups: &str| {
+        let mut files = Files::environment().with("observations:\n  policy:\n", "observations:\n  proprio:\n");
+        files.texts.push(("params/agent.yaml", format!("clip_actions: null\nobs_groups: {groups}\n")));
+        files
+    };
+    let own = answers(&JOINTS);
+    for groups in ["{policy: [proprio], critic: [critic]}", "{actor: [proprio]}"] {
+        ensure!(differs(&with(groups).run(&own)?, true).is_none(), "{groups}");
+    }
+    let asked = with("{}").reading(&format!("{own}group = \"proprio\"\n"))?.questions;
+    ensure!(asked.is_empty(), "{asked:?}");
+    for (groups, expected) in [
+        ("{}", "params/env.yaml: observations.policy is missing; answer group"),
+        (
+            "{policy: [proprio, critic]}",
+            "obs_groups.policy: the policy reads 2 groups of observations (proprio, critic)",
+        ),
+        ("{policy: []}", "obs_groups.policy: the policy reads 0 groups"),
+        ("{policy: 3}", "obs_groups.policy (line 2) must be a list of texts"),
+    ] {
+        let error = message(with(groups).reading(&own));
+        ensure!(error.contains(expected), "{groups}: {error}");
+    }
+    Ok(())
+}
+
+#[test]
 fn several_actions_become_several_targets() -> Result<()> {
     let legs = "  joint_pos:\n    class_type: isaaclab.envs.mdp.actions.joint_actions:JointPositionAction";
     let wheels = "  wheels:\n    class_type: isaaclab.envs.mdp.actions.joint_actions:JointVelocityAction\n    asset_name: robot\n    \

@@ -1,5 +1,6 @@
 //! Isaac Lab: `IO_descriptors.yaml`, the `env.yaml` of a training, or both, beside `policy.onnx`.
 
+mod agent;
 mod agree;
 mod describe;
 mod descriptors;
@@ -11,12 +12,13 @@ mod values;
 use actq::error::{Context as _, Result, bail};
 use actq_onnx::Signature;
 
+use self::agent::Agent;
 use self::describe::Maker;
 use self::environment::Environment;
-use self::model::{Given, MODULES, Policy};
+use self::model::{MODULES, Policy};
 use self::patterns::Joints;
 use super::common::{ACTION, Graph, metadata_document, names};
-use crate::bundle::{Bundle, beside};
+use crate::bundle::Bundle;
 use crate::description::Description;
 use crate::document::Document;
 use crate::facts::Facts;
@@ -82,7 +84,14 @@ impl Family for IsaacLab {
         let (exported, environment) = (find(descriptors::is_one), find(environment::is_one));
         let meta = find(|document| document.look(JOINT_NAMES).is_some());
         let asset = facts.find("asset")?.unwrap_or_else(|| "robot".to_owned());
-        let group = facts.find("group")?.unwrap_or_else(|| "policy".to_owned());
+        let agent = environment.map(|yaml| Agent::beside(bundle, yaml)).transpose()?.unwrap_or_default();
+        let group = match &agent.group {
+            Some((group, at)) => {
+                facts.note("group", at.clone());
+                group.clone()
+            }
+            None => facts.find("group")?.unwrap_or_else(|| "policy".to_owned()),
+        };
 
         let mut orders = Vec::new();
         if let Some(yaml) = exported {
@@ -116,19 +125,6 @@ impl Family for IsaacLab {
         if let Some(meta) = meta {
             agree::with_metadata(&policy, meta, environment.is_some())?;
         }
-        let clip = environment.map(|yaml| action_clip(bundle, yaml)).transpose()?.flatten();
-        Maker { policy: &policy, graph: &graph, clip, action: ACTION, facts }.make(&signature)
+        Maker { policy: &policy, graph: &graph, clip: agent.clip, action: ACTION, facts }.make(&signature)
     }
-}
-
-/// Returns the limit of the action in the `agent.yaml` that a training with RSL-RL stores beside its `env.yaml`.
-fn action_clip(bundle: &Bundle, environment: &Document) -> Result<Option<Given>> {
-    let file = beside(&environment.file, "agent.yaml");
-    if !bundle.has(&file) {
-        return Ok(None);
-    }
-    let yaml = Document::read(bundle, &file)?;
-    let limit = |node: &Node| node.number().filter(|limit| *limit > 0.0);
-    let limit = yaml.maybe("clip_actions", "a number above 0, or null", limit)?;
-    Ok(limit.map(|limit| Given { numbers: vec![limit], from: yaml.at("clip_actions") }))
 }
