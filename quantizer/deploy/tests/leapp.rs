@@ -71,6 +71,26 @@ fn names_gains_and_states_are_described() -> Result<()> {
 }
 
 #[test]
+fn several_outputs_become_several_targets() -> Result<()> {
+    let files = Files::new()?
+        .with(
+            "    - name: last_action_out\n      dtype: float32\n",
+            "    - name: last_action_out\n      dtype: float32\n      kind: target/joint/velocity\n",
+        )?
+        .with("policy: [joint_pos, ", "policy: [last_action_out, joint_pos, ")?;
+    let description = files.reading(true, "")?.description;
+    let kinds: Vec<TargetKind> = description.targets.iter().map(|target| target.kind).collect();
+    ensure!(kinds == [TargetKind::Velocity, TargetKind::Position], "{kinds:?}");
+    ensure!(description.action == "action", "{}", description.action);
+    let ticks = files.run("")?;
+    ensure!(ticks.iter().all(|target| target.len() == 8), "{:?}", ticks[0]);
+    let positions: Vec<Vec<f64>> = ticks.into_iter().map(|target| target[4..].to_vec()).collect();
+    let differs = differs(&positions, 0.0, SMOOTH);
+    ensure!(differs.is_none(), "{differs:?}");
+    Ok(())
+}
+
+#[test]
 fn schema_1_4_says_the_same() -> Result<()> {
     let joints = |names: &str| {
         (
@@ -141,7 +161,7 @@ fn each_convention_changes_the_result() -> Result<()> {
 }
 
 #[test]
-fn inputs_of_one_name_are_told_apart_by_their_models() -> Result<()> {
+fn equal_names_get_their_models_as_prefix() -> Result<()> {
     // The policy's last input gets the name of an input of the other model; LEAPP's runtime finds ports by their places.
     let files = Files::new()?
         .with(
