@@ -71,7 +71,8 @@ fn commands(text: &str) -> impl Iterator<Item = Vec<&str>> {
 
 /// Checks the subcommands and options of `actq` against `docs/CLI.md`.
 fn check_actq(words: &[&str], reference: &str) -> Result<()> {
-    let is_name = |word: &&&str| word.bytes().all(|byte| byte.is_ascii_lowercase());
+    let is_name =
+        |word: &&&str| word.split('-').all(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_lowercase()));
     let path: Vec<&str> = words.iter().take_while(is_name).copied().collect();
     let (_, section) = reference.split_once(&format!("\n## {}\n", path.join(" "))).context("no such subcommand")?;
     let section = section.split("\n## ").next().unwrap_or(section);

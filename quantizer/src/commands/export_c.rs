@@ -1,7 +1,7 @@
 //! `actq export-c`
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use actq::data::{Dataset, Sizes};
 use actq::runtime::{ImageBuffer, with_head};
@@ -34,7 +34,7 @@ pub(crate) fn run(args: &ExportCArgs) -> Result<()> {
 }
 
 /// Runs the image from a reset on the first `steps` observations of a recording's first episode.
-fn replay(image: Image<'_>, recording: &PathBuf, steps: usize) -> Result<Golden> {
+fn replay(image: Image<'_>, recording: &Path, steps: usize) -> Result<Golden> {
     let recording = Dataset::load(recording, Sizes::of_image(&image))?;
     let mut golden = Golden { observations: Vec::new(), actions: Vec::new() };
     with_head::<_, anyhow::Error>(image, |head| {

@@ -141,7 +141,7 @@ fn licences(files: &mut Files<'_>) -> Result<Vec<Value>> {
     let tree = ["tree", "--package", "actq-capi", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
     let mut used: Vec<String> = output(&tree)?
         .lines()
-        .filter_map(|line| Some(line.split(' ').take(2).collect::<Vec<_>>().join(" ").replace(" v", " ")))
+        .map(|line| line.split(' ').take(2).collect::<Vec<_>>().join(" ").replace(" v", " "))
         .collect();
     used.sort();
     used.dedup();

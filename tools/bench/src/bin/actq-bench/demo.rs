@@ -25,8 +25,8 @@ use ndarray::Array3;
 use crate::trials::{Column, Firmware, closed_loop, folder, summary};
 use crate::{balancer, faults, heads, kernels};
 
-/// Limit of distillation steps: a quarter of the default of `actq quantize`, for a result within a minute.
-const STEPS: usize = 2000;
+/// Limit of distillation steps: an eighth of the default of `actq quantize`, for a result within half a minute.
+const STEPS: usize = 1000;
 
 /// The same for the flow, whose step evaluates the network five times; and the divisor of the episodes that it drives.
 const FLOW_STEPS: usize = 100;
@@ -156,11 +156,15 @@ impl Trial<'_> {
         } else {
             Recordings::load(&policy)?
         };
+        let mut prepared: Option<Quantizer<'_>> = None;
         for (name, options) in &self.images {
             println!("Quantizing to {name} with {}", options.method);
-            let quantizer = Quantizer::new(&policy, &recordings, options.method.clone(), None, |_| {})?;
+            // Images of one method share what does not depend on the budget.
+            let reused = prepared.take().filter(|quantizer| quantizer.method().method() == &options.method);
+            let new = || Quantizer::new(&policy, &recordings, options.method.clone(), None, |_| {});
+            let quantizer = prepared.insert(reused.map_or_else(new, Ok)?);
             let path = self.path(name);
-            let bytes = heads::write_image(&quantizer, options, &path)?;
+            let bytes = heads::write_image(quantizer, options, &path)?;
             let buffer = ImageBuffer::new(&bytes);
             let image = buffer.image(&path)?;
             println!("Closed loop at {name}, {episodes} episodes on the host");
