@@ -1,9 +1,9 @@
 //! The same bits as the kernels, for steps, slices and saved states.
 
 use actq_c::{
-    ACTQ_ABI, CCost, Code, Text, actq_abi, actq_begin, actq_image_cost, actq_image_name, actq_pass, actq_play,
-    actq_poll, actq_reset, actq_restore, actq_save, actq_saved_bytes, actq_seed, actq_self_test, actq_status_text,
-    actq_step,
+    ACTQ_ABI, ActqHead, ActqImage, CCost, CPort, Code, Sizes, Text, actq_abi, actq_begin, actq_image_cost,
+    actq_image_name, actq_pass, actq_play, actq_poll, actq_reset, actq_restore, actq_save, actq_saved_bytes, actq_seed,
+    actq_self_test, actq_status_text, actq_step,
 };
 use actq_kernels::{Head, HeadError, Image, ImageError, SavedError, StepError};
 use actq_testkit::Random;
@@ -130,4 +130,38 @@ fn every_error_of_the_kernels_has_a_code() {
     assert_eq!(Code::from(scratch) as i32, i32::from(scratch.code()));
     assert_eq!([text(127), text(-2), text(i32::MIN)], ["unknown status"; 3]);
     assert!(Code::ALL.iter().all(|code| text(*code as i32) == code.text().to_str().expect("text")));
+}
+
+/// Another layout, or another number, needs another `ACTQ_ABI`.
+#[cfg(target_pointer_width = "64")]
+#[test]
+fn structures_and_numbers_are_those_of_the_interfaces_version() {
+    let sizes = [
+        size_of::<ActqImage>(),
+        size_of::<ActqHead>(),
+        size_of::<Sizes>(),
+        size_of::<Text>(),
+        size_of::<CPort>(),
+        size_of::<CCost>(),
+    ];
+    assert_eq!((ACTQ_ABI, sizes), (1, [48, 320, 64, 16, 64, 24]));
+    let own: Vec<_> = Code::ALL.iter().filter(|code| !(1..128).contains(&(**code as i32))).copied().collect();
+    let numbers: Vec<i32> = own.iter().map(|code| *code as i32).collect();
+    assert_eq!(
+        (own, numbers),
+        (
+            vec![
+                Code::Ok,
+                Code::Pending,
+                Code::Null,
+                Code::Alignment,
+                Code::Length,
+                Code::NotInitialized,
+                Code::Overlap,
+                Code::Polling,
+                Code::NoSuchPort,
+            ],
+            vec![0, -1, 128, 129, 130, 131, 132, 133, 134],
+        )
+    );
 }

@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, ensure};
 use crate::qemu::{self, Counter, Region, Server};
 
 /// Evaluations before the counted one, so that the recurrent state differs from that after a reset.
-const WARM_UP: usize = 4;
+pub const WARM_UP: usize = 4;
 
 /// Serves `observations` from a reset with the harness at `elf` on a target's board under QEMU, with the image file at
 /// `slot` in the slot or the built-in image. Counts one step that evaluates the network; for a head with chunks, one

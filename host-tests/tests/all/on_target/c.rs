@@ -4,10 +4,12 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use actq::measure::eval;
+use actq::runtime::ImageBuffer;
 use actq_bench::capi::Core;
 use actq_bench::command::{actq, run, succeeded};
-use actq_bench::firmware;
-use actq_bench::{root, skipped, ur3};
+use actq_bench::qemu::Counter;
+use actq_bench::{Target, evaluation, firmware, root, skipped, ur3};
 use anyhow::{Context as _, Result, ensure};
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 use tempfile::TempDir;
@@ -24,11 +26,11 @@ fn listings(document: &str) -> Vec<&str> {
     document.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next()).collect()
 }
 
-#[test]
-fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
+/// A folder with the package, the examples and the built-in image as C source; `None`, with a note, without a compiler.
+fn folder() -> Result<Option<TempDir>> {
     if !is_installed("arm-none-eabi-gcc") {
         skipped("arm-none-eabi-gcc is not installed");
-        return Ok(());
+        return Ok(None);
     }
     let dir = TempDir::new()?;
     let at = |name: &str| dir.path().join(name);
@@ -38,16 +40,27 @@ fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
         let entry = entry?;
         fs::copy(entry.path(), at("c").join(entry.file_name()))?;
     }
-    let image = firmware::built_in()?;
-    let [image_text, recording, out] = [image, &ur3().join("heldout.npz"), &at("policy")].map(|path| text(path));
-    succeeded(&run(actq(&["export-c", &image_text, "--golden", &recording, "--out", &out]), b"")?)?;
+    let [image, recording, out] = [firmware::built_in()?, &ur3().join("heldout.npz"), &at("policy")].map(text);
+    succeeded(&run(actq(&["export-c", &image, "--golden", &recording, "--out", &out]), b"")?)?;
+    Ok(Some(dir))
+}
 
+/// Runs shell commands in a folder, and returns what they print.
+fn shell(dir: &TempDir, commands: &str) -> Result<String> {
+    let output = Command::new("sh").arg("-c").arg(commands).current_dir(dir.path()).output()?;
+    let printed = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+    ensure!(output.status.success(), "{printed}");
+    Ok(printed)
+}
+
+#[test]
+fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
+    let Some(dir) = folder()? else { return Ok(()) };
+    let at = |name: &str| dir.path().join(name);
     let document = fs::read_to_string(root().join("docs/C.md"))?;
     let listings = listings(&document);
     ensure!(listings.len() == 3, "three listings in docs/C.md");
-    let output = Command::new("sh").arg("-c").arg(listings.concat()).current_dir(dir.path()).output()?;
-    let printed = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
-    ensure!(output.status.success(), "{printed}");
+    let printed = shell(&dir, &listings.concat())?;
     let lines: Vec<&str> = printed.lines().collect();
     let replayed = "200 steps, half of them in slices; values that differ in bits from the host's: 0";
     ensure!(lines.len() == 3 && lines[..2] == [replayed; 2], "{printed}");
@@ -56,7 +69,7 @@ fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
     ensure!(lines[2].starts_with(start) && lines[2].ends_with(end), "{printed}");
     ensure!(document.contains(&format!("    {replayed}\n")), "docs/C.md shows another line");
 
-    let image_bytes = fs::metadata(image)?.len();
+    let image_bytes = fs::metadata(firmware::built_in()?)?.len();
     let code = code_bytes(&at("minimal.elf"))? - image_bytes;
     println!("{code} bytes of code beside the image");
     ensure!(code <= CODE_LIMIT, "{code} bytes of code, more than {CODE_LIMIT}");
@@ -65,6 +78,67 @@ fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
     let elf = object::File::parse(&*bytes)?;
     let names: Vec<&str> = elf.symbols().filter_map(|symbol| symbol.name().ok()).collect();
     ensure!(names.contains(&"actq_step") && !names.iter().any(|name| name.contains("panic")), "{names:?}");
+    Ok(())
+}
+
+/// A step in a counted region, as the harness has it.
+const COUNTED: &str = r#"
+#include "actq.h"
+#include "policy.h"
+static actq_image image;
+static actq_head head;
+static uint32_t scratch[POLICY_SCRATCH_WORDS];
+void actq_count_begin(void);
+void actq_count_end(void);
+/* Different, because equal functions may become one. */
+__attribute__((noinline)) void actq_count_begin(void) { __asm__ volatile("nop"); }
+__attribute__((noinline)) void actq_count_end(void) { __asm__ volatile("nop\n nop"); }
+int main(void) {
+    float action[POLICY_ACTION_LEN];
+    actq_status status = actq_image_open(&image, (const uint8_t *)policy_image, POLICY_IMAGE_BYTES);
+    status |= actq_head_init(&head, &image, scratch, POLICY_SCRATCH_WORDS);
+    for (unsigned step = 0; step < STEPS; step++) {
+        actq_count_begin();
+        status |= actq_step(&head, &policy_golden_observations[step * POLICY_OBSERVATION_LEN], POLICY_OBSERVATION_LEN,
+                            action, POLICY_ACTION_LEN);
+        actq_count_end();
+    }
+    return status;
+}
+"#;
+
+/// Instructions that a step takes more when it is called from C, at most: the check of pointers.
+const CALL_LIMIT: u64 = 200;
+
+#[test]
+fn a_step_from_c_costs_what_one_from_rust_does() -> Result<()> {
+    let Some(dir) = folder()? else { return Ok(()) };
+    let buffer = ImageBuffer::read(firmware::built_in()?)?;
+    let image = buffer.image(firmware::built_in()?)?;
+    let heldout = eval::heldout(&ur3(), &image)?;
+    let counter = Counter::build()?;
+    let harness = firmware::harness(Target::Fpu)?;
+    let rust = evaluation::count(&counter, Target::Fpu, &harness, None, &image, heldout.episode(0))?.instructions;
+
+    fs::write(dir.path().join("c/counted.c"), COUNTED)?;
+    let steps = evaluation::WARM_UP * image.execute() + 1;
+    let document = fs::read_to_string(root().join("docs/C.md"))?;
+    let build = format!(
+        "{}\narm-none-eabi-gcc $CORE $STRICT -std=c99 -DSTEPS={steps} $INCLUDE -c c/counted.c -o counted.o\n\
+         arm-none-eabi-gcc $CORE $LINK -T mps2-an386.ld counted.o $OBJECTS $LIBRARY -o counted.elf\n",
+        listings(&document).first().context("a listing")?
+    );
+    shell(&dir, &build)?;
+    let elf = dir.path().join("counted.elf");
+    let mut command = Target::Fpu.run(&elf);
+    counter.attach(&mut command, &elf)?;
+    let output = command.output()?;
+    ensure!(output.status.success(), "{output:?}");
+    let regions = counter.regions()?;
+    ensure!(regions.len() == steps, "{} regions", regions.len());
+    let c = regions.last().context("a region")?.instructions;
+    println!("a step that evaluates the network: {rust} instructions from Rust, {c} from C");
+    ensure!(c <= rust + CALL_LIMIT, "{c} instructions from C, {rust} from Rust");
     Ok(())
 }
 
