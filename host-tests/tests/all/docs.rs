@@ -9,10 +9,17 @@ use anyhow::{Context, Result, ensure};
 
 const GENERATED: &str = "<!-- Below, the help of every command. Do not edit; write it anew by\n     \
                          ACTQ_BLESS=1 cargo test --release -p actq-host-tests docs:: -->\n";
-const OTHERS: &[&str] =
-    &["README.md", "firmware-demo/README.md", "fuzz/README.md", "examples/ur3/README.md", "research/README.md"];
-/// Commands of cargo itself, and of cargo-fuzz.
-const CARGO: &[&str] = &["+nightly", "build", "check", "install", "run", "test"];
+const OTHERS: &[&str] = &[
+    "README.md",
+    "CONTRIBUTING.md",
+    "RELEASING.md",
+    "firmware-demo/README.md",
+    "fuzz/README.md",
+    "examples/ur3/README.md",
+    "research/README.md",
+];
+/// Commands of cargo itself, of cargo-fuzz and of cargo-semver-checks.
+const CARGO: &[&str] = &["+nightly", "build", "check", "install", "publish", "run", "semver-checks", "test"];
 
 fn read(path: &str) -> Result<String> {
     fs::read_to_string(root().join(path)).with_context(|| path.to_owned())
