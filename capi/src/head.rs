@@ -34,6 +34,9 @@ const _: () = assert!(size_of::<Running>() <= size_of::<ActqHead>() && align_of:
 impl Running {
     /// Requires that the caller's buffer shares no byte with this head and its scratch memory.
     fn apart_from<T>(&self, buffer: *const T, len: usize) -> Result<(), Code> {
+        if len > 0 {
+            check(buffer, len)?;
+        }
         let (from, words) = self.scratch;
         let buffer = addresses(buffer, len);
         apart(&[from..from + 4 * words, buffer.clone()])?;
@@ -45,7 +48,6 @@ impl Running {
         if len != self.head.image().act_len() {
             return Err(Code::Length);
         }
-        check(action, len)?;
         self.apart_from(action, len)
     }
 
@@ -55,6 +57,9 @@ impl Running {
     ///
     /// As [`slice`].
     unsafe fn observation<'b>(&self, observation: *const f32, len: usize) -> Result<&'b [f32], Code> {
+        if len != self.head.image().obs_len() {
+            return Err(Code::ObservationLength);
+        }
         self.apart_from(observation, len)?;
         // SAFETY: as the caller promises.
         unsafe { slice(observation, len) }
@@ -107,6 +112,7 @@ pub unsafe extern "C" fn actq_head_init(
         unsafe { slice_mut(head.cast::<usize>(), size_of::<ActqHead>() / size_of::<usize>()) }?.fill(0);
         // SAFETY: as the caller promises.
         let opened = unsafe { opened(image) }?;
+        check(scratch, words)?;
         apart(&[addresses(head, 1), addresses(image, 1), addresses(scratch, words), opened.bytes()])?;
         // SAFETY: as the caller promises.
         let new = Head::new(opened.image, unsafe { slice_mut(scratch, words) }?)?;
@@ -148,8 +154,8 @@ pub unsafe extern "C" fn actq_seed(head: *mut ActqHead, seed: u32) -> ActqStatus
 /// Computes the action for an observation. With action chunks it is the chunk's next action, and most steps do not run
 /// the network. The call counts as one control period.
 ///
-/// After an error of the observation or of the network (80 to 83) `action` is unchanged, the recurrent state and the
-/// chunk are reset, and the step limit holds from the last action.
+/// After an error of the observation's values or of the network (81 to 83, 90) `action` is unchanged, the recurrent
+/// state and the chunk are reset, and the step limit holds from the last action.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_step(
     head: *mut ActqHead,

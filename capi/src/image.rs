@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use actq_kernels::{Image, Port};
 
-use crate::memory::{addresses, apart, put, seal, slice, slice_mut};
+use crate::memory::{addresses, apart, check, put, seal, slice, slice_mut};
 use crate::status::{ActqStatus, Code, status};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTI");
@@ -126,9 +126,7 @@ pub unsafe extern "C" fn actq_image_open(image: *mut ActqImage, bytes: *const u8
     let open = || {
         // SAFETY: as the caller promises.
         unsafe { slice_mut(image.cast::<usize>(), size_of::<ActqImage>() / size_of::<usize>()) }?.fill(0);
-        if bytes.is_null() {
-            return Err(Code::Null);
-        }
+        check(bytes, len)?;
         apart(&[addresses(image, 1), addresses(bytes, len)])?;
         // SAFETY: as the caller promises.
         let checked = Image::new_checked(unsafe { slice(bytes, len) }?)?;

@@ -29,6 +29,7 @@ fn null_misaligned_and_short_buffers_are_errors() {
     let bytes = BYTES.0.as_ptr();
     let scratch = program.scratch.as_mut_ptr();
     let words = program.scratch.len();
+    let saved = BYTES.0.as_ptr().cast_mut();
     let mut other = Program::start();
     let other_head = other.head();
     gives! {
@@ -40,7 +41,8 @@ fn null_misaligned_and_short_buffers_are_errors() {
         actq_step(head.wrapping_byte_add(1), o, obs, a, act) => Alignment;
         actq_step(head, o, obs - 1, a, act) => ObservationLength;
         actq_step(head, o, 0, a, act) => ObservationLength;
-        actq_step(head, o, usize::MAX, a, act) => Overlap;
+        actq_step(head, o, usize::MAX, a, act) => ObservationLength;
+        actq_save(head, saved, usize::MAX) => Length;
         actq_step(head, o, obs, a, act - 1) => Length;
         actq_step(head, o, obs, a, act + 1) => Length;
         actq_poll(head, u32::MAX, a, act) => NotBegun;
