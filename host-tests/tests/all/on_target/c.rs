@@ -8,9 +8,14 @@ use actq::measure::eval;
 use actq::runtime::ImageBuffer;
 use actq_bench::capi::Core;
 use actq_bench::command::{actq, run, succeeded};
+use actq_bench::controller::Controller;
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware, root, skipped, ur3};
-use anyhow::{Context as _, Result, ensure};
+use actq_boards::Clock;
+use actq_client::port::Address;
+use actq_link::code::State;
+use actq_ur3::{ACT_DIM, OBS_DIM};
+use anyhow::{Context as _, Result, bail, ensure};
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 use tempfile::TempDir;
 
@@ -38,6 +43,9 @@ fn folder() -> Result<Option<TempDir>> {
     fs::create_dir(at("c"))?;
     for entry in fs::read_dir(root().join("examples/c"))? {
         let entry = entry?;
+        if !entry.file_type()?.is_file() {
+            continue;
+        }
         fs::copy(entry.path(), at("c").join(entry.file_name()))?;
     }
     let [image, recording, out] = [firmware::built_in()?, &ur3().join("heldout.npz"), &at("policy")].map(text);
@@ -151,4 +159,37 @@ fn code_bytes(elf: &Path) -> Result<u64> {
 
 fn text(path: &Path) -> String {
     path.display().to_string()
+}
+
+#[test]
+fn the_link_client_in_c_arms_a_controller_and_reads_its_actions() -> Result<()> {
+    const ACTIONS: usize = 20;
+    if !is_installed("cc") {
+        skipped("cc is not installed");
+        return Ok(());
+    }
+    let dir = TempDir::new()?;
+    let program = dir.path().join("link-client");
+    let sources = ["actq_link.c", "main.c"].map(|name| root().join("examples/c/link").join(name));
+    let strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"];
+    let built = Command::new("cc").args(strict).args(sources).arg("-o").arg(&program).output()?;
+    ensure!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+
+    let image = ImageBuffer::read(firmware::built_in()?)?;
+    let crc = image.image(firmware::built_in()?)?.crc();
+    let elf = firmware::controller(Target::Fpu, "")?;
+    let controller = Controller::start_by(Target::Fpu, &elf, None, Clock::Host)?;
+    let Address::Unix(socket) = controller.address() else { bail!("the port is no socket") };
+    let output = Command::new(&program).arg(&socket).arg(ACTIONS.to_string()).output()?;
+    ensure!(output.status.success(), "{output:?}");
+    let printed = String::from_utf8(output.stdout)?;
+    let start = format!("image {crc:08x}, {OBS_DIM} values, {ACT_DIM} axes: ");
+    ensure!(printed.starts_with(&start) && printed.ends_with("damaged frames: 0 here, 0 at the controller\n"), "{printed}");
+    let applied = printed[start.len()..].split(' ').next().context("a number")?;
+    ensure!(applied.parse::<usize>()? >= ACTIONS, "{printed}");
+    let status = controller.client()?.status()?;
+    ensure!(status.state == State::Disarmed && status.counters.damaged == 0, "{status:?}");
+    let usage = Command::new(&program).output()?;
+    ensure!(usage.status.code() == Some(2), "{usage:?}");
+    Ok(())
 }

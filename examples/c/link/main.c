@@ -1,0 +1,87 @@
+/* Arms a controller at a Unix socket, sends it observations until it has applied some actions, and disarms it.
+ *
+ * Usage: link-client SOCKET ACTIONS. A serial port differs only in how it is opened. */
+#define _POSIX_C_SOURCE 200809L
+
+#include "actq_link.h"
+
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+
+static uint32_t micros(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
+}
+
+static void put(int line, const uint8_t *wire, size_t length) {
+    for (ssize_t written; length > 0; wire += written, length -= (size_t)written) {
+        written = write(line, wire, length);
+        if (written <= 0) {
+            perror("the line");
+            exit(1);
+        }
+    }
+}
+
+int main(int count, char **arguments) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    if (count != 3 || strlen(arguments[1]) >= sizeof address.sun_path) {
+        fprintf(stderr, "usage: link-client SOCKET ACTIONS\n");
+        return 2;
+    }
+    strcpy(address.sun_path, arguments[1]);
+    const long wanted = strtol(arguments[2], NULL, 10);
+    const int line = socket(AF_UNIX, SOCK_STREAM, 0);
+    if (line < 0 || connect(line, (const struct sockaddr *)&address, sizeof address) != 0) {
+        perror(arguments[1]);
+        return 1;
+    }
+    static actq_link link;
+    static uint8_t wire[ACTQ_LINK_WIRE];
+    static float observation[ACTQ_LINK_PAYLOAD / 4];
+    actq_link_status status = {0};
+    long applied = 0;
+    actq_link_init(&link, micros() / 1000u);
+    /* Until the controller says that it is disarmed: what is sent last may be lost when a socket closes. */
+    while (applied < wanted || status.state == ACTQ_LINK_ARMED) {
+        if (applied >= wanted) {
+            put(line, wire, actq_link_disarm(&link, micros(), wire));
+        }
+        put(line, wire, actq_link_ask_status(&link, micros(), wire));
+        put(line, wire, actq_link_observation(&link, micros(), observation, status.observation, wire, NULL));
+        /* 20 ms for answers. */
+        struct pollfd ready = {.fd = line, .events = POLLIN};
+        for (const uint32_t begun = micros(); micros() - begun < 20000u;) {
+            uint8_t bytes[256];
+            const ssize_t length = poll(&ready, 1, 20) > 0 ? read(line, bytes, sizeof bytes) : 0;
+            for (ssize_t i = 0; i < length; i++) {
+                actq_link_message message;
+                if (!actq_link_push(&link, bytes[i], &message)) {
+                    continue;
+                }
+                uint32_t of;
+                int is_applied;
+                float action[32];
+                size_t values;
+                if (actq_link_read_action(&message, &of, &is_applied, action, 32, &values)) {
+                    applied += is_applied;
+                } else if (actq_link_read_status(&message, &status) && applied < wanted &&
+                           status.state != ACTQ_LINK_ARMED && status.refusal == 0) {
+                    put(line, wire, actq_link_arm(&link, micros(), status.token, wire));
+                }
+            }
+        }
+    }
+    printf("image %08x, %u values, %u axes: %ld actions applied; damaged frames: %u here, %u at the controller\n",
+           (unsigned)status.image, (unsigned)status.observation, (unsigned)status.axes, applied, (unsigned)link.damaged,
+           (unsigned)status.damaged);
+    close(line);
+    return 0;
+}
