@@ -1,24 +1,26 @@
 //! Published bundles against the references of their deploy code. They run where `ACTQ_SHARED` names the folder of the
 //! bundles.
 
-mod common;
+#[path = "common/made.rs"]
+mod made;
 
 use actq::error::{Result, ensure};
 use actq_deploy::{Answers, Bundle, Plan, Reference, Variant, explain, read, variants};
+use made::{agrees, shared};
 
 #[test]
 fn unitree_rl_lab_agrees_with_its_deploy_code() -> Result<()> {
-    common::agrees("unitree_lab_g1_velocity", "")
+    agrees("unitree_lab_g1_velocity", "expect.npz", "")
 }
 
 #[test]
 fn limx_agrees_with_its_deploy_code() -> Result<()> {
-    common::agrees("limx_tron1_pf_isaaclab", "")
+    agrees("limx_tron1_pf_isaaclab", "expect.npz", "")
 }
 
 /// Every convention, changed alone, is detected, and changing it back explains the difference.
 fn every_convention_is_explained(name: &str, without_effect: &[&str]) -> Result<()> {
-    let Some(folder) = common::shared(name) else { return Ok(()) };
+    let Some(folder) = shared(name) else { return Ok(()) };
     let bundle = Bundle::open(&folder.join("bundle"))?;
     let reading = read(&bundle, true, Answers::default())?;
     let reference = Reference::read(&folder.join("raw.npz"), &folder.join("expect.npz"))?;

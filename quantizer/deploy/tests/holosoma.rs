@@ -1,20 +1,20 @@
 //! Bundles of holosoma.
 
-mod common;
+#[path = "common/made.rs"]
+mod made;
 #[path = "common/onnx.rs"]
 mod onnx;
 
-use std::fs;
-
 use actq::error::{Result, ensure};
-use actq_deploy::{Answers, Bundle, Plan, Reading, read};
+use actq_deploy::Plan;
+use made::{Made, agrees, asked, refused};
 
 /// Answers for the Booster T1.
 const T1: &str = include_str!("holosoma.toml");
 
 #[test]
 fn holosoma_agrees_with_its_deploy_code() -> Result<()> {
-    common::agrees("holosoma_t1_fastsac", T1)
+    agrees("holosoma_t1_fastsac", "expect.npz", T1)
 }
 
 /// Answers for a robot with two joints.
@@ -31,42 +31,42 @@ const METADATA: [(&str, &str); 3] = [("dof_names", "[\"a\", \"b\"]"), ("kp", "[1
 /// Length of its observation.
 const LEN: usize = 3 * 2 + 3 + 3 + 3 + 4;
 
-fn reading(file: &[u8], accepted: bool, answers: &str) -> Result<(tempfile::TempDir, Bundle, Reading)> {
-    let folder = tempfile::tempdir()?;
-    fs::write(folder.path().join("policy.onnx"), file)?;
-    let bundle = Bundle::open(folder.path())?;
-    let reading = read(&bundle, accepted, Answers::parse(answers)?)?;
-    Ok((folder, bundle, reading))
+fn made(file: &[u8]) -> Result<Made> {
+    Made::of([("policy.onnx", file)])
 }
 
 #[test]
 fn another_robot_is_read() -> Result<()> {
-    let (_folder, bundle, found) = reading(&onnx::linear(LEN, 2, &METADATA), true, TWO)?;
+    let two = made(&onnx::linear(LEN, 2, &METADATA))?;
+    let found = two.reading(true, TWO)?;
     ensure!(found.questions.is_empty(), "{:#?}", found.questions);
-    let plan = Plan::new(&found.description, &bundle)?;
+    let plan = Plan::new(&found.description, &two.bundle()?)?;
     assert!(plan.inputs().iter().any(|(name, len)| name == "base_quat" && *len == 4));
 
     // An action of fewer joints is that of the last ones.
     let three = [("dof_names", "[a, b, c]"), ("kp", "[1, 2, 3]"), ("kd", "[1, 2, 3]")];
     let answers = TWO.replace("[0.1, 0.2]", "[0.1, 0.2, 0.3]");
-    let (_folder, bundle, found) = reading(&onnx::linear(LEN + 2, 2, &three), true, &answers)?;
+    let three = made(&onnx::linear(LEN + 2, 2, &three))?;
+    let found = three.reading(true, &answers)?;
     ensure!(found.questions.is_empty(), "{:#?}", found.questions);
-    Plan::new(&found.description, &bundle)?;
+    Plan::new(&found.description, &three.bundle()?)?;
     Ok(())
 }
 
 #[test]
 fn every_rule_is_a_question() -> Result<()> {
-    let file = onnx::linear(LEN, 2, &METADATA);
-    let asked = |accepted| -> Result<Vec<String>> {
-        let (.., found) = reading(&file, accepted, "")?;
-        let mut keys: Vec<String> = found.questions.into_iter().map(|question| question.key).collect();
-        keys.sort();
-        Ok(keys)
+    let made = made(&onnx::linear(LEN, 2, &METADATA))?;
+    let is_asked = |accepted, mut expected: Vec<&str>| -> Result<()> {
+        let reading = made.reading(accepted, "")?;
+        let mut found = asked(&reading);
+        found.sort_unstable();
+        expected.sort_unstable();
+        assert_eq!(found, expected);
+        Ok(())
     };
     let open =
         ["action_scale", "default", "gait_period", "gravity", "rate_hz", "scales.base_ang_vel", "scales.dof_vel"];
-    assert_eq!(asked(true)?, open);
+    is_asked(true, open.to_vec())?;
     let ruled = [
         "action.clip",
         "clock.standing_at",
@@ -79,14 +79,11 @@ fn every_rule_is_a_question() -> Result<()> {
         "scales.other",
         "terms",
     ];
-    let mut all: Vec<&str> = open.into_iter().chain(ruled).collect();
-    all.sort_unstable();
-    assert_eq!(asked(false)?, all);
-    Ok(())
+    is_asked(false, [&open[..], &ruled].concat())
 }
 
 #[test]
-fn bad_files_are_refused() {
+fn bad_files_are_refused() -> Result<()> {
     let with = |key: &str, value: &str| {
         let entries = METADATA.map(|(name, old)| (name, if name == key { value } else { old }));
         onnx::linear(LEN, 2, &entries)
@@ -109,8 +106,7 @@ fn bad_files_are_refused() {
         ("a text", with("", ""), TWO.replace("= 0.25\ngravity", "= \"much\"\ngravity"), "answer action_scale"),
     ];
     for (name, file, answers, expected) in cases {
-        let error = reading(&file, true, &answers)
-            .map_or_else(|error| format!("{error:#}"), |(.., found)| format!("accepted: {:?}", found.questions));
-        assert!(error.contains(expected), "{name}: {error}");
+        refused(name, made(&file)?.reading(true, &answers), expected)?;
     }
+    Ok(())
 }

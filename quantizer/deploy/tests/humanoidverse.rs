@@ -1,32 +1,28 @@
 //! Bundles of humanoidverse's sim2real code: FALCON and ASAP.
 
-mod common;
+#[path = "common/made.rs"]
+mod made;
 #[path = "common/onnx.rs"]
 mod onnx;
 
-use std::fs;
-use std::path::Path;
-
 use actq::error::{Context as _, Result, ensure};
-use actq_deploy::{Answers, Bundle, Plan, Reading, Runner, read};
+use actq_deploy::{Answers, Bundle, Plan, Runner, read};
+use made::{Made, agrees, asked, refused, shared};
 
 const ANSWERS: &str = "action_scale = 0.25\nrate_hz = 50\n";
 
 #[test]
 fn falcon_agrees_with_its_deploy_code() -> Result<()> {
-    common::agrees("falcon_g1", ANSWERS)
+    agrees("falcon_g1", "expect.npz", ANSWERS)
 }
 
 #[test]
 fn every_rule_of_falcon_is_a_question() -> Result<()> {
-    let Some(folder) = common::shared("falcon_g1") else { return Ok(()) };
+    let Some(folder) = shared("falcon_g1") else { return Ok(()) };
     let bundle = Bundle::open(&folder.join("bundle"))?;
-    let asked = |accepted| -> Result<Vec<String>> {
-        let reading = read(&bundle, accepted, Answers::default())?;
-        Ok(reading.questions.into_iter().map(|question| question.key).collect())
-    };
-    let mut all = asked(false)?;
-    all.sort();
+    let unanswered = read(&bundle, false, Answers::default())?;
+    let mut all = asked(&unanswered);
+    all.sort_unstable();
     let expected = [
         "action.clip",
         "action_scale",
@@ -42,7 +38,8 @@ fn every_rule_of_falcon_is_a_question() -> Result<()> {
         "terms.order",
     ];
     assert_eq!(all, expected);
-    assert_eq!(asked(true)?, ["rate_hz", "action_scale"], "what differs between policies");
+    let accepted = read(&bundle, true, Answers::default())?;
+    assert_eq!(asked(&accepted), ["rate_hz", "action_scale"], "what differs between policies");
     Ok(())
 }
 
@@ -78,18 +75,11 @@ mimic_models: {jump: model.onnx, kick: model.onnx}
 motion_length_s: {jump: 2.0, kick: 3.0}
 ";
 
-/// Reads a bundle of a YAML file and networks.
-fn reading(yaml: &str, networks: &[(&str, Vec<u8>)], answers: &str) -> Result<(tempfile::TempDir, Bundle, Reading)> {
-    let folder = tempfile::tempdir()?;
-    fs::write(folder.path().join("robot.yaml"), yaml)?;
-    for (file, bytes) in networks {
-        let path = folder.path().join(file);
-        fs::create_dir_all(path.parent().unwrap_or(Path::new("")))?;
-        fs::write(path, bytes)?;
-    }
-    let bundle = Bundle::open(folder.path())?;
-    let reading = read(&bundle, true, Answers::parse(answers)?)?;
-    Ok((folder, bundle, reading))
+/// Makes a bundle of a YAML file and networks.
+fn made(yaml: &str, networks: &[(&str, Vec<u8>)]) -> Result<Made> {
+    let made = Made::of(networks.iter().map(|(file, bytes)| (*file, bytes)))?;
+    made.write("robot.yaml", yaml.as_bytes())?;
+    Ok(made)
 }
 
 /// Values of ticks: the observation and the target.
@@ -97,10 +87,11 @@ type Ticks = Vec<(Vec<f64>, Vec<f64>)>;
 
 /// Runs a bundle; each raw value is `raw(name, tick)`.
 fn run(yaml: &str, network: (&str, Vec<u8>), raw: fn(&str, usize) -> Vec<f64>, ticks: usize) -> Result<Ticks> {
-    let (_folder, bundle, reading) = reading(yaml, &[network], ANSWERS)?;
+    let made = made(yaml, &[network])?;
+    let reading = made.reading(true, ANSWERS)?;
     ensure!(reading.questions.is_empty(), "{:#?}", reading.questions);
     ensure!(reading.unread.is_empty(), "{:#?}", reading.unread);
-    let mut runner = Runner::new(Plan::new(&reading.description, &bundle)?);
+    let mut runner = Runner::new(Plan::new(&reading.description, &made.bundle()?)?);
     let names: Vec<String> = runner.plan().inputs().iter().map(|(name, _)| name.clone()).collect();
     let mut all = Vec::new();
     for tick in 0..ticks {
@@ -162,7 +153,7 @@ fn asap_reads_past_frames_newest_first() -> Result<()> {
 }
 
 #[test]
-fn bad_files_are_refused() {
+fn bad_files_are_refused() -> Result<()> {
     let falcon = || format!("{ROBOT}{FALCON}");
     let policy = || vec![("policy.onnx", onnx::linear(14, 2, &[]))];
     let cases = [
@@ -189,23 +180,23 @@ fn bad_files_are_refused() {
         ("a longer action", falcon(), vec![("policy.onnx", onnx::linear(14, 4, &[]))], "contradicts itself"),
     ];
     for (name, yaml, networks, expected) in cases {
-        let error = reading(&yaml, &networks, ANSWERS)
-            .map_or_else(|error| format!("{error:#}"), |(.., reading)| format!("accepted: {:?}", reading.questions));
-        assert!(error.contains(expected), "{name}: {error}");
+        refused(name, made(&yaml, &networks)?.reading(true, ANSWERS), expected)?;
     }
+    Ok(())
 }
 
 #[test]
 fn what_nothing_states_is_a_question() -> Result<()> {
     let unknown = format!("{ROBOT}{FALCON}").replace("cos_phase", "dif_pose");
     let policy = || ("policy.onnx", onnx::linear(14, 2, &[]));
-    let (.., found) = reading(&unknown, &[policy()], ANSWERS)?;
-    assert_eq!(found.questions.iter().map(|question| &question.key).collect::<Vec<_>>(), ["raw.dif_pose"]);
     let moved = format!("{ROBOT}{FALCON}JOINT2MOTOR: [1, 0, 2]\n");
-    let (.., found) = reading(&moved, &[policy()], ANSWERS)?;
-    assert_eq!(found.questions.iter().map(|question| &question.key).collect::<Vec<_>>(), ["raw.joints"]);
-    let several = [policy(), ("other.onnx", onnx::linear(14, 2, &[]))];
-    let (.., found) = reading(&format!("{ROBOT}{FALCON}"), &several, ANSWERS)?;
-    assert_eq!(found.questions.iter().map(|question| &question.key).collect::<Vec<_>>(), ["network"]);
+    let several = vec![policy(), ("other.onnx", onnx::linear(14, 2, &[]))];
+    for (yaml, networks, expected) in [
+        (unknown, vec![policy()], "raw.dif_pose"),
+        (moved, vec![policy()], "raw.joints"),
+        (format!("{ROBOT}{FALCON}"), several, "network"),
+    ] {
+        assert_eq!(asked(&made(&yaml, &networks)?.reading(true, ANSWERS)?), [expected]);
+    }
     Ok(())
 }

@@ -2,11 +2,13 @@
 
 #[path = "common/made.rs"]
 mod made;
+#[path = "common/onnx.rs"]
+mod onnx;
 
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::description::TargetKind;
 use actq_deploy::{Answers, Bundle, read};
-use made::{Made, Onnx, agrees, message, shared};
+use made::{Made, agrees, asked, message, refused, shared};
 
 const NAME: &str = "kinfer_zbot_walking";
 
@@ -26,7 +28,7 @@ fn rules_are_questions_until_accepted() -> Result<()> {
     let Some(folder) = shared(NAME) else { return Ok(()) };
     let bundle = Bundle::open(&folder.join("bundle"))?;
     let reading = read(&bundle, false, Answers::default())?;
-    let asked: Vec<&str> = reading.questions.iter().map(|question| question.key.as_str()).collect();
+    let asked = asked(&reading);
     for key in [
         "clock",
         "default_pose",
@@ -66,23 +68,18 @@ fn json(from: &str, to: &str) -> String {
 }
 
 fn files(xml: &str, json: &str) -> Result<Made> {
-    let made = Made::new()?;
+    let inputs = [("t.1", 1), ("dof_pos.1", 3), ("prev_actions.1", 3), ("buffer.1", 12)];
+    let outputs = [("actions_raw", 3), ("actions", 3), ("x.5", 12)];
+    let made = Made::of([("policy.kinfer", onnx::graph(&[], &[], &inputs, &outputs, &[("kinfer_metadata", json)]))])?;
     if !xml.is_empty() {
         made.write("robot.xml", xml.as_bytes())?;
     }
-    let onnx = Onnx {
-        inputs: &[("t.1", 1), ("dof_pos.1", 3), ("prev_actions.1", 3), ("buffer.1", 12)],
-        outputs: &[("actions_raw", 3), ("actions", 3), ("x.5", 12)],
-        metadata: &[("kinfer_metadata", json)],
-    };
-    made.write("policy.kinfer", &onnx.bytes())?;
     Ok(made)
 }
 
 #[test]
 fn other_robots_are_read_by_their_own_files() -> Result<()> {
-    let made = files(XML, &json("", "").replace("0.005", "0.0025"))?;
-    let reading = read(&made.bundle()?, true, Answers::default())?;
+    let reading = files(XML, &json("", "").replace("0.005", "0.0025"))?.reading(true, "")?;
     let description = &reading.description;
     ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
     ensure!(description.rate_hz == 100.0, "{}", description.rate_hz);
@@ -98,11 +95,11 @@ fn other_robots_are_read_by_their_own_files() -> Result<()> {
 
 #[test]
 fn missing_files_become_questions() -> Result<()> {
-    let reading = read(&files("", &json("", ""))?.bundle()?, true, Answers::default())?;
-    let asked: Vec<&str> = reading.questions.iter().map(|question| question.key.as_str()).collect();
-    ensure!(asked == ["joints.names", "default_pose"], "{asked:?}");
+    let files = files("", &json("", ""))?;
+    let reading = files.reading(true, "")?;
+    ensure!(asked(&reading) == ["joints.names", "default_pose"], "{:?}", reading.questions);
     let answers = "joints.names = [\"a\", \"b\", \"c\"]\ndefault_pose = [1, 2, 3]\n";
-    let reading = read(&files("", &json("", ""))?.bundle()?, true, Answers::parse(answers)?)?;
+    let reading = files.reading(true, answers)?;
     ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
     ensure!(reading.description.constants["default"] == [1.0, 2.0, 3.0], "{:?}", reading.description.constants);
     Ok(())
@@ -136,16 +133,11 @@ fn bad_bundles_are_refused() -> Result<()> {
         ("a number", XML.to_owned(), "3".to_owned(), "JSON object"),
     ];
     for (name, xml, json, expected) in cases {
-        let made = files(&xml, &json)?;
-        let error = message(read(&made.bundle()?, true, Answers::default()));
-        ensure!(error.contains(expected), "{name}: {error}");
+        refused(name, files(&xml, &json)?.reading(true, ""), expected)?;
     }
     let deep = format!("<mujoco><worldbody>{}{}</worldbody></mujoco>", "<body>".repeat(2000), "</body>".repeat(2000));
-    let error = message(read(&files(&deep, &json("", ""))?.bundle()?, true, Answers::default()));
+    let error = message(files(&deep, &json("", ""))?.reading(true, ""));
     ensure!(error.contains("levels") || error.contains("not XML"), "{error}");
-    let made = Made::new()?;
-    made.write("policy.kinfer", b"\x1f\x8b\x08 a tar file")?;
-    let error = message(read(&made.bundle()?, true, Answers::default()));
-    ensure!(error.contains("policy.kinfer"), "{error}");
-    Ok(())
+    let tar = Made::of([("policy.kinfer", b"\x1f\x8b\x08 a tar file")])?;
+    refused("a tar file", tar.reading(true, ""), "policy.kinfer")
 }

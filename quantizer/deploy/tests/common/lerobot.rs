@@ -264,15 +264,11 @@ impl Files {
     }
 
     pub(crate) fn made(&self) -> Result<Made> {
-        let made = Made::new()?;
-        for (name, bytes) in &self.0 {
-            made.write(name, bytes)?;
-        }
-        Ok(made)
+        Made::of(&self.0)
     }
 
     pub(crate) fn reading(&self, accepted: bool, answers: &str) -> Result<Reading> {
-        read(&self.made()?.bundle()?, accepted, Answers::parse(answers)?)
+        self.made()?.reading(accepted, answers)
     }
 
     /// Returns the keys of the questions.

@@ -1,10 +1,11 @@
-//! Bundles that tests write, and published ones with any of their references.
+//! Bundles that tests write, and published ones, which are in the folder that `ACTQ_SHARED` names.
 #![allow(dead_code, reason = "each test uses some of it")]
 
 use std::fs;
 use std::path::PathBuf;
 
 use actq::error::{Result, ensure};
+use actq_deploy::description::Description;
 use actq_deploy::{Answers, Bundle, Plan, Reading, Reference, read};
 use tempfile::TempDir;
 
@@ -24,15 +25,21 @@ pub(crate) fn shared(name: &str) -> Option<PathBuf> {
     shared_file(&format!("bundles/{name}"))
 }
 
-/// Reads a published bundle with its family's profile, and compares it with a reference.
+/// Asserts that a published bundle agrees with a reference, with the family's profile accepted.
 pub(crate) fn agrees(name: &str, expect: &str, answers: &str) -> Result<()> {
     let Some(folder) = shared(name) else { return Ok(()) };
     let bundle = Bundle::open(&folder.join("bundle"))?;
     let reading = read(&bundle, true, Answers::parse(answers)?)?;
     ensure!(reading.questions.is_empty(), "{name}: {:#?}", reading.questions);
+    let text = reading.description.to_toml(&reading.sources)?;
+    ensure!(
+        Description::parse(&text)? == reading.description,
+        "{name}: deploy.toml does not keep the description: {text}"
+    );
     let reference = Reference::read(&folder.join("raw.npz"), &folder.join(expect))?;
     let comparison = reference.compare(Plan::new(&reading.description, &bundle)?)?;
     println!("{name}, {expect}: {:?}, unread {:?}", comparison.largest, reading.unread);
+    ensure!(reading.unread.is_empty(), "{name}: nothing reads {:?}", reading.unread);
     comparison.require_equal()
 }
 
@@ -41,12 +48,33 @@ pub(crate) fn message(result: Result<Reading>) -> String {
     result.map_or_else(|error| format!("{error:#}"), |reading| format!("accepted: {:?}", reading.description))
 }
 
+/// Asserts that a bundle was refused with a message that contains `expected`; `name` tells what is wrong with it.
+pub(crate) fn refused(name: &str, result: Result<Reading>, expected: &str) -> Result<()> {
+    let error = message(result);
+    ensure!(error.contains(expected), "{name}: {error}");
+    Ok(())
+}
+
+/// Returns the keys of the questions.
+pub(crate) fn asked(reading: &Reading) -> Vec<&str> {
+    reading.questions.iter().map(|question| question.key.as_str()).collect()
+}
+
 /// A bundle that a test writes.
 pub(crate) struct Made(TempDir);
 
 impl Made {
     pub(crate) fn new() -> Result<Self> {
         Ok(Self(TempDir::new()?))
+    }
+
+    /// Writes files by name.
+    pub(crate) fn of<N: AsRef<str>, B: AsRef<[u8]>>(files: impl IntoIterator<Item = (N, B)>) -> Result<Self> {
+        let made = Self::new()?;
+        for (name, bytes) in files {
+            made.write(name.as_ref(), bytes.as_ref())?;
+        }
+        Ok(made)
     }
 
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
@@ -60,49 +88,8 @@ impl Made {
     pub(crate) fn bundle(&self) -> Result<Bundle> {
         Bundle::open(self.0.path())
     }
-}
 
-/// An ONNX file without operators: inputs and outputs with their lengths, and metadata.
-pub(crate) struct Onnx<'a> {
-    pub(crate) inputs: &'a [(&'a str, usize)],
-    pub(crate) outputs: &'a [(&'a str, usize)],
-    pub(crate) metadata: &'a [(&'a str, &'a str)],
-}
-
-impl Onnx<'_> {
-    /// Returns the file.
-    pub(crate) fn bytes(&self) -> Vec<u8> {
-        let mut graph = Vec::new();
-        for (tag, ports) in [(11, self.inputs), (12, self.outputs)] {
-            for (name, len) in ports {
-                let axis = field(1, &[vec![8], varint(*len)].concat());
-                let tensor = [vec![8, 1], field(2, &axis)].concat();
-                graph.extend(field(tag, &[field(1, name.as_bytes()), field(2, &field(1, &tensor))].concat()));
-            }
-        }
-        appended([field(7, &graph), field(8, &[16, 17])].concat(), self.metadata)
+    pub(crate) fn reading(&self, accepted: bool, answers: &str) -> Result<Reading> {
+        read(&self.bundle()?, accepted, Answers::parse(answers)?)
     }
-}
-
-/// Appends metadata to an ONNX file.
-pub(crate) fn appended(mut onnx: Vec<u8>, metadata: &[(&str, &str)]) -> Vec<u8> {
-    for (key, value) in metadata {
-        onnx.extend(field(14, &[field(1, key.as_bytes()), field(2, value.as_bytes())].concat()));
-    }
-    onnx
-}
-
-/// Encodes a field of protobuf that has a length.
-fn field(tag: usize, content: &[u8]) -> Vec<u8> {
-    [varint(tag << 3 | 2), varint(content.len()), content.to_vec()].concat()
-}
-
-fn varint(mut number: usize) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    while number > 127 {
-        bytes.push(number as u8 | 128);
-        number >>= 7;
-    }
-    bytes.push(number as u8);
-    bytes
 }

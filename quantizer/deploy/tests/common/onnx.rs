@@ -61,7 +61,11 @@ pub(crate) fn shaped(
     graph.extend(inputs.iter().flat_map(|(name, shape)| field(11, &port(name, shape))));
     graph.extend(outputs.iter().flat_map(|(name, shape)| field(12, &port(name, shape))));
     let opset = [field(1, b""), number(2, 13)];
-    let mut model = [number(1, 8), field(7, &graph), field(8, &opset.concat())].concat();
+    with_metadata([number(1, 8), field(7, &graph), field(8, &opset.concat())].concat(), metadata)
+}
+
+/// Appends metadata to a file.
+pub(crate) fn with_metadata(mut model: Vec<u8>, metadata: &[(&str, &str)]) -> Vec<u8> {
     for (key, value) in metadata {
         model.extend(field(14, &[field(1, key.as_bytes()), field(2, value.as_bytes())].concat()));
     }
