@@ -11,6 +11,30 @@ pub fn main() {
     std::process::exit(1);
 }
 
+/// Declares a program whose code is measured, and which is not run: it calls a function of an image, scratch memory and
+/// an observation, without text or host.
+#[macro_export]
+macro_rules! measured {
+    ($run:ident) => {
+        #[panic_handler]
+        fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+            loop {
+                cortex_m::asm::wfi();
+            }
+        }
+
+        #[cortex_m_rt::entry]
+        fn main() -> ! {
+            use core::hint::black_box;
+            let mut scratch = [0u32; 256];
+            loop {
+                // The compiler cannot remove what it cannot see through.
+                black_box($run(black_box(&[]), black_box(&mut scratch), black_box(&[])));
+            }
+        }
+    };
+}
+
 /// Returns a generator of pseudorandom words, the same in every run (Marsaglia's xorshift32).
 pub fn random_words() -> impl FnMut() -> u32 {
     let mut seed = 0x1234_5678u32;

@@ -7,25 +7,9 @@ use actq_firmware_bench::main;
 
 #[cfg(target_os = "none")]
 mod firmware {
-    use core::hint::black_box;
-
     use actq_kernels::{Head, Image};
 
-    #[panic_handler]
-    fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-        loop {
-            cortex_m::asm::wfi();
-        }
-    }
-
-    #[cortex_m_rt::entry]
-    fn main() -> ! {
-        let mut scratch = [0u32; 256];
-        loop {
-            // The compiler cannot remove what it cannot see through.
-            black_box(run(black_box(&[]), black_box(&mut scratch), black_box(&[])));
-        }
-    }
+    actq_firmware_bench::measured!(run);
 
     /// Makes all calls of an application that does not split its steps.
     fn run(image: &[u8], scratch: &mut [u32], observation: &[f32]) -> Option<f32> {
