@@ -17,8 +17,9 @@ use actq_kernels::pace::cost::Cost;
 use anyhow::{Context as _, Result, ensure};
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SectionKind, SymbolKind};
 
-use crate::instruction::{Class, Instruction, Kind, REFILL, branch_target};
+use crate::instruction::{Class, Instruction, Kind, REFILL};
 use crate::qemu::Region;
+use crate::stack::step::Step;
 
 /// Bytes per line of the STM32F4's flash.
 const LINE: u64 = 16;
@@ -150,10 +151,11 @@ impl Code {
         while address < function.address + function.size {
             let instruction = self.instruction(address)?;
             let (first, second) = (self.half(address).unwrap_or(0), self.half(address + 2).unwrap_or(0));
-            if let Some(target) = branch_target(address, first, second)
-                && (function.address..=address).contains(&target)
+            // CBZ, too, but it only goes forward.
+            if let Step::Conditional { to, .. } = Step::decode(u32::try_from(address)?, first, second)
+                && (function.address..=address).contains(&to.into())
             {
-                loops.push((target - function.address, address - function.address + instruction.size));
+                loops.push((u64::from(to) - function.address, address - function.address + instruction.size));
             }
             address += instruction.size;
         }

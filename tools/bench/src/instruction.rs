@@ -328,23 +328,6 @@ impl Instruction {
     }
 }
 
-/// Returns the target of a conditional branch (B<cond>, not CBZ, which only goes forward) at `address`.
-pub(crate) fn branch_target(address: u64, first: u16, second: u16) -> Option<u64> {
-    if Instruction::decode(first, second).class != Class::Conditional {
-        return None;
-    }
-    let sign_extend = |value: u32, bits: u32| i64::from((value << (32 - bits)) as i32 >> (32 - bits));
-    let offset = match first >> 12 {
-        0xd => sign_extend(bits(first, 7, 0) << 1, 9),
-        0xf => {
-            let high = bits(first, 10, 10) << 20 | bits(second, 11, 11) << 19 | bits(second, 13, 13) << 18;
-            sign_extend(high | bits(first, 5, 0) << 12 | bits(second, 10, 0) << 1, 21)
-        }
-        _ => return None,
-    };
-    (address + 4).checked_add_signed(offset)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -448,14 +431,5 @@ mod tests {
         let multiply = ldr([0xee24, 0x4a80]); // vmul.f32 s8, s9, s0
         let add = ldr([0xee38, 0x4a04]); // vadd.f32 s8, s16, s8
         assert_eq!((add.cycles(), add.cycles_after(&multiply)), (1, 2));
-    }
-
-    #[test]
-    fn branch_targets_follow_the_encoding() {
-        assert_eq!(branch_target(0x100, 0xd0fe, 0), Some(0x100)); // beq.n to itself
-        assert_eq!(branch_target(0x100, 0xd1f7, 0), Some(0xf2)); // bne.n
-        assert_eq!(branch_target(0x100, 0xf47f, 0xaffd), Some(0xfe)); // bne.w
-        assert_eq!(branch_target(0x1000, 0xf47f, 0xae00), Some(0xc04)); // bne.w, 1020 bytes back
-        assert_eq!(branch_target(0x100, 0xe7f7, 0), None); // b.n
     }
 }

@@ -10,12 +10,11 @@
 //! use, and one more to align them (Arm DDI 0403E, section B1.5.6; no board here stacks the FPU's upper half, as
 //! FPCCR.TS requests). The worst case is the deepest path of the program and, for every priority, that of its deepest
 //! handler, each with such a frame.
-//! its deepest handler, each with such a frame.
 
 mod depth;
 mod flow;
 mod program;
-mod step;
+pub(crate) mod step;
 #[cfg(test)]
 mod tests;
 

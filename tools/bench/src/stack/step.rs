@@ -10,7 +10,7 @@ const PC: u32 = 15;
 
 /// The effect of an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Step {
+pub(crate) enum Step {
     /// No effect: continues at the next instruction.
     Next,
     /// The stack grows by this many bytes; a negative number shrinks it.
@@ -58,7 +58,7 @@ fn words(count: u32) -> i32 {
 
 impl Step {
     /// Decodes the instruction at `address`, from its first halfword and the next one.
-    pub(super) fn decode(address: u32, first: u16, second: u16) -> Self {
+    pub(crate) fn decode(address: u32, first: u16, second: u16) -> Self {
         let pc = address.wrapping_add(4);
         let instruction = Instruction::decode(first, second);
         let known = match instruction.size {
@@ -272,6 +272,7 @@ mod tests {
         check([0xd1f7, 0], Step::Conditional { to: AT - 14, zero: Some(false) }); // bne.n
         check([0xd3fe, 0], Step::Conditional { to: AT, zero: None }); // blo.n
         check([0xf47f, 0xaffd], Step::Conditional { to: AT - 2, zero: Some(false) }); // bne.w
+        check([0xf47f, 0xae00], Step::Conditional { to: AT.wrapping_sub(0x3fc), zero: Some(false) }); // bne.w
         check([0xb101, 0], Step::Conditional { to: AT + 4, zero: None }); // cbz r1
         check([0xe7f7, 0], Step::Branch(AT - 14)); // b.n
         check([0xf7ff, 0xbffb], Step::Branch(AT - 6)); // b.w
