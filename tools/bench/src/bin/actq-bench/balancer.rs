@@ -4,7 +4,6 @@ use std::fs;
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
-use actq::measure::size::bits_per_weight;
 use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
 use actq::runtime::{ImageBuffer, with_head};
@@ -17,17 +16,10 @@ use actq_deploy::{Bundle, DESCRIPTION, Deployment, Plan, Runner, observed};
 use anyhow::{Context as _, Result};
 use ndarray::Array3;
 
-use crate::trials::{Column, Firmware, closed_loop, folder, summary};
+use crate::trials::{Column, Firmware, closed_loop, folder, mean, share, summary};
 
-const ROWS: [&str; 7] = [
-    "bits per weight",
-    "image bytes",
-    "against f32",
-    "scratch RAM bytes",
-    "closed-loop success",
-    "speed error",
-    "instructions per step",
-];
+/// Rows of the table after those of the sizes.
+const ROWS: [&str; 3] = ["closed-loop success", "speed error", "instructions per step"];
 /// Budgets in bits per weight.
 const BITS: [f64; 2] = [3.0, 2.0];
 /// Steps of distillation, and episodes of the f32 policy to learn from, from seed 0.
@@ -43,12 +35,7 @@ pub(crate) fn run(counter: &Counter, episodes: u64, qemu_episodes: u64) -> Resul
 
     println!("Closed loop in f32, {episodes} episodes");
     let outcomes = closed_loop(episodes, |seed| f32_policy.episode(seed, |_| ()))?;
-    let mut columns = vec![Column {
-        name: "f32".into(),
-        cells: ["32", &f32_bytes.to_string(), "1.0x", "-", &success(&outcomes), &error(&outcomes)]
-            .map(str::to_owned)
-            .to_vec(),
-    }];
+    let mut columns = vec![Column::of_f32(f32_bytes, &[success(&outcomes), error(&outcomes)])];
     println!("Recording {RECORDED_EPISODES} episodes of the f32 policy to learn from");
     let raw = f32_policy.record()?;
     let recordings = Recordings { calib: Some(observed(bundle(), &raw)?), heldout: None };
@@ -76,18 +63,8 @@ pub(crate) fn run(counter: &Counter, episodes: u64, qemu_episodes: u64) -> Resul
         let firmware =
             Firmware::run(&elf, image, qemu_episodes, |seed, step| run_episode(seed, |raw| torques(&step(raw)?)))?;
         let instructions = evaluation::count(counter, Target::Fpu, &elf, None, &image, raw.episode(0))?.instructions;
-        columns.push(Column {
-            name: name.clone(),
-            cells: vec![
-                format!("{:.2}", bits_per_weight(&image)),
-                bytes.len().to_string(),
-                format!("{:.1}x", f32_bytes as f64 / bytes.len() as f64),
-                (4 * image.scratch_words()).to_string(),
-                success(&outcomes),
-                error(&outcomes),
-                instructions.to_string(),
-            ],
-        });
+        let figures = [success(&outcomes), error(&outcomes), instructions.to_string()];
+        columns.push(Column::new(&name, &image, f32_bytes, &figures));
         report.push(firmware.report(&name, &success(&firmware.outcomes), &elf, image)?);
     }
     Ok(format!("{}\n\n{}\n", summary("Balancer", &ROWS, &columns), report.join("\n")))
@@ -136,10 +113,9 @@ fn torques(values: &[f32]) -> Result<[f32; 2]> {
 }
 
 fn success(outcomes: &[Outcome]) -> String {
-    format!("{} of {}", outcomes.iter().filter(|outcome| outcome.success).count(), outcomes.len())
+    share(outcomes, |outcome| outcome.success)
 }
 
 fn error(outcomes: &[Outcome]) -> String {
-    let mean = outcomes.iter().map(|outcome| outcome.speed_error).sum::<f64>() / outcomes.len().max(1) as f64;
-    format!("{:.1} mm/s", 1e3 * mean)
+    format!("{:.1} mm/s", mean(outcomes, |outcome| outcome.speed_error))
 }

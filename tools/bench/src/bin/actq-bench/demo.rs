@@ -7,7 +7,6 @@ use std::path::PathBuf;
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
 use actq::measure::eval;
-use actq::measure::size::bits_per_weight;
 use actq::methods::{Method, Options};
 use actq::pipeline::Quantizer;
 use actq::policy::Policy;
@@ -22,7 +21,7 @@ use actq_ur3::task::{EPISODE_STEPS, Outcome, run_episode};
 use anyhow::{Context, Result};
 use ndarray::Array3;
 
-use crate::trials::{Column, Firmware, closed_loop, folder, summary};
+use crate::trials::{Column, Firmware, closed_loop, folder, mean, share, summary};
 use crate::{balancer, faults, heads, kernels};
 
 /// Limit of distillation steps: an eighth of the default of `actq quantize`, for a result within half a minute.
@@ -70,17 +69,9 @@ struct Trial<'a> {
     qemu_episodes: u64,
 }
 
-const ROWS: [&str; 9] = [
-    "bits per weight",
-    "image bytes",
-    "against f32",
-    "scratch RAM bytes",
-    "held-out NMSE",
-    "closed-loop success",
-    "tracking error",
-    "instructions per evaluation",
-    "instructions per MAC",
-];
+/// Rows of the table after those of the sizes.
+const ROWS: [&str; 5] =
+    ["held-out NMSE", "closed-loop success", "tracking error", "instructions per evaluation", "instructions per MAC"];
 
 pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     let eight = Options::new(Method::Gptq, Budget::Width(Width::W8));
@@ -136,18 +127,7 @@ impl Trial<'_> {
             reference.reset();
             Ok(run_episode(seed, |obs| reference.act(obs)))
         })?;
-        let mut columns = vec![Column {
-            name: "f32".into(),
-            cells: vec![
-                "32".into(),
-                f32_bytes.to_string(),
-                "1.0x".into(),
-                "-".into(),
-                "-".into(),
-                success(&outcomes),
-                tracking(&outcomes),
-            ],
-        }];
+        let mut columns = vec![Column::of_f32(f32_bytes, &["-".to_owned(), success(&outcomes), tracking(&outcomes)])];
 
         let mut report = Vec::new();
         let recordings = if recorded {
@@ -178,24 +158,18 @@ impl Trial<'_> {
             let instructions =
                 evaluation::count(counter, Target::Fpu, &elf, None, &image, heldout.episode(0))?.instructions;
             let nmse = eval::evaluate(image, &heldout)?.nmse;
-            columns.push(Column {
-                name: (*name).into(),
-                cells: vec![
-                    format!("{:.2}", bits_per_weight(&image)),
-                    bytes.len().to_string(),
-                    format!("{:.1}x", f32_bytes as f64 / bytes.len() as f64),
-                    (4 * image.scratch_words()).to_string(),
-                    format!("{nmse:.1e}"),
-                    success(&outcomes),
-                    tracking(&outcomes),
-                    instructions.to_string(),
-                    match policy.graph.denoising {
-                        None => format!("{:.2}", instructions as f64 / policy.graph.weights() as f64),
-                        // A weight is multiplied once in each step.
-                        Some(_) => "-".to_owned(),
-                    },
-                ],
-            });
+            let figures = [
+                format!("{nmse:.1e}"),
+                success(&outcomes),
+                tracking(&outcomes),
+                instructions.to_string(),
+                match policy.graph.denoising {
+                    None => format!("{:.2}", instructions as f64 / policy.graph.weights() as f64),
+                    // A weight is multiplied once in each step.
+                    Some(_) => "-".to_owned(),
+                },
+            ];
+            columns.push(Column::new(name, &image, f32_bytes, &figures));
             report.push(firmware.report(name, &success(&firmware.outcomes), &elf, image)?);
         }
 
@@ -204,10 +178,9 @@ impl Trial<'_> {
 }
 
 fn success(outcomes: &[Outcome]) -> String {
-    format!("{} of {}", outcomes.iter().filter(|o| o.success).count(), outcomes.len())
+    share(outcomes, |outcome| outcome.success)
 }
 
 fn tracking(outcomes: &[Outcome]) -> String {
-    let mean = outcomes.iter().map(|o| o.tracking_error_m).sum::<f64>() / outcomes.len().max(1) as f64;
-    format!("{:.2} mm", 1e3 * mean)
+    format!("{:.2} mm", mean(outcomes, |outcome| outcome.tracking_error_m))
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use actq::measure::size::bits_per_weight;
 use actq::runtime::with_head;
 use actq_bench::qemu::{self, Server};
 use actq_bench::{bits, firmware, target_dir};
@@ -17,17 +18,49 @@ pub(crate) fn folder() -> PathBuf {
     target_dir().join("demo")
 }
 
+/// First rows of every table.
+const SIZES: [&str; 4] = ["bits per weight", "image bytes", "against f32", "scratch RAM bytes"];
+
 /// A policy's column in a table.
 pub(crate) struct Column {
-    pub(crate) name: String,
-    pub(crate) cells: Vec<String>,
+    name: String,
+    cells: Vec<String>,
 }
 
-/// Formats columns, each with a cell for each row, or fewer.
-pub(crate) fn summary(name: &str, rows: &[&str], columns: &[Column]) -> String {
+impl Column {
+    /// The column of a policy in f32: its size in bytes, then other cells.
+    pub(crate) fn of_f32(bytes: usize, more: &[String]) -> Self {
+        let sizes = ["32".to_owned(), bytes.to_string(), "1.0x".to_owned(), "-".to_owned()];
+        Self { name: "f32".to_owned(), cells: [&sizes[..], more].concat() }
+    }
+
+    /// The column of an image: the sizes, then other cells.
+    pub(crate) fn new(name: &str, image: &Image<'_>, f32_bytes: usize, more: &[String]) -> Self {
+        let sizes = [
+            format!("{:.2}", bits_per_weight(image)),
+            image.bytes().to_string(),
+            format!("{:.1}x", f32_bytes as f64 / image.bytes() as f64),
+            (4 * image.scratch_words()).to_string(),
+        ];
+        Self { name: name.to_owned(), cells: [&sizes[..], more].concat() }
+    }
+}
+
+/// Formats how many outcomes are a success.
+pub(crate) fn share<T>(outcomes: &[T], is_success: impl Fn(&T) -> bool) -> String {
+    format!("{} of {}", outcomes.iter().filter(|outcome| is_success(outcome)).count(), outcomes.len())
+}
+
+/// Returns the mean of a figure, in thousandths of its unit.
+pub(crate) fn mean<T>(outcomes: &[T], of: impl Fn(&T) -> f64) -> f64 {
+    1e3 * outcomes.iter().map(of).sum::<f64>() / outcomes.len().max(1) as f64
+}
+
+/// Formats columns, each with a cell for each row, or fewer, below those of the sizes.
+pub(crate) fn summary(name: &str, more_rows: &[&str], columns: &[Column]) -> String {
     let names: Vec<&str> = std::iter::once(name).chain(columns.iter().map(|c| c.name.as_str())).collect();
     let mut summary = table(&names);
-    for (i, row) in rows.iter().enumerate() {
+    for (i, row) in SIZES.iter().chain(more_rows).enumerate() {
         let cells = columns.iter().map(|c| c.cells.get(i).cloned().unwrap_or_else(|| "-".into()));
         summary.add_row(std::iter::once((*row).to_owned()).chain(cells));
     }
