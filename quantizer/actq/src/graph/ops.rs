@@ -1,5 +1,18 @@
 //! The operations. A new one needs its file and its line in the list below.
 
+/// Implements [`Operation::vectors`] and its mutable form: the fields whose values can be learned, in this order.
+macro_rules! learned {
+    ($($field:ident),*) => {
+        fn vectors(&self) -> Vec<&Vec<f32>> {
+            vec![$(&self.$field),*]
+        }
+
+        fn vectors_mut(&mut self) -> Vec<&mut Vec<f32>> {
+            vec![$(&mut self.$field),*]
+        }
+    };
+}
+
 mod add;
 mod concat;
 mod function;

@@ -57,13 +57,7 @@ impl Operation for Gru {
         vec![&mut self.input, &mut self.state]
     }
 
-    fn vectors(&self) -> Vec<&Vec<f32>> {
-        vec![&self.input_bias, &self.state_bias]
-    }
-
-    fn vectors_mut(&mut self) -> Vec<&mut Vec<f32>> {
-        vec![&mut self.input_bias, &mut self.state_bias]
-    }
+    learned! { input_bias, state_bias }
 
     fn state_lens(&self) -> [usize; 2] {
         [self.hidden, 0]

@@ -41,13 +41,7 @@ impl Operation for Linear {
         vec![&mut self.matrix]
     }
 
-    fn vectors(&self) -> Vec<&Vec<f32>> {
-        vec![&self.bias]
-    }
-
-    fn vectors_mut(&mut self) -> Vec<&mut Vec<f32>> {
-        vec![&mut self.bias]
-    }
+    learned! { bias }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
         let x = run.operand(self.matrix, run.input(0).view());

@@ -56,13 +56,7 @@ impl Operation for Lstm {
         vec![&mut self.input, &mut self.state]
     }
 
-    fn vectors(&self) -> Vec<&Vec<f32>> {
-        vec![&self.bias]
-    }
-
-    fn vectors_mut(&mut self) -> Vec<&mut Vec<f32>> {
-        vec![&mut self.bias]
-    }
+    learned! { bias }
 
     fn trained_values(&self) -> usize {
         // torch stores both biases.

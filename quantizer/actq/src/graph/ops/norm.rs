@@ -49,13 +49,7 @@ impl Operation for LayerNorm {
         vec![Syntax { name: "layernorm", keys: &["w_ln", "b_ln", "eps"], read }]
     }
 
-    fn vectors(&self) -> Vec<&Vec<f32>> {
-        vec![&self.weight, &self.bias]
-    }
-
-    fn vectors_mut(&mut self) -> Vec<&mut Vec<f32>> {
-        vec![&mut self.weight, &mut self.bias]
-    }
+    learned! { weight, bias }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
         normalized(run, self.eps, true)
@@ -89,13 +83,7 @@ impl Operation for RmsNorm {
         vec![Syntax { name: "rmsnorm", keys: &["w_ln", "eps"], read }]
     }
 
-    fn vectors(&self) -> Vec<&Vec<f32>> {
-        vec![&self.weight]
-    }
-
-    fn vectors_mut(&mut self) -> Vec<&mut Vec<f32>> {
-        vec![&mut self.weight]
-    }
+    learned! { weight }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
         normalized(run, self.eps, false)

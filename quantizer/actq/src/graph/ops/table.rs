@@ -27,13 +27,7 @@ impl Operation for Table {
         Ok(self.len)
     }
 
-    fn vectors(&self) -> Vec<&Vec<f32>> {
-        vec![&self.rows]
-    }
-
-    fn vectors_mut(&mut self) -> Vec<&mut Vec<f32>> {
-        vec![&mut self.rows]
-    }
+    learned! { rows }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
         let row = &run.vectors[0][run.step * self.len..][..self.len];
