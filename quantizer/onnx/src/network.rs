@@ -21,6 +21,7 @@ use crate::nodes::call::RANDOM;
 use crate::nodes::follow::{Follower, INTEGERS};
 use crate::patterns::simplify::simplify;
 use crate::states::{Cells, Output, is_state, refuse_lost_states};
+use crate::values::elements::value;
 use crate::values::expr::{Expr, Exprs, Id};
 use crate::values::tensor::{Element, Tensor};
 
@@ -177,15 +178,12 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
     let chosen = choose(&exprs, &cells, &outputs, errors, choice)?;
     let (action, act_shape) = (outputs[chosen].name.clone(), outputs[chosen].value.shape.clone());
 
-    let value = Tensor::of_elements(act_shape.clone(), cells.elements(&outputs[chosen].value));
-    let values = value.elements();
+    let values = Tensor::of_elements(act_shape.clone(), cells.elements(&outputs[chosen].value)).elements();
     // A constant value becomes another value times 0, plus an offset.
-    let first = values.iter().find_map(|e| if let Element::Of(id, i) = e { Some((*id, *i)) } else { None });
-    let first = first.with_context(|| {
+    let first = values.iter().find_map(value).with_context(|| {
         format!("output {:?} depends on no input; choose another by --output NAME", printable(&action))
     })?;
-    let open: Vec<(Id, usize)> =
-        values.iter().map(|e| if let Element::Of(id, i) = e { (*id, *i) } else { first }).collect();
+    let open: Vec<(Id, usize)> = values.iter().map(|element| value(element).unwrap_or(first)).collect();
     let parts = |e: &Element| if let Element::Known(v) = e { (0.0, *v) } else { (1.0, 0.0) };
     let (scale, offset) = values.iter().map(parts).unzip();
     let root = exprs.vector(&open);

@@ -6,7 +6,7 @@ use crate::nodes::call::Call;
 use crate::nodes::moves::expanded;
 use crate::nodes::places::broadcast;
 use crate::values::elements::{apply, value};
-use crate::values::expr::{Expr, Exprs, Unary};
+use crate::values::expr::{Expr, Exprs, Id, Unary};
 use crate::values::tensor::{Data, Element, Tensor};
 
 /// Converts a comparison of a value with one number to [`Unary::Above`].
@@ -94,10 +94,14 @@ pub(crate) fn not(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
     let input = call.input(0)?;
     let Some(values) = input.elements().iter().map(value).collect::<Option<Vec<_>>>() else { return Ok(None) };
     let condition = exprs.vector(&values);
-    let &Expr::Unary(Unary::Above(limit), x) = exprs.get(condition) else { return Ok(None) };
+    Ok(negated(exprs, condition).map(|below| Tensor::of_elements(input.shape.clone(), exprs.elements(below))))
+}
+
+/// Returns `-x > -limit` for `x > limit`.
+fn negated(exprs: &mut Exprs, condition: Id) -> Option<Id> {
+    let &Expr::Unary(Unary::Above(limit), x) = exprs.get(condition) else { return None };
     let negative = exprs.scaled(x, -1.0, 0.0);
-    let below = exprs.unary(Unary::Above(-limit), negative);
-    Ok(Some(Tensor::of_elements(input.shape.clone(), exprs.elements(below))))
+    Some(exprs.unary(Unary::Above(-limit), negative))
 }
 
 /// Converts a choice by a value of the network that forms an activation.
@@ -119,9 +123,7 @@ pub(crate) fn choice(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<
             let (x, y) = (exprs.vector(&x), exprs.vector(&y));
             // A comparison of the negative value swaps the choices.
             exprs.select(condition, x, y).or_else(|| {
-                let &Expr::Unary(Unary::Above(limit), of) = exprs.get(condition) else { return None };
-                let negative = exprs.scaled(of, -1.0, 0.0);
-                let other = exprs.unary(Unary::Above(-limit), negative);
+                let other = negated(exprs, condition)?;
                 exprs.select(other, y, x)
             })
         }

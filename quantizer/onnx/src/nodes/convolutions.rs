@@ -6,7 +6,7 @@ use actq::error::{Context as _, Result, bail, ensure};
 
 use crate::nodes::arithmetic::two;
 use crate::nodes::call::Call;
-use crate::nodes::places::transpose;
+use crate::nodes::moves::transposed;
 use crate::nodes::products::row_product;
 use crate::values::expr::{Exprs, Matrix};
 use crate::values::tensor::{Data, Element, Tensor, count};
@@ -92,8 +92,7 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
         ensure!(bias.len() == outputs, "its bias has {} values for {outputs} channels", bias.len());
         y = two("Add", exprs, &y, &Tensor::new(vec![outputs], Data::Real(bias)), y.len())?;
     }
-    let (turned, places) = transpose(&y.shape, &[1, 0])?;
-    y.taken(turned, &places)?.reshaped([vec![1, outputs], shape].concat()).map(Some)
+    transposed(&y, &[1, 0])?.reshaped([vec![1, outputs], shape].concat()).map(Some)
 }
 
 /// Returns the axes of a kernel over an operand, from their lengths and the node's attributes.

@@ -3,7 +3,7 @@
 use actq::error::{Context as _, Result, ensure};
 
 use crate::nodes::call::Call;
-use crate::nodes::places::transpose;
+use crate::nodes::moves::transposed;
 use crate::nodes::products::product;
 use crate::values::expr::Exprs;
 use crate::values::tensor::{Tensor, count};
@@ -43,8 +43,7 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     let order = output.iter().map(|c| joined.iter().position(|other| other == c));
     let order: Vec<usize> =
         order.collect::<Option<_>>().context("lost an axis; this is an error of this program, please report it")?;
-    let (shape, places) = transpose(&result.shape, &order)?;
-    result.taken(shape, &places).map(Some)
+    transposed(&result, &order).map(Some)
 }
 
 /// Returns a tensor as a matrix with these axes as rows and columns, and the lengths of the axes.
@@ -56,8 +55,8 @@ fn turned(x: &Tensor, axes: &[char], sides: [&[char]; 2]) -> Result<(Tensor, [Ve
         .map(place)
         .collect::<Option<_>>()
         .context("lost an axis; this is an error of this program, please report it")?;
-    let (shape, places) = transpose(&x.shape, &order)?;
-    let (rows, cols) = shape.split_at(sides[0].len());
-    let matrix = x.taken(shape.clone(), &places)?.reshaped(vec![count(rows)?, count(cols)?])?;
+    let turned = transposed(x, &order)?;
+    let (rows, cols) = turned.shape.split_at(sides[0].len());
+    let matrix = turned.reshaped(vec![count(rows)?, count(cols)?])?;
     Ok((Tensor { name: x.name.clone(), ..matrix }, [rows.to_vec(), cols.to_vec()]))
 }

@@ -41,22 +41,29 @@ pub(crate) fn gather_nd(call: &Call<'_>, most: usize) -> Result<Tensor> {
     let n = count(piece)?;
     let mut places = Vec::new();
     for index in indices.chunks(*depth) {
-        let mut at = 0;
-        for (&i, &n) in index.iter().zip(&input.shape[batch..]) {
-            at = at * n + axis(i, n)?;
-        }
+        let at = place(index, &input.shape[batch..])?;
         places.extend(at * n..(at + 1) * n);
     }
     input.taken(out, &places)
 }
 
-/// Replaces slices at known places.
-pub(crate) fn scatter_nd(call: &Call<'_>) -> Result<Tensor> {
-    let (data, updates) = (call.input(0)?, call.input(2)?);
+/// Returns the place of a slice with this index along the first axes of a shape.
+fn place(index: &[i64], shape: &[usize]) -> Result<usize> {
+    index.iter().zip(shape).try_fold(0, |at, (&i, &n)| Ok(at * n + axis(i, n)?))
+}
+
+fn refuse_reduction(call: &Call<'_>) -> Result<()> {
     ensure!(
         matches!(call.text("reduction").as_deref(), None | Some("none")),
         "has a reduction; only replacement is supported"
     );
+    Ok(())
+}
+
+/// Replaces slices at known places.
+pub(crate) fn scatter_nd(call: &Call<'_>) -> Result<Tensor> {
+    let (data, updates) = (call.input(0)?, call.input(2)?);
+    refuse_reduction(call)?;
     let indices = call.integers(1, "the indices")?;
     let depth = call.input(1)?.shape.last().copied().unwrap_or(1);
     ensure!((1..=data.shape.len()).contains(&depth), "its indices have {depth} parts for {} axes", data.shape.len());
@@ -65,27 +72,12 @@ pub(crate) fn scatter_nd(call: &Call<'_>) -> Result<Tensor> {
     ensure!(updates.len() == rows.len() * piece, "its updates do not fit its indices");
     let mut places: Vec<usize> = (0..data.len()).collect();
     for (row, index) in rows.enumerate() {
-        let mut at = 0;
-        for (&i, &n) in index.iter().zip(&data.shape) {
-            at = at * n + axis(i, n)?;
-        }
+        let at = place(index, &data.shape)?;
         for k in 0..piece {
             places[at * piece + k] = data.len() + row * piece + k;
         }
     }
-    replaced(data, updates, &places)
-}
-
-/// Returns elements at these places of a tensor, followed by its updates.
-fn replaced(data: &Tensor, updates: &Tensor, places: &[usize]) -> Result<Tensor> {
-    let both = match (data.integers(), updates.integers()) {
-        (Some(data), Some(updates)) => Tensor::ints([data, updates].concat()),
-        _ => {
-            let all = [data.elements(), updates.elements()].concat();
-            Tensor::of_elements(vec![all.len()], all)
-        }
-    };
-    both.taken(data.shape.clone(), places)
+    Tensor::chain(&[data, updates]).taken(data.shape.clone(), &places)
 }
 
 /// Returns the place in a tensor of this shape for each index along the node's axis.
@@ -116,14 +108,11 @@ pub(crate) fn gather_elements(call: &Call<'_>) -> Result<Tensor> {
 /// Replaces single elements at known indices along an axis.
 pub(crate) fn scatter_elements(call: &Call<'_>) -> Result<Tensor> {
     let (data, updates) = (call.input(0)?, call.input(2)?);
-    ensure!(
-        matches!(call.text("reduction").as_deref(), None | Some("none")),
-        "has a reduction; only replacement is supported"
-    );
+    refuse_reduction(call)?;
     ensure!(updates.shape == call.input(1)?.shape, "its updates do not fit its indices");
     let mut places: Vec<usize> = (0..data.len()).collect();
     for (k, place) in element_places(call, &data.shape)?.into_iter().enumerate() {
         places[place] = data.len() + k;
     }
-    replaced(data, updates, &places)
+    Tensor::chain(&[data, updates]).taken(data.shape.clone(), &places)
 }

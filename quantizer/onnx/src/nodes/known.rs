@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use actq::error::{Context as _, Result, ensure};
 
 use crate::nodes::call::Call;
-use crate::nodes::moves::expanded;
+use crate::nodes::moves::{expanded, transposed};
 use crate::nodes::places::{axis, broadcast};
 use crate::values::tensor::{Data, Tensor, count};
 
@@ -163,6 +163,17 @@ pub(crate) struct Reduced {
     pub(crate) shape: Vec<usize>,
 }
 
+impl Reduced {
+    /// Returns a tensor in runs, each of which is reduced to one value, and the length of a run.
+    pub(crate) fn runs(&self, x: &Tensor) -> Result<(Tensor, usize)> {
+        let outputs = count(&self.shape)?;
+        ensure!(outputs > 0 && x.len() > 0, "goes over no values");
+        let others = (0..x.shape.len()).filter(|i| !self.axes.contains(i));
+        let order: Vec<usize> = others.chain(self.axes.iter().copied()).collect();
+        Ok((transposed(x, &order)?, x.len() / outputs))
+    }
+}
+
 /// Returns the axes of a Reduce node and the shape of its result.
 pub(crate) fn reduced(call: &Call<'_>) -> Result<Reduced> {
     let shape = &call.input(0)?.shape;
@@ -177,14 +188,8 @@ pub(crate) fn reduced(call: &Call<'_>) -> Result<Reduced> {
 }
 
 fn reduce(call: &Call<'_>, x: &Tensor) -> Result<Tensor> {
-    let Reduced { axes, shape } = reduced(call)?;
-    // The other axes come first, so that each result reduces one run.
-    let order: Vec<usize> = (0..x.shape.len()).filter(|i| !axes.contains(i)).chain(axes.iter().copied()).collect();
-    let (turned, places) = crate::nodes::places::transpose(&x.shape, &order)?;
-    let x = x.taken(turned, &places)?;
-    let outputs = count(&shape)?;
-    ensure!(outputs > 0 && !x.shape.contains(&0), "goes over no values");
-    let each = x.len() / outputs;
+    let reduced = reduced(call)?;
+    let (x, each) = reduced.runs(x)?;
     let fold = |run: &[f64]| match call.op() {
         "ReduceProd" => run.iter().product::<f64>(),
         "ReduceSum" => run.iter().sum(),
@@ -196,5 +201,5 @@ fn reduce(call: &Call<'_>, x: &Tensor) -> Result<Tensor> {
     // f64 holds lengths of axes exactly.
     let data =
         if x.integers().is_some() { Data::Int(values.iter().map(|&v| v as i64).collect()) } else { Data::Real(values) };
-    Ok(Tensor::new(shape, data))
+    Ok(Tensor::new(reduced.shape, data))
 }

@@ -7,7 +7,7 @@ use crate::file::model::kind_name;
 use crate::nodes::call::Call;
 use crate::nodes::gather;
 use crate::nodes::places::{self, Places, along, axis, broadcast};
-use crate::values::tensor::{Data, Element, Tensor, count, room};
+use crate::values::tensor::{Data, Tensor, count, room};
 
 /// Returns the outputs, with at most `most` elements, if the node is such an operator.
 pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
@@ -61,7 +61,7 @@ pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
                 Some(perm) => perm.into_iter().map(|a| axis(a, rank)).collect::<Result<Vec<_>>>()?,
                 None => (0..rank).rev().collect(),
             };
-            one(taken(input, places::transpose(&input.shape, &order)?)?)
+            one(transposed(input, &order)?)
         }
         "Slice" => one(slice(call)?),
         "Split" => split(call).map(Some),
@@ -91,6 +91,11 @@ pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
 
 fn taken(input: &Tensor, (shape, places): Places) -> Result<Tensor> {
     input.taken(shape, &places)
+}
+
+/// Returns a tensor with its axes in this order.
+pub(crate) fn transposed(input: &Tensor, order: &[usize]) -> Result<Tensor> {
+    taken(input, places::transpose(&input.shape, order)?)
 }
 
 /// Broadcasts a tensor to a shape.
@@ -302,15 +307,7 @@ fn joined(parts: &[&Tensor], at: usize) -> Result<Tensor> {
             from += part.len();
         }
     }
-    let ints: Option<Vec<&[i64]>> = parts.iter().map(|part| part.integers()).collect();
-    let all = match ints {
-        Some(ints) => Tensor::ints(ints.concat()),
-        None => {
-            let elements: Vec<Element> = parts.iter().flat_map(|part| part.elements()).collect();
-            Tensor::of_elements(vec![elements.len()], elements)
-        }
-    };
-    all.taken(shape, &found)
+    Tensor::chain(parts).taken(shape, &found)
 }
 
 /// Converts Pad, which adds or removes values at both ends of axes.
@@ -354,7 +351,6 @@ fn where_known(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
     }
     let shape = broadcast(&broadcast(&choice.shape, &x.shape)?, &y.shape)?;
     let choice = expanded(choice, &shape, most)?;
-    let whole = x.integers().is_some() && y.integers().is_some();
     let (x, y) = (expanded(x, &shape, most)?, expanded(y, &shape, most)?);
     let n = x.len();
     let places: Vec<usize> = choice
@@ -364,9 +360,5 @@ fn where_known(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
         .enumerate()
         .map(|(i, &c)| if c != 0 { i } else { n + i })
         .collect();
-    let both = match (x.integers(), y.integers()) {
-        (Some(x), Some(y)) if whole => Tensor::ints([x, y].concat()),
-        _ => Tensor::of_elements(vec![2 * n], [x.elements(), y.elements()].concat()),
-    };
-    Ok(Some(vec![both.taken(shape, &places)?]))
+    Ok(Some(vec![Tensor::chain(&[&x, &y]).taken(shape, &places)?]))
 }

@@ -5,7 +5,7 @@ use actq::error::{Context as _, Result, bail, ensure};
 use crate::nodes::arithmetic::two;
 use crate::nodes::call::Call;
 use crate::nodes::convolutions::{axes, window};
-use crate::nodes::places::transpose;
+use crate::nodes::moves::transposed;
 use crate::nodes::reductions::MOST_COMPARED;
 use crate::values::expr::Exprs;
 use crate::values::tensor::{Data, Element, Tensor, count, room};
@@ -66,6 +66,5 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Opt
         let shares = windows.iter().map(|window| 1.0 / counted(window).max(1) as f64).collect();
         y = two("Mul", exprs, &y, &Tensor::new(vec![positions, 1], Data::Real(shares)), most)?;
     }
-    let (turned, places) = transpose(&y.shape, &[1, 0])?;
-    y.taken(turned, &places)?.reshaped([vec![1, channels], shape].concat()).map(Some)
+    transposed(&y, &[1, 0])?.reshaped([vec![1, channels], shape].concat()).map(Some)
 }

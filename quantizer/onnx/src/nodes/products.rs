@@ -6,8 +6,8 @@ use actq::error::{Context as _, Result, bail, ensure};
 
 use crate::nodes::arithmetic::two;
 use crate::nodes::call::Call;
-use crate::nodes::moves::expanded;
-use crate::nodes::places::{broadcast, transpose};
+use crate::nodes::moves::{expanded, transposed};
+use crate::nodes::places::broadcast;
 use crate::values::elements::open_vector;
 use crate::values::expr::{Exprs, Matrix};
 use crate::values::tensor::{Data, Element, Tensor, count};
@@ -29,8 +29,7 @@ fn gemm(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Tensor
         if call.int(name).unwrap_or(0) == 0 {
             return Ok(x.clone());
         }
-        let (shape, places) = transpose(&x.shape, &[1, 0])?;
-        Ok(Tensor { name: x.name.clone(), ..x.taken(shape, &places)? })
+        Ok(Tensor { name: x.name.clone(), ..transposed(x, &[1, 0])? })
     };
     let (a, b) = (turned(0, "transA")?, turned(1, "transB")?);
     let y = product(exprs, &a, &b, call.float("alpha").unwrap_or(1.0), budget)?;
@@ -67,8 +66,7 @@ pub(crate) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, bu
                 if let [.., last, end] = &mut order[..] {
                     std::mem::swap(last, end);
                 }
-                let (shape, places) = transpose(&x.shape, &order)?;
-                Ok(Tensor { name: x.name.clone(), ..x.taken(shape, &places)? })
+                Ok(Tensor { name: x.name.clone(), ..transposed(x, &order)? })
             };
             let y = product(exprs, &flat(b)?, &flat(a)?, factor, budget)?;
             return if a.shape.len() > 1 && b.shape.len() > 1 { flat(&y) } else { Ok(y) };

@@ -6,7 +6,7 @@ use actq::numbers::positive;
 use crate::nodes::arithmetic::two;
 use crate::nodes::call::Call;
 use crate::nodes::known::{Reduced, reduced};
-use crate::nodes::places::{axis, transpose};
+use crate::nodes::places::axis;
 use crate::values::elements::{open_vector, value};
 use crate::values::evaluation::computed;
 use crate::values::expr::{Exprs, Id, Unary};
@@ -158,13 +158,8 @@ fn group_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
     two("Add", exprs, &scaled, &constant(2, "the bias")?, x.len())
 }
 
-fn reduce(op: &str, x: &Tensor, Reduced { axes, shape }: Reduced, exprs: &mut Exprs) -> Result<Tensor> {
-    let order: Vec<usize> = (0..x.shape.len()).filter(|i| !axes.contains(i)).chain(axes.iter().copied()).collect();
-    let (turned, places) = transpose(&x.shape, &order)?;
-    let outputs = count(&shape)?;
-    ensure!(outputs > 0 && x.len() > 0, "goes over no values");
-    let each = x.len() / outputs;
-    let mut all = Vec::with_capacity(outputs);
+fn reduce(op: &str, x: &Tensor, reduced: Reduced, exprs: &mut Exprs) -> Result<Tensor> {
+    let (runs, each) = reduced.runs(x)?;
     let one = |exprs: &mut Exprs, row: Id| match op {
         "ReduceL1" => {
             let sizes = exprs.unary(Unary::Abs, row);
@@ -181,19 +176,20 @@ fn reduce(op: &str, x: &Tensor, Reduced { axes, shape }: Reduced, exprs: &mut Ex
         }
         _ => exprs.sum(row),
     };
-    let elements = x.taken(turned, &places)?.elements();
+    let elements = runs.elements();
     let largest = matches!(op, "ReduceMax" | "ReduceMin");
     if largest || matches!(op, "ReduceSum" | "ReduceMean") && elements.chunks(each).all(of_different_values) {
         ensure!(
             !largest || each <= MOST_COMPARED,
             "takes the maximum or minimum of {each} values; the limit is {MOST_COMPARED}; export the part after it"
         );
-        return slices_joined(op, exprs, &elements, each, shape);
+        return slices_joined(op, exprs, &elements, each, reduced.shape);
     }
+    let mut all = Vec::with_capacity(elements.len() / each);
     for row in elements.chunks(each) {
         all.extend(of_row(exprs, row, &one)?);
     }
-    Ok(Tensor::of_elements(shape, all))
+    Ok(Tensor::of_elements(reduced.shape, all))
 }
 
 /// Returns `true` if a sum over these adds outputs of several layers rather than elements of one.

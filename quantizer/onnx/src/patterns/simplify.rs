@@ -38,7 +38,7 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
                     Expr::Linear(y, w, bias) if read_by(&x).len() == 1 => {
                         let (y, w, bias) = (
                             *y,
-                            scaled_rows(w, &a),
+                            scaled(w, &a, |row, _| a[row]),
                             bias.iter().zip(&a).zip(&b).map(|((bias, a), b)| bias * a + b).collect(),
                         );
                         exprs.put(Expr::Linear(y, w, bias), len)
@@ -51,7 +51,7 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
                 let all_linear = read_by(&x).iter().all(|&reader| matches!(exprs.get(reader), Expr::Linear(..)));
                 match exprs.get(value) {
                     Expr::Affine(y, a, b) if all_linear && !exprs.is_observed(*y) => {
-                        let (y, w, bias) = (*y, scaled_cols(&w, a), offset(&w, b, bias));
+                        let (y, w, bias) = (*y, scaled(&w, a, |_, col| a[col]), offset(&w, b, bias));
                         exprs.put(Expr::Linear(y, w, bias), len)
                     }
                     _ => exprs.put(Expr::Linear(value, w, bias), len),
@@ -124,19 +124,12 @@ fn is_only_reader(readers: &HashMap<Id, Vec<Id>>, reader: Id, exprs: &Exprs, ins
     })
 }
 
-fn scaled_rows(w: &Arc<Matrix>, a: &[f64]) -> Arc<Matrix> {
+/// Returns the matrix with each element times the factor of its row and column.
+fn scaled(w: &Arc<Matrix>, a: &[f64], factor: impl Fn(usize, usize) -> f64) -> Arc<Matrix> {
     if a.iter().all(|a| *a == 1.0) {
         return Arc::clone(w);
     }
-    let data = w.data.chunks(w.cols).zip(a).flat_map(|(row, a)| row.iter().map(move |w| w * a)).collect();
-    Arc::new(Matrix { name: w.name.clone(), rows: w.rows, cols: w.cols, data })
-}
-
-fn scaled_cols(w: &Arc<Matrix>, a: &[f64]) -> Arc<Matrix> {
-    if a.iter().all(|a| *a == 1.0) {
-        return Arc::clone(w);
-    }
-    let data = w.data.chunks(w.cols).flat_map(|row| row.iter().zip(a).map(|(w, a)| w * a)).collect();
+    let data = w.data.iter().enumerate().map(|(i, element)| element * factor(i / w.cols, i % w.cols)).collect();
     Arc::new(Matrix { name: w.name.clone(), rows: w.rows, cols: w.cols, data })
 }
 

@@ -108,6 +108,18 @@ impl Tensor {
         if let Data::Int(v) = &self.data { Some(v) } else { None }
     }
 
+    /// Returns the elements of several tensors one after the other.
+    pub(crate) fn chain(parts: &[&Self]) -> Self {
+        let ints: Option<Vec<&[i64]>> = parts.iter().map(|part| part.integers()).collect();
+        match ints {
+            Some(ints) => Self::ints(ints.concat()),
+            None => {
+                let elements: Vec<Element> = parts.iter().flat_map(|part| part.elements()).collect();
+                Self::of_elements(vec![elements.len()], elements)
+            }
+        }
+    }
+
     /// Returns the same elements in another shape.
     pub(crate) fn reshaped(&self, shape: Vec<usize>) -> Result<Self> {
         ensure!(count(&shape)? == self.len(), "shape {:?} cannot be reshaped to {shape:?}", self.shape);
