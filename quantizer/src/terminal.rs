@@ -27,8 +27,13 @@ static SHOWN: Mutex<Option<Shown>> = Mutex::new(None);
 
 /// Reserves a command's outputs ([`files::reserve`]). If one of them is standard output, the report goes to standard
 /// error.
-pub(crate) fn reserve(outputs: &[&Path], inputs: &[PathBuf]) -> Result<Outputs> {
-    let outputs = files::reserve(outputs, inputs)?;
+pub(crate) fn reserve<P: AsRef<Path>, I: Into<PathBuf>>(
+    outputs: impl IntoIterator<Item = P>,
+    inputs: impl IntoIterator<Item = I>,
+) -> Result<Outputs> {
+    let (outputs, inputs): (Vec<P>, Vec<PathBuf>) =
+        (outputs.into_iter().collect(), inputs.into_iter().map(Into::into).collect());
+    let outputs = files::reserve(&outputs.iter().map(AsRef::as_ref).collect::<Vec<_>>(), &inputs)?;
     STDOUT_IS_TAKEN.store(outputs.include_stream(Path::new("/dev/stdout")), Ordering::Relaxed);
     Ok(outputs)
 }

@@ -21,8 +21,7 @@ pub(crate) fn run(args: &ConstantsArgs) -> Result<()> {
         _ => bail!("{shown}: give a name that ends in .rs for Rust, or in .h for C and C++"),
     };
     let prefix = args.out.file_stem().and_then(OsStr::to_str).with_context(|| format!("{shown}: no name of a file"))?;
-    let inputs: Vec<_> = [Some(args.image.clone()), args.gains.clone()].into_iter().flatten().collect();
-    let outputs = reserve(&[&args.out], &inputs)?;
+    let outputs = reserve([&args.out], [&args.image].into_iter().chain(&args.gains))?;
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let description = args.gains.as_deref().map(described).transpose()?;

@@ -26,8 +26,7 @@ pub(crate) fn run(args: &ExportCArgs) -> Result<()> {
 
     fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
     let paths: Vec<PathBuf> = files.iter().map(|(name, _)| args.out.join(name)).collect();
-    let inputs: Vec<PathBuf> = std::iter::once(args.image.clone()).chain(args.golden.clone()).collect();
-    let outputs = reserve(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>(), &inputs)?;
+    let outputs = reserve(&paths, [&args.image].into_iter().chain(&args.golden))?;
     outputs.write(&files.iter().map(|(_, text)| text).collect::<Vec<_>>())?;
     let list: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     print(&format!("{}\n", list.join("\n")))

@@ -35,8 +35,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     );
     let _folder =
         OutputFolder::new(&args.out).with_context(|| format!("{}: cannot create the folder", args.out.display()))?;
-    let inputs: Vec<_> = [Some(args.model.clone()), args.calib.clone()].into_iter().flatten().collect();
-    let outputs = reserve(&names, &inputs)?;
+    let outputs = reserve(&names, [&args.model].into_iter().chain(&args.calib))?;
     let checked = match args.check {
         true => Some(check(&args.model, &imported, &policy, calib.as_ref())?),
         false => None,

@@ -12,8 +12,7 @@ use crate::terminal::{print, reserve};
 
 /// Prints the content of an image.
 pub(crate) fn run(args: &InspectArgs) -> Result<()> {
-    let inputs = [Some(&args.image), args.stats.as_ref()].into_iter().flatten().cloned().collect::<Vec<_>>();
-    let outputs = reserve(args.svg.as_deref().as_slice(), &inputs)?;
+    let outputs = reserve(&args.svg, [&args.image].into_iter().chain(&args.stats))?;
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     if !args.widths {

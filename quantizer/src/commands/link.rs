@@ -83,8 +83,7 @@ fn watch(port: &PortArgs, once: bool) -> Result<()> {
 }
 
 fn run_stream(args: &StreamArgs) -> Result<()> {
-    let outputs: Vec<&Path> = args.log.as_deref().into_iter().collect();
-    let outputs = reserve(&outputs, &[args.image.clone(), args.recording.clone()])?;
+    let outputs = reserve(&args.log, [&args.image, &args.recording])?;
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let recording = Dataset::load(&args.recording, Sizes::of_image(&image))?;

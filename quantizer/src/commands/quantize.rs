@@ -1,6 +1,6 @@
 //! `actq quantize`
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use actq::budget::{Budget, TimeLimit};
@@ -26,10 +26,9 @@ pub fn run(
     method: Option<Method>,
     describe: impl FnOnce(&Quantizer<'_>, &QuantizedPolicy) -> String,
 ) -> Result<()> {
-    let outputs: Vec<&Path> = [Some(&args.out), args.save_stats.as_ref()].into_iter().flatten().map(|p| &**p).collect();
     let calib = files_of(&args.calib)?;
-    let inputs: Vec<PathBuf> = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned()).collect();
-    let outputs = reserve(&outputs, &inputs)?;
+    let inputs = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned());
+    let outputs = reserve([&args.out].into_iter().chain(&args.save_stats), inputs)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
     let source = load(&args.policy_dir)?;
     let has_calib = !calib.is_empty() || Recording::Calib.find(&args.policy_dir)?.is_some();

@@ -16,7 +16,7 @@ pub(crate) fn keygen(args: &KeygenArgs) -> Result<()> {
 
 /// Signs an image.
 pub(crate) fn sign(args: &SignArgs) -> Result<()> {
-    let outputs = reserve(&[&args.out], &[args.image.clone(), args.key.clone()])?;
+    let outputs = reserve([&args.out], [&args.image, &args.key])?;
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let signed = keys::sign(&keys::read(&args.key)?, buffer.bytes(), args.version)?;

@@ -1,7 +1,5 @@
 //! `actq sweep`
 
-use std::path::{Path, PathBuf};
-
 use actq::data::{Recording, Recordings, Sizes, files_of};
 use actq::methods::Method;
 use actq::pipeline::sweep::{self, SweepPlan};
@@ -17,9 +15,8 @@ use crate::threads::start_threads;
 pub fn run(args: &SweepArgs, methods: &[Method]) -> Result<()> {
     let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
     let calib = files_of(&args.calib)?;
-    let inputs: Vec<PathBuf> = folders.chain(calib.iter().chain(&args.heldout).cloned()).collect();
-    let outputs: Vec<&Path> = [&args.svg, &args.json].into_iter().filter_map(|path| path.as_deref()).collect();
-    let outputs = reserve(&outputs, &inputs)?;
+    let inputs = folders.chain(calib.iter().chain(&args.heldout).cloned());
+    let outputs = reserve(args.svg.iter().chain(&args.json), inputs)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
     start_threads(args.run.threads)?;
     let policies = args.policy_dirs.iter().map(|dir| load(dir)).collect::<Result<Vec<_>>>()?;

@@ -21,10 +21,9 @@ use crate::threads::start_threads;
 
 /// Quantizes in on-policy rounds: rolls out, labels, and learns again.
 pub(crate) fn run(args: &TuneArgs) -> Result<()> {
-    let outputs: Vec<&Path> = [Some(&args.out), args.json.as_ref()].into_iter().flatten().map(|p| &**p).collect();
     let mut calib = files_of(&args.calib)?;
-    let inputs: Vec<PathBuf> = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned()).collect();
-    let outputs = reserve(&outputs, &inputs)?;
+    let inputs = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned());
+    let outputs = reserve([&args.out].into_iter().chain(&args.json), inputs)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
     let policy = load(&args.policy_dir)?;
     ensure!(
