@@ -67,8 +67,8 @@ impl Document {
     ///
     /// If it is missing, or `as_type` does not accept it.
     pub(crate) fn need<'a, T>(&'a self, path: &str, what: &str, as_type: impl Fn(&'a Node) -> Option<T>) -> Result<T> {
-        let node = self.get(path).with_context(|| format!("{} is missing; it must be {what}", self.at(path)))?;
-        as_type(node).with_context(|| format!("{} (line {}) must be {what}", self.at(path), node.line))
+        let value = self.maybe(path, what, as_type)?;
+        value.with_context(|| format!("{} is missing; it must be {what}", self.at(path)))
     }
 
     /// Returns a value, or `None` if it is missing or null.

@@ -178,10 +178,7 @@ impl Compiler<'_> {
         if contract.scale.is_some() || contract.offset.is_some() {
             let scaled = self.to.normalize(place, &vec![0.0; len], &of(&contract.scale, 1.0), f32::INFINITY);
             place = match &contract.offset {
-                Some(offset) => {
-                    let mean: Vec<f32> = offset.iter().map(|offset| -offset).collect();
-                    self.to.normalize(scaled, &mean, &vec![1.0; len], f32::INFINITY)
-                }
+                Some(offset) => self.to.plus(scaled, offset),
                 None => scaled,
             };
         }
@@ -261,12 +258,8 @@ impl Compiler<'_> {
         }
         let all = self.to.select(ticks, &vec![0; clock.start.len()]);
         let value = self.to.times(all, clock.advance as f32);
-        let mean: Vec<f32> = clock.start.iter().map(|phase| -phase as f32).collect();
-        let value = if mean.iter().any(|mean| *mean != 0.0) {
-            self.to.normalize(value, &mean, &vec![1.0; value.len], f32::INFINITY)
-        } else {
-            value
-        };
+        let start: Vec<f32> = clock.start.iter().map(|phase| *phase as f32).collect();
+        let value = if start.iter().any(|phase| *phase != 0.0) { self.to.plus(value, &start) } else { value };
         if !before {
             self.to.with(OpKind::Add, ticks, one);
         }

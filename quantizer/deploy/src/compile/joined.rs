@@ -205,35 +205,41 @@ impl Builder<'_> {
         }
     }
 
+    /// Returns what an output's network reads, one after the other.
+    fn reads(&self, output: Output) -> Result<Vec<Source>> {
+        let mut reads = Vec::new();
+        for read in part(self.plan, output)?.reads {
+            match &self.plan.networks[output.0].feeds[*read] {
+                Feed::Before(before, _) => reads.push(Source::Before((output.0, *before))),
+                Feed::Value(slot) => reads.extend(self.parts(*slot)?.into_iter().map(Source::Value)),
+            }
+        }
+        Ok(reads)
+    }
+
+    /// Returns the output that a source is, if it is no part of the observation.
+    fn inner(&self, source: Source) -> Option<Output> {
+        let Source::Value(slot) = source else { return None };
+        match self.plan.values[slot].maker {
+            Maker::Output(network, output) if self.depends[slot] => Some((network, output)),
+            _ => None,
+        }
+    }
+
     /// Collects what an output's network, and those before it, read.
     fn read(&mut self, output: Output, seen: &mut Vec<Output>) -> Result<()> {
         if seen.contains(&output) {
             return Ok(());
         }
         seen.push(output);
-        let plan = self.plan;
-        for read in part(plan, output)?.reads {
-            match &plan.networks[output.0].feeds[*read] {
-                Feed::Before(before, _) => self.add(Source::Before((output.0, *before))),
-                Feed::Value(slot) => {
-                    for slot in self.parts(*slot)? {
-                        match &plan.values[slot].maker {
-                            Maker::Output(network, output) if self.depends[slot] => {
-                                self.read((*network, *output), seen)?;
-                            }
-                            _ => self.add(Source::Value(slot)),
-                        }
-                    }
-                }
+        for source in self.reads(output)? {
+            match self.inner(source) {
+                Some(inner) => self.read(inner, seen)?,
+                None if self.observation.contains(&source) => {}
+                None => self.observation.push(source),
             }
         }
         Ok(())
-    }
-
-    fn add(&mut self, source: Source) {
-        if !self.observation.contains(&source) {
-            self.observation.push(source);
-        }
     }
 
     /// Returns the part of the observation that a source is.
@@ -247,33 +253,26 @@ impl Builder<'_> {
         if let Some((_, value)) = self.values.iter().find(|(known, _)| *known == output) {
             return Ok(*value);
         }
-        let plan = self.plan;
-        let part = part(plan, output)?;
         let mut parts = Vec::new();
-        for read in part.reads {
-            match &plan.networks[output.0].feeds[*read] {
-                Feed::Before(before, _) => parts.push(self.span(Source::Before((output.0, *before)))),
-                Feed::Value(slot) => {
-                    for slot in self.parts(*slot)? {
-                        match plan.values[slot].maker {
-                            Maker::Output(network, inner) if self.depends[slot] => {
-                                let contract = &self::part(plan, (network, inner))?.policy.contract;
-                                ensure!(
-                                    contract.arrays().iter().all(|(_, array)| array.is_none()),
-                                    "output {inner} of network {network} ends with a scale or a limit before another network; \
-                                     this is not supported"
-                                );
-                                let value = self.append(graph, (network, inner))?;
-                                parts.push((value, Span { from: 0, len: graph.len_of(value) }));
-                            }
-                            _ => parts.push(self.span(Source::Value(slot))),
-                        }
-                    }
+        for source in self.reads(output)? {
+            parts.push(match self.inner(source) {
+                None => self.span(source),
+                Some(inner) => {
+                    let contract = &part(self.plan, inner)?.policy.contract;
+                    ensure!(
+                        contract.arrays().iter().all(|(_, array)| array.is_none()),
+                        "output {} of network {} ends with a scale or a limit before another network; \
+                         this is not supported",
+                        inner.1,
+                        inner.0
+                    );
+                    let value = self.append(graph, inner)?;
+                    (value, Span { from: 0, len: graph.len_of(value) })
                 }
-            }
+            });
         }
         let input = graph.join(merged(parts))?;
-        let value = graph.append(&part.policy.graph, input)?;
+        let value = graph.append(&part(self.plan, output)?.policy.graph, input)?;
         self.values.push((output, value));
         Ok(value)
     }
