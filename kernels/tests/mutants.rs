@@ -2,11 +2,15 @@
 //! panic, keeps its limits, and depends only on its observations. An image that changes after the check does not panic
 //! either. The tests need only this crate, so that they also run with words of 32 bits and in Miri.
 
+#[path = "common/draft.rs"]
+mod draft;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use actq_kernels::image::{checksum, header as h, op};
+use actq_kernels::image::{header as h, op};
 use actq_kernels::{Head, Image};
 use actq_testkit::Random;
+use draft::Draft;
 
 /// Mutations in each test.
 const CASES: u64 = if cfg!(miri) { 20 } else { 20_000 };
@@ -14,49 +18,19 @@ const CASES: u64 = if cfg!(miri) { 20 } else { 20_000 };
 /// An image with every kind of section. A test in `host-tests/tests` writes the same bytes.
 const VALID: &[u8] = include_bytes!("valid.actq");
 
-/// An image whose words can be changed.
-struct Draft(Vec<u32>);
-
-impl Draft {
-    fn valid() -> Self {
-        Self(VALID.as_chunks().0.iter().map(|word| u32::from_ne_bytes(*word)).collect())
-    }
-
-    fn bytes(&self) -> &[u8] {
-        bytemuck::cast_slice(&self.0)
-    }
-
-    fn get(&self, at: usize) -> u32 {
-        u32::from_le(self.0[at])
-    }
-
-    fn set(&mut self, at: usize, value: u32) {
-        self.0[at] = value.to_le();
-    }
-
-    fn offset(&self, at: usize) -> usize {
-        self.get(at) as usize
-    }
-
-    /// Writes the correct checksum.
-    fn seal(&mut self) {
-        self.set(h::W_CRC, checksum(self.bytes()));
-    }
-
-    /// Returns the words with the image's structure: header, operation, matrix and block records.
-    fn structure(&self) -> Vec<usize> {
-        let (first, count) = (self.offset(h::W_OPS), (self.get(h::W_KIND) >> 16) as usize);
-        let ops = first..first + count * h::OP_WORDS;
-        let linear = ops.clone().step_by(h::OP_WORDS).filter(|at| self.get(*at) as u8 == op::LINEAR);
-        let matrix = |op: usize| {
-            let at = self.offset(op + 3);
-            let blocks = self.offset(at + 3);
-            let count = (self.get(at + 2) & 0xffff) as usize;
-            (at..at + h::MATRIX_WORDS).chain(blocks..blocks + count * h::BLOCK_WORDS)
-        };
-        let header = (h::W_KIND..h::W_DIGEST).chain(h::W_MATRICES..h::WORDS);
-        header.chain(ops).chain(linear.flat_map(matrix)).collect()
-    }
+/// Returns the words with the image's structure: header, operation, matrix and block records.
+fn structure() -> Vec<usize> {
+    let draft = Draft::of(VALID);
+    let (first, count) = (draft.offset(h::W_OPS), draft.high(h::W_KIND) as usize);
+    let ops = first..first + count * h::OP_WORDS;
+    let linear = ops.clone().step_by(h::OP_WORDS).filter(|at| draft.get(*at) as u8 == op::LINEAR);
+    let matrix = |op: usize| {
+        let at = draft.offset(op + 3);
+        let (blocks, count) = (draft.offset(at + 3), draft.low(at + 2) as usize);
+        (at..at + h::MATRIX_WORDS).chain(blocks..blocks + count * h::BLOCK_WORDS)
+    };
+    let header = (h::W_KIND..h::W_DIGEST).chain(h::W_MATRICES..h::WORDS);
+    header.chain(ops).chain(linear.flat_map(matrix)).collect()
 }
 
 /// Changes up to three words at random, mostly words of the structure.
@@ -83,11 +57,11 @@ fn mutate(random: &mut Random, draft: &mut Draft, structure: &[usize]) {
 /// Passes each accepted mutation to `see` and returns their number. If `see` panics, the test fails with the numbers of
 /// all such cases.
 fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
-    let structure = Draft::valid().structure();
+    let structure = structure();
     let (mut seen, mut failed) = (0, Vec::new());
     for case in 0..CASES {
         let mut random = Random::new(case);
-        let mut draft = Draft::valid();
+        let mut draft = Draft::of(VALID);
         mutate(&mut random, &mut draft, &structure);
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             let image = Image::new_checked(draft.bytes()).ok();
@@ -159,11 +133,11 @@ fn a_reset_clears_everything() {
 
 #[test]
 fn damage_after_the_check_does_not_panic() {
-    let structure = Draft::valid().structure();
+    let structure = structure();
     let mut outcomes = [0; 2];
     for case in 0..CASES {
         let mut random = Random::new(case);
-        let mut draft = Draft::valid();
+        let mut draft = Draft::of(VALID);
         let scratch = draft.get(h::W_SCRATCH);
         mutate(&mut random, &mut draft, &structure);
         // The head's memory stays as the header had it.

@@ -12,6 +12,7 @@ mod deployed;
 mod digests;
 mod distill;
 mod docs;
+#[path = "../../../kernels/tests/common/draft.rs"]
 mod draft;
 mod drive;
 mod faults;
