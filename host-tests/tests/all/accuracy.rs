@@ -7,11 +7,9 @@ use actq::methods::{Activations, Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq_bench::{shared_policies, ur3};
+use actq_bench::{rtn, shared_policies, ur3};
 use actq_kernels::Width;
 use anyhow::Result;
-
-use crate::on_target::qemu::rtn;
 
 /// Held-out NMSE at 8 bits, round to nearest, with the command's defaults.
 #[test]

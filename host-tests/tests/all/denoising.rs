@@ -14,7 +14,7 @@ use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
-use actq_bench::{Target, bits, shared_policies};
+use actq_bench::{Target, bits, rtn, shared_policies};
 use actq_kernels::image::{header as h, op};
 use actq_kernels::ops::noise::normal;
 use actq_kernels::pace::cost;
@@ -206,14 +206,11 @@ fn steps_match_the_textbook_formulas() -> Result<()> {
         // The part that depends on time is a table; the part that depends on the observation runs once.
         ensure!(graph.matrices.iter().all(|m| !m.name.starts_with("t ") && m.name != "in 12x21"), "{json}");
         ensure!(graph.denoising.as_ref().is_some_and(|d| d.first >= 3), "{json}");
-        let (outcomes, quantized) = {
-            let options =
-                Options { activations: Activations::Int16, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
-            let quantized = quantize(&policy, &Recordings::default(), &options, ())?;
-            (quantized.outcomes.len(), quantized.image)
-        };
-        assert_eq!(outcomes, graph.matrices.len());
-        let buffer = ImageBuffer::new(&quantized);
+        let options =
+            Options { activations: Activations::Int16, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
+        let quantized = quantize(&policy, &Recordings::default(), &options, ())?;
+        assert_eq!(quantized.outcomes.len(), graph.matrices.len());
+        let buffer = quantized.buffer();
         let image = buffer.image(case.dir.path())?;
         assert_eq!((image.noise_len(), image.obs_len()), (graph.noise_len(), OBS), "{json}");
         with_head::<_, anyhow::Error>(image, |head| {
@@ -241,8 +238,7 @@ fn steps_match_the_textbook_formulas() -> Result<()> {
 fn quantized(json: Value) -> Result<ImageBuffer> {
     let case = Case::new(json)?;
     let policy = Policy::load(case.dir.path())?;
-    let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
-    Ok(ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, ())?.image))
+    Ok(ImageBuffer::new(&rtn(&policy, Width::W3, 0, Activations::Auto)?))
 }
 
 #[test]
@@ -433,8 +429,7 @@ fn the_shared_flow_policy_runs_on_the_target() -> Result<()> {
     let heldout = Dataset::load(&dir.join("heldout.npz"), Sizes::of(&policy))?;
     let heldout = heldout.thinned(60, false);
     for (width, limit) in [(Width::W8, 5.1e-4), (Width::W3, 0.33), (Width::W2, 3.0)] {
-        let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(width)) };
-        let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
+        let bytes = rtn(&policy, width, 32, Activations::Auto)?;
         let buffer = ImageBuffer::new(&bytes);
         let report = eval::evaluate(buffer.image(&dir)?, &heldout)?;
         println!("fetch_flow, {} bits: NMSE {:.2e}, {} bytes", width.bits(), report.nmse, report.bytes);

@@ -2,13 +2,10 @@
 
 use std::path::Path;
 
-use actq::budget::Budget;
-use actq::data::Recordings;
-use actq::methods::{Method, Options};
-use actq::pipeline::quantize;
+use actq::methods::Activations;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq_bench::{shared_policies, ur3};
+use actq_bench::{rtn, shared_policies, ur3};
 use actq_cli::report::memory::{Peak, peak};
 use actq_kernels::Width;
 use anyhow::{Result, ensure};
@@ -16,9 +13,7 @@ use anyhow::{Result, ensure};
 /// Words of the arena, and of the values that operations write: the place of the largest need, the words needed there,
 /// and the words provided.
 fn scratch_is(dir: &Path, words: usize, [op, needed, placed]: [usize; 3]) -> Result<()> {
-    let policy = Policy::load(dir)?;
-    let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
-    let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, ())?.image);
+    let buffer = ImageBuffer::new(&rtn(&Policy::load(dir)?, Width::W3, 0, Activations::Auto)?);
     let image = buffer.image(dir)?;
     let (is, expected) = ((image.scratch_words(), peak(&image)), (words, Peak { op, words: needed, placed }));
     ensure!(is == expected, "{}: found {is:?}, expected {expected:?}", dir.display());

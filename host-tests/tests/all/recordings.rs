@@ -2,17 +2,15 @@
 
 use std::path::Path;
 
-use actq::budget::Budget;
-use actq::data::{Dataset, Range, Recording, Recordings, Sizes};
+use actq::data::{Dataset, Range, Recording, Sizes};
 use actq::graph::ops::{Linear, Lstm};
 use actq::graph::{Graph, Network, WeightMatrix, Weights, zero_state};
 use actq::measure::eval::evaluate;
-use actq::methods::{Activations, Method, Options};
-use actq::pipeline::quantize;
+use actq::methods::Activations;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::golden::Random;
-use actq_bench::{shared_policies, ur3};
+use actq_bench::{rtn, shared_policies, ur3};
 use actq_kernels::Width;
 use anyhow::Result;
 use ndarray::{Array2, Array3};
@@ -90,9 +88,7 @@ fn windows_start_from_their_recorded_state() -> Result<()> {
     };
     let from_zero = Dataset { state: None, ..cut.clone() };
 
-    let options =
-        Options { group: 32, activations: Activations::Int16, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
-    let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, ())?.image);
+    let buffer = ImageBuffer::new(&rtn(&policy, Width::W8, 32, Activations::Int16)?);
     let nmse = |dataset: &Dataset| Ok::<_, anyhow::Error>(evaluate(buffer.image(Path::new("memory"))?, dataset)?.nmse);
     let (whole, cut, from_zero) = (nmse(&whole)?, nmse(&cut)?, nmse(&from_zero)?);
     assert!(cut < 2.0 * whole && from_zero > 100.0 * cut, "{whole}, {cut}, from zero {from_zero}");

@@ -3,7 +3,7 @@
 
 use actq::methods::Activations;
 use actq::policy::Policy;
-use actq_bench::{Target, ur3};
+use actq_bench::{Target, rtn, ur3};
 use actq_kernels::Width;
 use anyhow::Result;
 
@@ -17,7 +17,7 @@ fn kernels_give_the_golden_sums() -> Result<()> {
 #[test]
 fn the_ur3_policy_matches_the_host() -> Result<()> {
     let policy = Policy::load(&ur3())?;
-    let image = qemu::rtn(&policy, Width::W3, 0, Activations::Int8)?;
+    let image = rtn(&policy, Width::W3, 0, Activations::Int8)?;
     qemu::same_bits(Target::Fpu, &image, &qemu::recorded(&ur3(), &policy)?)
 }
 

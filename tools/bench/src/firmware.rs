@@ -6,10 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{LazyLock, Mutex};
 
-use actq::budget::Budget;
-use actq::data::Recordings;
-use actq::methods::{Activations, Method, Options};
-use actq::pipeline::quantize;
+use actq::methods::Activations;
 use actq::policy::Policy;
 use actq_boards::{Target, root, target_dir};
 use actq_cli::outputs::files;
@@ -17,7 +14,7 @@ use actq_kernels::Width;
 use anyhow::{Context, Result, anyhow, ensure};
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 
-use crate::ur3;
+use crate::{rtn, ur3};
 
 pub(crate) fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<()> {
     cargo(what, &[&["build", "--quiet"], arguments].concat(), environment)
@@ -181,10 +178,7 @@ pub fn built_in() -> Result<&'static Path> {
 
 fn write_built_in() -> Result<PathBuf> {
     let path = target_dir().join("firmware-example.actq");
-    let policy = Policy::load(&ur3())?;
-    let options =
-        Options { group: 32, activations: Activations::Int8, ..Options::new(Method::Rtn, Budget::Width(Width::W3)) };
-    let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
+    let bytes = rtn(&Policy::load(&ur3())?, Width::W3, 32, Activations::Int8)?;
     // Cargo rebuilds a crate that includes a newer file.
     if fs::read(&path).ok().as_ref() != Some(&bytes) {
         files::write(&path, &bytes)?;

@@ -21,12 +21,25 @@ pub mod uart;
 
 use std::path::PathBuf;
 
+use actq::budget::Budget;
+use actq::data::Recordings;
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline::quantize;
+use actq::policy::Policy;
 pub use actq_boards::{Target, root, target_dir};
+use actq_kernels::Width;
+use anyhow::Result;
 pub use shared::{shared_policies, skipped};
 
 /// Returns the bits of values, to compare them exactly.
 pub fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|value| value.to_bits()).collect()
+}
+
+/// Returns the image of a policy whose weights are rounded to nearest; needs no recording.
+pub fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) -> Result<Vec<u8>> {
+    let options = Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
+    Ok(quantize(policy, &Recordings::default(), &options, ())?.image)
 }
 
 /// Returns the folder of the project's own policy.

@@ -2,16 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use actq::budget::Budget;
-use actq::data::Recordings;
 use actq::measure::eval;
-use actq::methods::{Method, Options};
-use actq::pipeline::quantize;
+use actq::methods::Activations;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
-use actq_bench::{Target, evaluation, firmware, ur3};
+use actq_bench::{Target, evaluation, firmware, rtn, ur3};
 use actq_kernels::Width;
 use anyhow::Result;
 
@@ -19,8 +16,7 @@ use anyhow::Result;
 fn a_step_reads_each_weight_once() -> Result<()> {
     let dir = ur3();
     let policy = Policy::load(&dir)?;
-    let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
-    let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
+    let bytes = rtn(&policy, Width::W8, 0, Activations::Auto)?;
     let slot = qemu::slot(&bytes)?;
     let path = slot.path();
     let buffer = ImageBuffer::new(&bytes);

@@ -1,14 +1,11 @@
 //! The functions on the Cortex-M4's FPU: the host's bits, and their cost.
 
-use actq::budget::Budget;
-use actq::data::Recordings;
-use actq::methods::{Method, Options};
-use actq::pipeline::quantize;
+use actq::methods::Activations;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
 use actq_bench::qemu::{self, Counter};
-use actq_bench::{Target, firmware, shared_policies};
+use actq_bench::{Target, firmware, rtn, shared_policies};
 use actq_firmware_bench::functions::{DENOISED, EXTREMES, LEN, hash, magnitudes, values};
 use actq_kernels::Width;
 use actq_kernels::math::Function;
@@ -122,8 +119,7 @@ fn every_function_keeps_its_bits_and_instruction_limit() -> Result<()> {
 fn an_lstm_head_keeps_its_instruction_limit() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     let policy = Policy::load(&policies.join("g1_lstm256"))?;
-    let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
-    let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
+    let bytes = rtn(&policy, Width::W3, 0, Activations::Auto)?;
     let slot = qemu::slot(&bytes)?;
     let buffer = ImageBuffer::new(&bytes);
     let matrices = buffer.image(slot.path())?.ops().filter_map(|op| op.matrix());

@@ -1,14 +1,11 @@
 //! Heads of published sizes (`examples/heads`) on the target: the host's bits, and the predicted cost.
 
-use actq::budget::Budget;
-use actq::data::Recordings;
 use actq::measure::time::{CLOCK, StepTime};
-use actq::methods::{Method, Options};
-use actq::pipeline::quantize;
+use actq::methods::Activations;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::qemu::Counter;
-use actq_bench::{Target, bits, firmware, profile};
+use actq_bench::{Target, bits, firmware, profile, rtn};
 use actq_heads::{octo, oft};
 use actq_kernels::Width;
 use anyhow::{Result, bail, ensure};
@@ -33,8 +30,7 @@ fn octos_head_matches_the_prediction_and_the_host() -> Result<()> {
     let mut chunks = Vec::new();
     for steps in [octo::STEPS, octo::STEPS / 2] {
         let policy = octo::head(TOKEN, steps)?.policy()?;
-        let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(Width::W3)) };
-        let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
+        let bytes = rtn(&policy, Width::W3, 32, Activations::Auto)?;
         ensure!(bytes.len() < 750_000, "{} bytes", bytes.len());
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image("octo".as_ref())?;
@@ -59,8 +55,7 @@ fn ofts_head_stores_its_matrices_once() -> Result<()> {
     const HIDDEN: usize = 64;
     let policy = oft::head(HIDDEN)?.policy()?;
     ensure!(policy.weights == oft::weights(HIDDEN), "{} weights", policy.weights);
-    let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
-    let bytes = quantize(&policy, &Recordings::default(), &options, ())?.image;
+    let bytes = rtn(&policy, Width::W8, 0, Activations::Auto)?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image("oft".as_ref())?;
     let time = StepTime::new(&image, CLOCK);

@@ -4,16 +4,14 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use actq::budget::Budget;
-use actq::data::{Recording, Recordings, Sizes};
-use actq::methods::{Activations, Method, Options};
-use actq::pipeline::quantize;
+use actq::data::{Recording, Sizes};
+use actq::methods::Activations;
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::cycles::Code;
 use actq_bench::firmware::{self, built_in};
 use actq_bench::qemu::{self, Server};
-use actq_bench::{Target, bits, golden, shared_policies, ur3};
+use actq_bench::{Target, bits, golden, rtn, shared_policies, ur3};
 use actq_kernels::Width;
 use actq_kernels::image::{op, worst_case};
 use anyhow::{Context, Result, ensure};
@@ -22,11 +20,6 @@ use crate::draft::Draft;
 
 /// Steps of each image on the host and in QEMU.
 const STEPS: usize = 208;
-
-pub(crate) fn rtn(policy: &Policy, width: Width, group: usize, activations: Activations) -> Result<Vec<u8>> {
-    let options = Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
-    Ok(quantize(policy, &Recordings::default(), &options, ())?.image)
-}
 
 #[test]
 fn kernels_give_the_golden_sums_on_the_target() -> Result<()> {
