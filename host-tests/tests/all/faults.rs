@@ -12,6 +12,8 @@ use actq::runtime::ImageBuffer;
 use actq_kernels::math::Function;
 use actq_kernels::{Head, StepError, Width};
 
+use crate::playback::with_head;
+
 /// Length of observation, hidden values and action.
 const N: usize = 2;
 const MAX_STEP: f32 = 0.25;
@@ -31,12 +33,6 @@ fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: ActionContract)
     let (_, outcomes) = quantize(&graph, None, Rate::Width(Width::W8), &options).expect("the graph is valid");
     let policy = Policy { contract, ..Policy::of("faults", graph) };
     ImageBuffer::new(&actq::emit::image(&policy, &outcomes).expect("the policy fits the format"))
-}
-
-fn with_head(buffer: &ImageBuffer, work: impl FnOnce(&mut Head<'_, '_>)) {
-    let image = buffer.image("memory".as_ref()).expect("the image is valid");
-    let mut scratch = vec![0; image.scratch_words()];
-    work(&mut Head::new(image, &mut scratch).expect("the scratch memory has the image's size"));
 }
 
 fn step_limit() -> ImageBuffer {

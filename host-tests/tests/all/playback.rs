@@ -33,7 +33,7 @@ fn echo(chunk: usize, execute: usize, contract: ActionContract) -> ImageBuffer {
     ImageBuffer::new(&actq::emit::image(&policy, &[]).expect("the policy fits the format"))
 }
 
-fn with_head<T>(buffer: &ImageBuffer, work: impl FnOnce(&mut Head<'_, '_>) -> T) -> T {
+pub(crate) fn with_head<T>(buffer: &ImageBuffer, work: impl FnOnce(&mut Head<'_, '_>) -> T) -> T {
     let image = buffer.image("memory".as_ref()).expect("the image is valid");
     let mut scratch = vec![0; image.scratch_words()];
     work(&mut Head::new(image, &mut scratch).expect("the scratch memory has the image's size"))
