@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use actq_bench::command::{actq, run, succeeded};
+use actq_bench::command::{actq, failed, run, succeeded};
 use anyhow::{Result, ensure};
 use tempfile::TempDir;
 
@@ -26,8 +26,8 @@ pub(super) const STRICT: [&str; 6] = ["-Wall", "-Wextra", "-Wpedantic", "-Wconve
 
 pub(super) fn compiles(command: &mut Command) -> Result<()> {
     let output = command.output()?;
-    ensure!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
-    ensure!(output.stderr.is_empty(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
+    let is_silent = output.status.success() && output.stderr.is_empty();
+    ensure!(is_silent, "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
     Ok(())
 }
 
@@ -87,12 +87,8 @@ fn constants_compile_and_have_the_places_of_inputs_targets_and_joints() -> Resul
 pub(super) fn has_compiler(file: &Path, standard: &str) -> Result<bool> {
     let empty = file.with_file_name(format!("empty.{}", file.extension().unwrap_or_default().display()));
     fs::write(&empty, "")?;
-    Ok(Command::new("cc")
-        .arg(standard)
-        .arg("-fsyntax-only")
-        .arg(empty)
-        .output()
-        .is_ok_and(|output| output.status.success()))
+    let output = Command::new("cc").arg(standard).arg("-fsyntax-only").arg(empty).output();
+    Ok(output.is_ok_and(|output| output.status.success()))
 }
 
 #[test]
@@ -108,8 +104,7 @@ fn constants_are_refused_for_other_languages_and_without_gains() -> Result<()> {
         let gains = gains.map(path);
         let gains: Vec<&str> = gains.iter().flat_map(|gains| ["--gains", gains]).collect();
         let output = run(actq(&[&["constants", &image, "--out", &out][..], &gains].concat()), b"")?;
-        let error = String::from_utf8_lossy(&output.stderr);
-        ensure!(output.status.code() == Some(1) && error.contains(message), "{error}");
+        failed(&output, 1, &[message])?;
         ensure!(!Path::new(&out).exists(), "something was written");
     }
     Ok(())
