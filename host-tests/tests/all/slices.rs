@@ -159,11 +159,15 @@ fn seed(recurrent: bool) -> Result<u64> {
     (0..400).find(suits).context("no seed gives a suitable network")
 }
 
+/// Runs `work` with a head of such a network, and observations.
+fn on_sliced(recurrent: bool, work: impl FnOnce(&mut Head<'_, '_>, &[Vec<f32>]) -> Result<()>) -> Result<()> {
+    let seed = seed(recurrent)?;
+    on_head(seed, |head| work(head, &observations(seed)))
+}
+
 #[test]
 fn ready_stays_ready_until_the_next_begin() -> Result<()> {
-    let seed = seed(true)?;
-    on_head(seed, |head| {
-        let observations = observations(seed);
+    on_sliced(true, |head, observations| {
         let (action, _) = in_polls(head, &observations[0], || u32::MAX)?;
         for _ in 0..3 {
             let Poll::Ready(again) = head.poll(head.image().least_budget())? else { anyhow::bail!("pending") };
@@ -179,13 +183,12 @@ fn ready_stays_ready_until_the_next_begin() -> Result<()> {
 
 #[test]
 fn a_poll_without_a_step_is_an_error() -> Result<()> {
-    let seed = seed(true)?;
-    on_head(seed, |head| {
+    on_sliced(true, |head, observations| {
         assert_eq!(head.poll(u32::MAX), Err(StepError::NotBegun));
-        part_of_a_step(head, &observations(seed)[0], 2)?;
+        part_of_a_step(head, &observations[0], 2)?;
         head.reset();
         assert_eq!(head.poll(u32::MAX), Err(StepError::NotBegun), "a reset drops the step");
-        head.infer(&observations(seed)[0])?;
+        head.infer(&observations[0])?;
         assert_eq!(head.poll(u32::MAX), Err(StepError::NotBegun), "infer gives no action");
         Ok(())
     })
@@ -193,9 +196,7 @@ fn a_poll_without_a_step_is_an_error() -> Result<()> {
 
 #[test]
 fn a_budget_below_the_least_changes_nothing() -> Result<()> {
-    let seed = seed(true)?;
-    on_head(seed, |head| {
-        let observations = observations(seed);
+    on_sliced(true, |head, observations| {
         let expected = whole(head, &observations[..2])?;
         head.reset();
         head.step(&observations[0])?;
@@ -213,9 +214,7 @@ fn a_budget_below_the_least_changes_nothing() -> Result<()> {
 #[test]
 fn a_dropped_step_leaves_nothing_behind() -> Result<()> {
     // Without a recurrent state, the next action equals that without the dropped step, including the step limit.
-    let plain = seed(false)?;
-    on_head(plain, |head| {
-        let observations = observations(plain);
+    on_sliced(false, |head, observations| {
         let expected = whole(head, &observations[..2])?;
         for polls in 0..5 {
             head.reset();
@@ -226,9 +225,7 @@ fn a_dropped_step_leaves_nothing_behind() -> Result<()> {
         Ok(())
     })?;
     // A recurrent state is reset if a poll has worked on it.
-    let recurrent = seed(true)?;
-    on_head(recurrent, |head| {
-        let observations = observations(recurrent);
+    on_sliced(true, |head, observations| {
         let expected = whole(head, &observations[..2])?;
         head.reset();
         let fresh = bits(head.infer(&observations[1])?);
@@ -254,9 +251,7 @@ fn a_dropped_step_leaves_nothing_behind() -> Result<()> {
 
 #[test]
 fn an_error_resets() -> Result<()> {
-    let seed = seed(true)?;
-    on_head(seed, |head| {
-        let observations = observations(seed);
+    on_sliced(true, |head, observations| {
         let expected = whole(head, &observations[..1])?;
         part_of_a_step(head, &observations[2], 3)?;
         let bad = vec![f32::NAN; OBSERVATION];
@@ -292,9 +287,8 @@ fn an_error_resets() -> Result<()> {
 
 #[test]
 fn single_operation_polls_end_after_each_operation() -> Result<()> {
-    let seed = seed(true)?;
-    on_head(seed, |head| {
-        head.begin(&observations(seed)[0])?;
+    on_sliced(true, |head, observations| {
+        head.begin(&observations[0])?;
         for op in 0..head.image().op_count() {
             ensure!(head.poll_op(u32::MAX)?.is_pending(), "ready before operation {op}");
         }

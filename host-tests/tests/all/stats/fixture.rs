@@ -1,12 +1,11 @@
 //! A small policy with recordings, in a folder in which commands run.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs;
 use std::path::PathBuf;
 use std::process::Output;
 
-use actq::data::NpzWriter;
-use actq::graph::Evaluator;
+use actq::data::Dataset;
 use actq::policy::Policy;
 use actq_bench::command::{actq, research, run, succeeded};
 use actq_bench::golden::Random;
@@ -51,13 +50,9 @@ impl Fixture {
         for (name, seed) in [("calib.npz", 5), ("heldout.npz", 6)] {
             let mut random = Random::new(seed);
             let obs = Array3::from_shape_simple_fn((2, 150, OBS), || 2.0 * random.unit());
-            let mut evaluator = Evaluator::new(&policy.graph);
-            let actions = obs.rows().into_iter().flat_map(|row| evaluator.step(&row.to_vec(), &mut |_, _| {}));
-            let action = Array3::from_shape_vec((2, 150, ACT), actions.collect())?;
-            let mut npz = NpzWriter::new(File::create(dir.join(name))?);
-            npz.array("obs", obs.shape(), obs.iter().copied())?;
-            npz.array("action", action.shape(), action.iter().copied())?;
-            npz.finish()?;
+            let mut recording = Dataset { path: name.into(), obs, action: None, length: vec![150; 2], state: None };
+            recording.fill_actions(&policy.graph);
+            fs::write(dir.join(name), recording.npz()?)?;
         }
         Ok(fixture)
     }
