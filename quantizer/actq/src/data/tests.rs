@@ -149,109 +149,90 @@ fn with_f32(place: [usize; 3], value: f32) -> Array {
     Array::F32(array)
 }
 
-/// Lists damaged arrays, the sizes to fit, and the whole message after the file's name.
-fn spoilt() -> Vec<(Vec<Named>, Sizes, &'static str)> {
+/// Lists damaged arrays, and the whole message after the file's name.
+fn spoilt() -> Vec<(Vec<Named>, &'static str)> {
     let floats = |shape: &[usize]| Array::F32(count(shape));
-    let mut infinite = count(&[2, 4]);
-    infinite[[1, 2]] = f32::NEG_INFINITY;
     vec![
-        (vec![("seed", ints(&[1])), ("act", obs())], SIZES, "array \"obs\" is missing; the file holds act, seed"),
+        (vec![("seed", ints(&[1])), ("act", obs())], "array \"obs\" is missing; the file holds act, seed"),
         (
             vec![("obs", floats(&[5]))],
-            SIZES,
             "array \"obs\" has the shape [5]; use [episode, step, value], or [frame, value] for one episode",
         ),
         (
             vec![("obs", floats(&[1, 2, 5, 3]))],
-            SIZES,
             "array \"obs\" has the shape [1, 2, 5, 3]; use [episode, step, value], or [frame, value] for one episode",
         ),
-        (vec![("obs", floats(&[0, 5, 3]))], SIZES, "array \"obs\" is empty: [0, 5, 3]"),
-        (vec![("obs", floats(&[2, 0, 3]))], SIZES, "array \"obs\" is empty: [2, 0, 3]"),
-        (vec![("obs", floats(&[2, 5, 4]))], SIZES, "array \"obs\" has 4 values per step, but the policy takes 3"),
+        (vec![("obs", floats(&[0, 5, 3]))], "array \"obs\" is empty: [0, 5, 3]"),
+        (vec![("obs", floats(&[2, 0, 3]))], "array \"obs\" is empty: [2, 0, 3]"),
+        (vec![("obs", floats(&[2, 5, 4]))], "array \"obs\" has 4 values per step, but the policy takes 3"),
         (
             vec![("obs", ints(&[1]))],
-            SIZES,
             "array \"obs\" has the shape [1]; use [episode, step, value], or [frame, value] for one episode",
         ),
         (
             vec![("obs", Array::I32(count(&[2, 5, 3]).mapv(|v| v as i32)))],
-            SIZES,
             "array \"obs\" is of type int32; use float32 or float64",
         ),
-        (vec![("obs", with_f32([1, 4, 2], f32::NAN))], SIZES, "array \"obs\" holds NaN at episode 1, step 4, value 2"),
-        (
-            vec![("obs", with([0, 2, 1], f64::NEG_INFINITY))],
-            SIZES,
-            "array \"obs\" holds -inf at episode 0, step 2, value 1",
-        ),
+        (vec![("obs", with_f32([1, 4, 2], f32::NAN))], "array \"obs\" holds NaN at episode 1, step 4, value 2"),
+        (vec![("obs", with([0, 2, 1], f64::NEG_INFINITY))], "array \"obs\" holds -inf at episode 0, step 2, value 1"),
         (
             vec![("obs", with([0, 0, 0], -1e39))],
-            SIZES,
             "array \"obs\" holds -1e39, beyond float32's range, at episode 0, step 0, value 0",
         ),
         (
             vec![("obs", obs()), ("action", floats(&[2, 5, 3]))],
-            SIZES,
             "array \"action\" has the shape [2, 5, 3]; [2, 5, 2] is needed: the network's raw output at every observation",
         ),
         (
             vec![("obs", floats(&[5, 3])), ("action", floats(&[1, 5, 2]))],
-            SIZES,
             "array \"action\" has the shape [1, 5, 2]; [5, 2] is needed: the network's raw output at every observation",
         ),
         (
             vec![("obs", obs()), ("length", ints(&[5, 6]))],
-            SIZES,
             "episode 1 has length 6, but the array \"obs\" holds 5 steps",
         ),
-        (vec![("obs", obs()), ("length", ints(&[-1, 5]))], SIZES, "array \"length\" holds -1 for episode 0"),
+        (vec![("obs", obs()), ("length", ints(&[-1, 5]))], "array \"length\" holds -1 for episode 0"),
         (
             vec![("obs", obs()), ("length", ints(&[5]))],
-            SIZES,
             "array \"length\" has the shape [1]; [2] is needed: the valid steps of each episode",
         ),
-        (
-            vec![("obs", obs()), ("length", floats(&[2]))],
-            SIZES,
-            "array \"length\" is of type float32; use int32 or int64",
-        ),
-        (
-            vec![("obs", obs()), ("length", ints(&[0, 0]))],
-            SIZES,
-            "the recording holds no frame: every episode has length 0",
-        ),
+        (vec![("obs", obs()), ("length", floats(&[2]))], "array \"length\" is of type float32; use int32 or int64"),
+        (vec![("obs", obs()), ("length", ints(&[0, 0]))], "the recording holds no frame: every episode has length 0"),
         (
             vec![("obs", obs()), ("state", floats(&[2, 4]))],
-            SIZES,
             "array \"state\" is present, but the policy has no recurrent state",
         ),
+    ]
+}
+
+/// The same for the states of a recurrent policy.
+fn spoilt_states() -> Vec<(Vec<Named>, &'static str)> {
+    let mut infinite = count(&[2, 4]);
+    infinite[[1, 2]] = f32::NEG_INFINITY;
+    let state = |array| vec![("obs", obs()), ("state", Array::F32(array))];
+    vec![
         (
-            vec![("obs", obs()), ("state", floats(&[2, 3]))],
-            RECURRENT,
+            state(count(&[2, 3])),
             "array \"state\" has the shape [2, 3]; [2, 4] is needed: the recurrent state before each episode's first step, hidden then cell state of each lstm, the state of each gru, in the order of the ops",
         ),
         (
-            vec![("obs", obs()), ("state", floats(&[4]))],
-            RECURRENT,
+            state(count(&[4])),
             "array \"state\" has the shape [4]; [2, 4] is needed: the recurrent state before each episode's first step, hidden then cell state of each lstm, the state of each gru, in the order of the ops",
         ),
-        (
-            vec![("obs", obs()), ("state", Array::F32(infinite))],
-            RECURRENT,
-            "array \"state\" holds -inf at episode 1, value 2",
-        ),
+        (state(infinite), "array \"state\" holds -inf at episode 1, value 2"),
     ]
 }
 
 #[test]
 fn errors_name_the_array_and_its_fault() {
     let dir = folder();
-    for ending in ["npz", "safetensors"] {
-        for (arrays, sizes, expected) in spoilt() {
-            let path = write(&dir, &format!("r.{ending}"), &arrays);
-            let error = format!("{:#}", Dataset::load(&path, sizes).expect_err(expected));
-            assert_eq!(error, format!("{}: {expected}", path.display()));
+    for (sizes, cases) in [(SIZES, spoilt()), (RECURRENT, spoilt_states())] {
+        for (arrays, expected) in cases {
+            for ending in ["npz", "safetensors"] {
+                let path = write(&dir, &format!("r.{ending}"), &arrays);
+                let error = format!("{:#}", Dataset::load(&path, sizes).expect_err(expected));
+                assert_eq!(error, format!("{}: {expected}", path.display()));
+            }
         }
     }
 }
