@@ -250,9 +250,7 @@ fn impossible_matrices_are_refused() {
             }
             d.set_low(d.data(OUTPUT), 7);
         }),
-        ("row scales away from their weights", E::Section, |d| {
-            d.set(d.block(FIRST, 0) + 2, d.get(d.block(FIRST, 0) + 2) + 1);
-        }),
+        ("row scales away from their weights", E::Section, |d| d.map_low(d.block(FIRST, 0) + 2, |at| at + 1)),
         ("steps away from its scales", E::Section, |d| {
             d.set(d.block(OUTPUT, 0) + 3, d.get(d.block(OUTPUT, 1) + 3));
         }),
@@ -315,9 +313,7 @@ fn operations_read_only_values_of_their_step() {
         ("a sum with what is written later", E::Unwritten, |d| {
             d.set_low(d.op(FIRST), u32::from(op::LINEAR) | 1 << 8);
         }),
-        ("a destination after a gap", E::Arena, |d| {
-            d.set_low(d.op(NORMALIZE) + 1, d.low(d.op(NORMALIZE) + 1) + 1);
-        }),
+        ("a destination after a gap", E::Arena, |d| d.map_low(d.op(NORMALIZE) + 1, |at| at + 1)),
         ("an output that is not written", E::Unwritten, |d| d.set_high(h::W_OBS_OUT, d.low(h::W_ACTION_WORK) - 1)),
     ]);
 }

@@ -53,6 +53,14 @@ impl Draft {
         self.set(at, self.low(at) | value << 16);
     }
 
+    pub(crate) fn map_low(&mut self, at: usize, change: impl Fn(u32) -> u32) {
+        self.set_low(at, change(self.low(at)));
+    }
+
+    pub(crate) fn map_high(&mut self, at: usize, change: impl Fn(u32) -> u32) {
+        self.set_high(at, change(self.high(at)));
+    }
+
     /// Updates the checksum.
     pub(crate) fn seal(&mut self) {
         self.set(h::W_CRC, checksum(self.bytes()));
