@@ -184,7 +184,10 @@ fn the_link_client_in_c_arms_a_controller_and_reads_its_actions() -> Result<()> 
     ensure!(output.status.success(), "{output:?}");
     let printed = String::from_utf8(output.stdout)?;
     let start = format!("image {crc:08x}, {OBS_DIM} values, {ACT_DIM} axes: ");
-    ensure!(printed.starts_with(&start) && printed.ends_with("damaged frames: 0 here, 0 at the controller\n"), "{printed}");
+    ensure!(
+        printed.starts_with(&start) && printed.ends_with("damaged frames: 0 here, 0 at the controller\n"),
+        "{printed}"
+    );
     let applied = printed[start.len()..].split(' ').next().context("a number")?;
     ensure!(applied.parse::<usize>()? >= ACTIONS, "{printed}");
     let status = controller.client()?.status()?;
