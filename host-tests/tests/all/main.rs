@@ -3,6 +3,7 @@
 mod accuracy;
 mod arrows;
 mod budgets;
+mod c_ports;
 mod cli;
 mod compare;
 mod constants;
