@@ -1,11 +1,12 @@
 //! Heads: step, slices, saved state.
 
+use core::ops::Range;
 use core::task::Poll;
 
 use actq_kernels::{Head, StepError};
 
 use crate::image::{ActqImage, opened};
-use crate::memory::{addresses, apart, check, put, seal, slice, slice_mut};
+use crate::memory::{addresses, all_apart, apart, check, put, seal, slice, slice_mut};
 use crate::status::{ActqStatus, Code, status};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTH");
@@ -24,23 +25,22 @@ struct Running {
     seal: usize,
     /// `true` from the begin of a step until its action is ready.
     polling: bool,
-    /// Address and words of the scratch memory.
-    scratch: (usize, usize),
+    /// Addresses of the scratch memory and of the image.
+    memory: [Range<usize>; 2],
     head: Head<'static, 'static>,
 }
 
 const _: () = assert!(size_of::<Running>() <= size_of::<ActqHead>() && align_of::<Running>() <= align_of::<ActqHead>());
 
 impl Running {
-    /// Requires that the caller's buffer shares no byte with this head and its scratch memory.
+    /// Requires that the caller's buffer shares no byte with this head, its scratch memory and its image.
     fn apart_from<T>(&self, buffer: *const T, len: usize) -> Result<(), Code> {
         if len > 0 {
             check(buffer, len)?;
         }
-        let (from, words) = self.scratch;
         let buffer = addresses(buffer, len);
-        apart(&[from..from + 4 * words, buffer.clone()])?;
-        apart(&[addresses(self, 1), buffer])
+        let [scratch, image] = &self.memory;
+        [&addresses(self, 1), scratch, image].into_iter().try_for_each(|own| apart(own, &buffer))
     }
 
     /// Checks an action's buffer. It is borrowed only when the action is ready: it may be the observation's, too.
@@ -113,13 +113,14 @@ pub unsafe extern "C" fn actq_head_init(
         // SAFETY: as the caller promises.
         let opened = unsafe { opened(image) }?;
         check(scratch, words)?;
-        apart(&[addresses(head, 1), addresses(image, 1), addresses(scratch, words), opened.bytes()])?;
+        let memory = [addresses(scratch, words), opened.bytes()];
+        let structures = [addresses(head, 1), addresses(image, 1)];
+        all_apart(&[&structures[0], &structures[1], &memory[0], &memory[1]])?;
         // SAFETY: as the caller promises.
         let new = Head::new(opened.image, unsafe { slice_mut(scratch, words) }?)?;
         let place = head.cast::<Running>();
-        let scratch = (scratch as usize, words);
         // SAFETY: valid as the words above.
-        unsafe { put(place, Running { seal: seal(place, MAGIC), polling: false, scratch, head: new }) }
+        unsafe { put(place, Running { seal: seal(place, MAGIC), polling: false, memory, head: new }) }
     };
     status(init())
 }
@@ -270,7 +271,12 @@ pub unsafe extern "C" fn actq_self_test(head: *mut ActqHead) -> ActqStatus {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_saved_bytes(head: *mut ActqHead, bytes: *mut usize) -> ActqStatus {
     // SAFETY: as the caller promises.
-    unsafe { with(head, |running| put(bytes, running.head.saved_len())) }
+    unsafe {
+        with(head, |running| {
+            running.apart_from(bytes, 1)?;
+            put(bytes, running.head.saved_len())
+        })
+    }
 }
 
 /// Writes the state to `to`, of `actq_saved_bytes` bytes. A head of the same image that restores it continues with the

@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use actq_kernels::{Image, Port};
 
-use crate::memory::{addresses, apart, check, put, seal, slice, slice_mut};
+use crate::memory::{addresses, all_apart, apart, check, put, seal, slice, slice_mut};
 use crate::status::{ActqStatus, Code, status};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTI");
@@ -127,7 +127,7 @@ pub unsafe extern "C" fn actq_image_open(image: *mut ActqImage, bytes: *const u8
         // SAFETY: as the caller promises.
         unsafe { slice_mut(image.cast::<usize>(), size_of::<ActqImage>() / size_of::<usize>()) }?.fill(0);
         check(bytes, len)?;
-        apart(&[addresses(image, 1), addresses(bytes, len)])?;
+        apart(&addresses(image, 1), &addresses(bytes, len))?;
         // SAFETY: as the caller promises.
         let checked = Image::new_checked(unsafe { slice(bytes, len) }?)?;
         let place = image.cast::<Opened>();
@@ -137,62 +137,77 @@ pub unsafe extern "C" fn actq_image_open(image: *mut ActqImage, bytes: *const u8
     status(open())
 }
 
+/// Writes what `get` reads of an image to `out`.
+///
+/// # Safety
+///
+/// As [`opened`]; `out` is null, misaligned, or valid for a write.
+unsafe fn query<T>(
+    image: *const ActqImage,
+    out: *mut T,
+    get: impl FnOnce(Image<'static>) -> Result<T, Code>,
+) -> ActqStatus {
+    let query = || {
+        // SAFETY: as the caller promises.
+        let opened = unsafe { opened(image) }?;
+        check(out, 1)?;
+        all_apart(&[&addresses(out, 1), &addresses(image, 1), &opened.bytes()])?;
+        // SAFETY: as the caller promises.
+        unsafe { put(out, get(opened.image)?) }
+    };
+    status(query())
+}
+
 /// Gives an image's numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_image_sizes(image: *const ActqImage, sizes: *mut Sizes) -> ActqStatus {
-    // SAFETY: as the caller promises.
-    let query = || unsafe {
-        let image = opened(image)?.image;
-        put(
-            sizes,
-            Sizes {
-                image_bytes: image.bytes(),
-                scratch_words: image.scratch_words(),
-                observation_len: image.obs_len(),
-                action_len: image.act_len(),
-                chunk: image.chunk(),
-                execute: image.execute(),
-                ports: image.ports().count(),
-                rate_hz: image.rate_hz(),
-                crc: image.crc(),
-            },
-        )
+    let get = |image: Image<'static>| {
+        Ok(Sizes {
+            image_bytes: image.bytes(),
+            scratch_words: image.scratch_words(),
+            observation_len: image.obs_len(),
+            action_len: image.act_len(),
+            chunk: image.chunk(),
+            execute: image.execute(),
+            ports: image.ports().count(),
+            rate_hz: image.rate_hz(),
+            crc: image.crc(),
+        })
     };
-    status(query())
+    // SAFETY: as the caller promises.
+    unsafe { query(image, sizes, get) }
 }
 
 /// Gives a policy's name.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_image_name(image: *const ActqImage, name: *mut Text) -> ActqStatus {
     // SAFETY: as the caller promises.
-    status((|| unsafe { put(name, text(opened(image)?.image.name())) })())
+    unsafe { query(image, name, |image| Ok(text(image.name()))) }
 }
 
 /// Gives what a step costs.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_image_cost(image: *const ActqImage, cost: *mut CCost) -> ActqStatus {
-    // SAFETY: as the caller promises.
-    let query = || unsafe {
-        let image = opened(image)?.image;
+    let get = |image: Image<'static>| {
         let step = image.step_cost();
-        let given = CCost { instructions: step.instructions, cycles: step.cycles, least_budget: image.least_budget() };
-        put(cost, given)
+        Ok(CCost { instructions: step.instructions, cycles: step.cycles, least_budget: image.least_budget() })
     };
-    status(query())
+    // SAFETY: as the caller promises.
+    unsafe { query(image, cost, get) }
 }
 
 /// Gives a raw input or target, numbered from 0: the raw inputs in the order of the observation, then the targets in
 /// the order of the action. After the last one, and if the image has none, it returns `ACTQ_NO_SUCH_PORT`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_image_port(image: *const ActqImage, number: usize, port: *mut CPort) -> ActqStatus {
-    // SAFETY: as the caller promises.
-    let query = || unsafe {
-        let (offset, found) = places(opened(image)?.image).nth(number).ok_or(Code::NoSuchPort)?;
+    let get = |image: Image<'static>| {
+        let (offset, found) = places(image).nth(number).ok_or(Code::NoSuchPort)?;
         let [low, high] = found.range;
         let [name, names] = [found.name, found.names].map(text);
-        put(port, CPort { kind: found.kind as u32, offset, len: found.len, low, high, name, names })
+        Ok(CPort { kind: found.kind as u32, offset, len: found.len, low, high, name, names })
     };
-    status(query())
+    // SAFETY: as the caller promises.
+    unsafe { query(image, port, get) }
 }
 
 /// Copies `count` values of the raw input with this name to their place in `observation`, which has `len` values.
@@ -207,7 +222,8 @@ pub unsafe extern "C" fn actq_set_input(
 ) -> ActqStatus {
     let set = || {
         // SAFETY: as the caller promises.
-        let image = unsafe { opened(image) }?.image;
+        let opened = unsafe { opened(image) }?;
+        let (structure, image) = (image, opened.image);
         if name.is_null() {
             return Err(Code::Null);
         }
@@ -220,7 +236,9 @@ pub unsafe extern "C" fn actq_set_input(
         if count != port.len || len != image.obs_len() {
             return Err(Code::Length);
         }
-        apart(&[addresses(values, count), addresses(observation, len)])?;
+        check(observation, len)?;
+        let to = addresses(observation, len);
+        all_apart(&[&to, &addresses(values, count), &addresses(structure, 1), &opened.bytes()])?;
         // SAFETY: as the caller promises; they do not overlap.
         let (values, observation) = unsafe { (slice(values, count)?, slice_mut(observation, len)?) };
         observation.iter_mut().skip(offset).zip(values).for_each(|(to, value)| *to = *value);

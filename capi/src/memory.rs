@@ -68,14 +68,17 @@ pub(crate) fn addresses<T>(pointer: *const T, len: usize) -> Range<usize> {
     from..from.saturating_add(len.saturating_mul(size_of::<T>()))
 }
 
+/// Requires that two ranges share no byte.
+pub(crate) fn apart(one: &Range<usize>, other: &Range<usize>) -> Result<(), Code> {
+    if one.start < other.end && other.start < one.end { Err(Code::Overlap) } else { Ok(()) }
+}
+
 /// Requires that no two of these ranges share a byte.
-pub(crate) fn apart(ranges: &[Range<usize>]) -> Result<(), Code> {
-    for (i, one) in ranges.iter().enumerate() {
-        for other in ranges.iter().skip(i + 1) {
-            if one.start < other.end && other.start < one.end {
-                return Err(Code::Overlap);
-            }
-        }
+pub(crate) fn all_apart(ranges: &[&Range<usize>]) -> Result<(), Code> {
+    let mut rest = ranges;
+    while let Some((one, others)) = rest.split_first() {
+        others.iter().try_for_each(|other| apart(one, other))?;
+        rest = others;
     }
     Ok(())
 }

@@ -50,7 +50,7 @@ int main(int count, char **arguments) {
     long applied = 0;
     actq_link_init(&link, micros() / 1000u);
     /* Until the controller says that it is disarmed: what is sent last may be lost when a socket closes. */
-    while (applied < wanted || status.state == ACTQ_LINK_ARMED) {
+    while (applied < wanted || status.state != ACTQ_LINK_DISARMED) {
         if (applied >= wanted) {
             put(line, wire, actq_link_disarm(&link, micros(), wire));
         }
