@@ -1,7 +1,7 @@
 //! C interface of the executor. `include/actq.h` is made from it by cbindgen; a test compares them.
 //!
-//! Each function takes the caller's pointers, checks them ([`memory`]), and calls `actq-kernels`. It returns a
-//! [`status::Code`]'s number: 0, or the number of the kernels' error.
+//! Each function takes the caller's pointers, checks them (`memory.rs`), and calls `actq-kernels`. It returns the number
+//! of a [`Code`]: 0, or the number of the kernels' error.
 //!
 //! # Safety
 //!
