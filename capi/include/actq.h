@@ -15,7 +15,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** What a function returns. The numbers stay the same in all versions. */
+/** The status that a function returns. The numbers stay the same in all versions. */
 enum actq_code {
   /** done */
   ACTQ_OK = 0,
@@ -138,7 +138,7 @@ enum actq_code {
 #define ACTQ_ABI 1
 
 /**
- * What a function returns: one of `actq_code`.
+ * The status that a function returns: one of `actq_code`.
  */
 typedef int32_t actq_status;
 
@@ -215,7 +215,7 @@ typedef struct actq_text {
 } actq_text;
 
 /**
- * What a step that runs the network costs on a Cortex-M4F, by the cost model (docs/KERNELS.md).
+ * The cost of a step that runs the network on a Cortex-M4F, by the cost model (docs/KERNELS.md).
  */
 typedef struct actq_cost {
   /**

@@ -19,7 +19,7 @@ pub struct ActqHead {
     opaque: [usize; 40],
 }
 
-/// What an initialized [`ActqHead`] holds.
+/// The content of an initialized [`ActqHead`].
 #[repr(C)]
 struct Running {
     seal: usize,
@@ -93,7 +93,7 @@ unsafe fn with(head: *mut ActqHead, run: impl FnOnce(&mut Running) -> Result<(),
         if found.first() != Some(&seal(place, MAGIC)) {
             return Err(Code::NotInitialized);
         }
-        // SAFETY: only `actq_head_init` writes this seal, with a head behind it, at this address.
+        // SAFETY: only `actq_head_init` writes this seal, with a head after it, at this address.
         run(unsafe { &mut *place })
     }))
 }

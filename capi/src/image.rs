@@ -18,7 +18,7 @@ pub struct ActqImage {
     opaque: [usize; 6],
 }
 
-/// What an opened [`ActqImage`] holds.
+/// The content of an opened [`ActqImage`].
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub(crate) struct Opened {
@@ -91,7 +91,7 @@ pub struct CPort {
     pub names: Text,
 }
 
-/// What a step that runs the network costs on a Cortex-M4F, by the cost model (docs/KERNELS.md).
+/// The cost of a step that runs the network on a Cortex-M4F, by the cost model (docs/KERNELS.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct CCost {

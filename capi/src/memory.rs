@@ -13,7 +13,7 @@ pub(crate) fn check<T>(pointer: *const T, len: usize) -> Result<(), Code> {
     if !pointer.is_aligned() {
         return Err(Code::Alignment);
     }
-    // What Rust requires of a slice's length.
+    // The longest slice that Rust allows.
     let bytes = len.checked_mul(size_of::<T>()).filter(|bytes| isize::try_from(*bytes).is_ok());
     match bytes.and_then(|bytes| (pointer as usize).checked_add(bytes)) {
         Some(_) => Ok(()),

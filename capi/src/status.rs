@@ -4,12 +4,12 @@ use core::ffi::{CStr, c_char};
 
 use actq_kernels::{HeadError, ImageError, SavedError, StepError};
 
-/// What a function returns: one of `actq_code`.
+/// The status that a function returns: one of `actq_code`.
 pub type ActqStatus = i32;
 
 macro_rules! codes {
     ($($(#[$doc:meta])* $name:ident = $code:literal, $text:literal;)*) => {
-        /// What a function returns. The numbers of errors stay the same in all versions.
+        /// The status that a function returns. The numbers of errors stay the same in all versions.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(i32)]
         pub enum Code {
