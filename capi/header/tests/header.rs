@@ -8,7 +8,8 @@ use actq_c::Code;
 /// Returns C's enumeration of the codes, which a macro declares: cbindgen does not expand macros.
 fn codes() -> String {
     let mut lines =
-        "\n/** The status that a function returns. The numbers stay the same in all versions. */\nenum actq_code {\n".to_owned();
+        "\n/** The status that a function returns. The numbers stay the same in all versions. */\nenum actq_code {\n"
+            .to_owned();
     for code in Code::ALL {
         let mut name = String::new();
         for letter in format!("{code:?}").chars() {
