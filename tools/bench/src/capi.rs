@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use actq_boards::{Target, root, target_dir, version};
 use actq_cli::report::export::sha256;
@@ -136,10 +135,10 @@ fn licences(files: &mut Files<'_>) -> Result<Vec<Value>> {
     for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
         files.put(name, &fs::read(root().join(name))?)?;
     }
-    let metadata = output(&["metadata", "--format-version", "1", "--locked"])?;
+    let metadata = cargo("the list of crates", &["metadata", "--format-version", "1", "--locked"], &[])?;
     let metadata: Value = serde_json::from_str(&metadata)?;
     let tree = ["tree", "--package", "actq-capi", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
-    let mut used: Vec<String> = output(&tree)?
+    let mut used: Vec<String> = cargo("the tree of crates", &tree, &[])?
         .lines()
         .map(|line| line.split(' ').take(2).collect::<Vec<_>>().join(" ").replace(" v", " "))
         .collect();
@@ -171,12 +170,4 @@ fn licences(files: &mut Files<'_>) -> Result<Vec<Value>> {
     let compiled_in = json!({ "name": "core and compiler_builtins of Rust", "licence": "MIT OR Apache-2.0" });
     parts.push(compiled_in);
     Ok(parts)
-}
-
-/// Returns the output of cargo.
-fn output(arguments: &[&str]) -> Result<String> {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let output = Command::new(cargo).current_dir(root()).args(arguments).output().context("cannot start cargo")?;
-    ensure!(output.status.success(), "cargo {}: {}", arguments[0], String::from_utf8_lossy(&output.stderr));
-    Ok(String::from_utf8(output.stdout)?)
 }

@@ -17,11 +17,11 @@ use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
 use crate::{rtn, ur3};
 
 pub(crate) fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<()> {
-    cargo(what, &[&["build", "--quiet"], arguments].concat(), environment)
+    cargo(what, &[&["build", "--quiet"], arguments].concat(), environment).map(drop)
 }
 
-/// Runs cargo, to build something.
-pub(crate) fn cargo(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<()> {
+/// Runs cargo, to make something, and returns its output.
+pub(crate) fn cargo(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<String> {
     let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(root())
         .args(arguments)
@@ -29,7 +29,7 @@ pub(crate) fn cargo(what: &str, arguments: &[&str], environment: &[(&str, &str)]
         .output()
         .context("cannot start cargo")?;
     ensure!(output.status.success(), "cannot build {what}:\n{}", String::from_utf8_lossy(&output.stderr));
-    Ok(())
+    Ok(String::from_utf8(output.stdout)?)
 }
 
 const APPLICATION: &str = "actq-firmware-demo";
