@@ -85,6 +85,8 @@ enum actq_code {
   ACTQ_IMAGE_AROUND = 31,
   /** raw inputs or targets have impossible lengths, names, kinds or ranges */
   ACTQ_IMAGE_PORTS = 32,
+  /** the image needs a feature of the kernels that this build leaves out */
+  ACTQ_IMAGE_LEFT_OUT = 33,
   /** scratch memory is too small for the image */
   ACTQ_SCRATCH_TOO_SMALL = 64,
   /** saved state has another length than the image's */
@@ -136,6 +138,12 @@ enum actq_code {
  * Number of this interface: it changes with every change of a structure or a function.
  */
 #define ACTQ_ABI 1
+
+/**
+ * Bytes of stack that a call takes at most on a Cortex-M with the assembler kernels, without interrupts. A test computes
+ * them from the calls in a linked program, for any image.
+ */
+#define ACTQ_STACK_BYTES 2560
 
 /**
  * The status that a function returns: one of `actq_code`.

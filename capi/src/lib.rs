@@ -24,6 +24,10 @@ pub use status::*;
 /// Number of this interface: it changes with every change of a structure or a function.
 pub const ACTQ_ABI: u32 = 1;
 
+/// Bytes of stack that a call takes at most on a Cortex-M with the assembler kernels, without interrupts. A test computes
+/// them from the calls in a linked program, for any image.
+pub const ACTQ_STACK_BYTES: usize = 2560;
+
 /// Returns the library's `ACTQ_ABI`. A program that was compiled with another header must not go on.
 #[unsafe(no_mangle)]
 pub extern "C" fn actq_abi() -> u32 {

@@ -115,6 +115,8 @@ image_errors! {
     /// The lengths of raw inputs and targets are not those of observation and action, or a name, a kind or a range is
     /// impossible.
     Ports = 32, "raw inputs or targets have impossible lengths, names, kinds or ranges";
+    /// This build lacks what the image needs: a width, an operation, chunks. `actq inspect` lists the features.
+    LeftOut = 33, "the image needs a feature of the kernels that this build leaves out";
 }
 
 impl ImageError {
@@ -382,6 +384,7 @@ mod tests {
             "Smoothing",
             "Around",
             "Ports",
+            "LeftOut",
         ];
         assert_eq!(codes, (1..).zip(expected.map(Into::into)).collect::<std::vec::Vec<_>>());
         assert_eq!(HeadError::ScratchTooSmall { needed: 1, given: 0 }.code(), 64);

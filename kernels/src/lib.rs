@@ -22,8 +22,15 @@
 //!
 //! Features:
 //!
-//! - `around` runs the operations around a network (`docs/DEPLOY.md`): raw values in, targets out. Without it, an image
-//!   that has some is refused with [`ImageError::Op`], and the code is 3 KB shorter.
+//! - `w2`, `w3`, `w4`, `w8`: matrices of weights of these bits.
+//! - `functions`: GELU, SiLU, softplus, mish, exp, sine, cosine. (ReLU, ELU, tanh and sigmoid are in every build.)
+//! - `norm`: layer norm and RMS norm. `recurrent`: LSTM and GRU cells. `flow`: flow and diffusion policies.
+//! - `chunks`: action chunks of more than one action, with overlap and temporal ensemble.
+//! - `around`: the operations around a network (`docs/DEPLOY.md`): raw values in, targets out.
+//!
+//! These make the code smaller when they are off; all but `around` are on by default. A build refuses an image that
+//! needs one of them with [`ImageError::LeftOut`]; `actq inspect` lists what an image needs. Two more:
+//!
 //! - `defmt` derives `defmt::Format` for the error types.
 //! - `writer` makes public what writes images and what checks the kernels: packed layouts, records, arithmetic and the
 //!   parts of the cost model. The quantizer, tests and measurements use it. It is **unstable**: any version may change

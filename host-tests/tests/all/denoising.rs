@@ -1,20 +1,19 @@
 //! Flow and diffusion policies: their steps against the textbook formulas in f64, with hoisted weights and tables that
-//! are computed when the image is built; noise; and the same bits in any slicing of a step, on the host and on the
-//! target.
+//! are computed when the image is built; noise; and the same bits in any slicing of a step, on the host. `on_target::denoising`
+//! has the target.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use actq::budget::Budget;
-use actq::data::{Dataset, Recordings, Sizes};
+use actq::data::Recordings;
 use actq::graph::Evaluator;
-use actq::measure::eval;
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
-use actq_bench::{Target, bits, rtn, shared_policies};
+use actq_bench::{bits, rtn};
 use actq_kernels::image::{header as h, op};
 use actq_kernels::ops::noise::normal;
 use actq_kernels::pace::cost;
@@ -23,7 +22,6 @@ use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 
 use crate::draft::Draft;
-use crate::on_target;
 use crate::ops::{Case, wide};
 use crate::slices;
 
@@ -191,7 +189,7 @@ fn reference(case: &Case, json: &Value, solver: &Solver, obs: &[f64], noise: &[f
     x
 }
 
-fn drawn(random: &mut Random, len: usize, reach: f32) -> Vec<f32> {
+pub(crate) fn drawn(random: &mut Random, len: usize, reach: f32) -> Vec<f32> {
     (0..len).map(|_| reach * random.unit()).collect()
 }
 
@@ -233,6 +231,11 @@ fn steps_match_the_textbook_formulas() -> Result<()> {
         })?;
     }
     Ok(())
+}
+
+/// Returns an image of each policy of these tests.
+pub(crate) fn images() -> Result<Vec<ImageBuffer>> {
+    policies().into_iter().map(|(json, _)| quantized(json)).collect()
 }
 
 fn quantized(json: Value) -> Result<ImageBuffer> {
@@ -295,22 +298,6 @@ fn any_slicing_gives_the_same_bits() -> Result<()> {
         assert!(polls > 3 * 3 * 3, "{polls} polls: {json}");
     }
     Ok(())
-}
-
-#[test]
-fn the_target_gives_the_hosts_bits() -> Result<()> {
-    for (json, _) in policies() {
-        same_bits(quantized(json)?.bytes(), 12)?;
-    }
-    Ok(())
-}
-
-/// Requires the host's bits in QEMU, in this many steps.
-fn same_bits(image: &[u8], steps: usize) -> Result<()> {
-    let mut random = Random::new(9);
-    let obs_len = ImageBuffer::new(image).image("memory".as_ref())?.obs_len();
-    let observations: Vec<_> = (0..steps).map(|_| drawn(&mut random, obs_len, 1.0)).collect();
-    on_target::qemu::same_bits(Target::Fpu, image, &observations)
 }
 
 #[test]
@@ -419,25 +406,5 @@ fn steps_cost_what_they_repeat() -> Result<()> {
     };
     let [one, two, ten] = [of(1)?, of(2)?, of(10)?];
     assert!(ten.abs_diff(one + 9 * (two - one)) <= 9, "{one}, {two}, {ten}");
-    Ok(())
-}
-
-#[test]
-fn the_shared_flow_policy_runs_on_the_target() -> Result<()> {
-    let Some(dir) = shared_policies().map(|policies| policies.join("fetch_flow")) else { return Ok(()) };
-    let policy = Policy::load(&dir)?;
-    let heldout = Dataset::load(&dir.join("heldout.npz"), Sizes::of(&policy))?;
-    let heldout = heldout.thinned(60, false);
-    for (width, limit) in [(Width::W8, 5.1e-4), (Width::W3, 0.33), (Width::W2, 3.0)] {
-        let bytes = rtn(&policy, width, 32, Activations::Auto)?;
-        let buffer = ImageBuffer::new(&bytes);
-        let report = eval::evaluate(buffer.image(&dir)?, &heldout)?;
-        println!("fetch_flow, {} bits: NMSE {:.2e}, {} bytes", width.bits(), report.nmse, report.bytes);
-        ensure!(report.nmse < limit, "{width:?}: NMSE {}", report.nmse);
-        if width != Width::W8 {
-            ensure!(bytes.len() < 1 << 20, "{} bytes", bytes.len());
-            same_bits(&bytes, 4)?;
-        }
-    }
     Ok(())
 }

@@ -5,6 +5,7 @@ pub(crate) mod application;
 mod c;
 mod cost;
 mod counting;
+mod denoising;
 mod deployed;
 mod firmware;
 mod foc;

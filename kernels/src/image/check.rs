@@ -43,18 +43,20 @@ impl<'a> Image<'a> {
     }
 
     fn check(&self) -> Result<(), ImageError> {
-        if self.header.kind() >> 8 > usize::from(cfg!(feature = "around"))
-            || self.header.contract_flags() >> CONTRACT_ARRAYS != 0
-        {
+        let (kind, flags) = (self.header.kind() & 0xff, self.header.kind() >> 8);
+        if flags > 1 || self.header.contract_flags() >> CONTRACT_ARRAYS != 0 {
             return Err(ImageError::Reserved);
         }
-        match (self.header.kind() & 0xff, self.chunk(), self.execute()) {
+        if !cfg!(feature = "around") && flags != 0 || !cfg!(feature = "chunks") && self.header.chunk() > 1 {
+            return Err(ImageError::LeftOut);
+        }
+        match (kind, self.header.chunk(), self.header.execute()) {
             (0, 1, 1) => {}
             (1..=3, chunk, execute) if (1..=chunk).contains(&execute) => {}
             (0..=3, ..) => return Err(ImageError::Chunk),
             _ => return Err(ImageError::Kind),
         }
-        let (horizon, overlap) = (self.horizon(), self.overlap());
+        let (horizon, overlap) = (self.header.horizon(), self.header.overlap());
         let averaged = horizon == 0 || horizon <= self.chunk() && self.execute() == 1 && overlap == 0;
         let in_time = self.deadline().is_none_or(|age| age >= self.execute().max(horizon));
         if !averaged || !in_time || overlap > self.chunk() - self.execute() {

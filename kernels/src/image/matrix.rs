@@ -80,6 +80,9 @@ impl BlockRecord {
     pub fn parse(record: &[u32; BLOCK_WORDS], lanes: Lanes) -> Result<Self, ImageError> {
         let [head, weights, scales, steps] = record.map(u32::from_le);
         let width = Width::from_bits(head & 0xff).ok_or(ImageError::Width)?;
+        if !width.is_built() {
+            return Err(ImageError::LeftOut);
+        }
         if (head >> 8) as u8 != lanes.code() {
             return Err(ImageError::Lanes);
         }

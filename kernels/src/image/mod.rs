@@ -8,6 +8,8 @@
 mod check;
 mod contract;
 mod crc;
+#[cfg(feature = "writer")]
+mod features;
 pub mod header;
 mod info;
 mod matrix;

@@ -76,7 +76,7 @@ pub enum OpKind {
 impl OpKind {
     /// Returns `true` if the operation differs between denoising steps.
     pub(super) fn is_of_step(self) -> bool {
-        matches!(self, Self::Table | Self::Denoise)
+        cfg!(feature = "flow") && matches!(self, Self::Table | Self::Denoise)
     }
 
     /// Returns `true` for the operations around a network ([`crate::ops::around`]). A build without them has none.
@@ -95,7 +95,7 @@ impl OpKind {
     }
 
     #[cfg(feature = "writer")]
-    fn texts(self) -> [&'static str; 2] {
+    fn texts(self) -> [&'static str; 3] {
         self.form().and_then(|form| TEXTS.get(usize::from(form.code) - 1)).copied().unwrap_or_default()
     }
 
@@ -115,6 +115,15 @@ impl OpKind {
         self.texts()[1]
     }
 
+    /// Returns the feature of this crate without which a build refuses the operation.
+    #[cfg(feature = "writer")]
+    pub fn feature(self) -> Option<&'static str> {
+        match self {
+            Self::Function(function) => Some("functions").filter(|_| !function.is_basic()),
+            kind => Some(kind.texts()[2]).filter(|feature| !feature.is_empty()),
+        }
+    }
+
     /// Returns `true` if the operation takes these bits as a single constant: above 0, and finite except for limits.
     #[inline(always)]
     pub(super) fn takes(self, constant: u32) -> bool {
@@ -132,6 +141,8 @@ pub(super) struct Form {
     /// Kind with the detail 0.
     kind: OpKind,
     pub(super) uses: Uses,
+    /// `false` if the build leaves the operation out.
+    built: bool,
     /// Bits of the record's last three words that the operation does not use.
     pub(super) unused: [u32; 3],
 }
@@ -159,7 +170,7 @@ impl Uses {
 }
 
 impl Form {
-    const fn new(code: u8, kind: OpKind, uses: Uses) -> Self {
+    const fn new(code: u8, kind: OpKind, uses: Uses, built: bool) -> Self {
         const fn unless(used: bool, bits: u32) -> u32 {
             if used { 0 } else { bits }
         }
@@ -169,23 +180,26 @@ impl Form {
             unless(linear, 0xffff) | unless(linear || uses.third > 0, !0xffff),
             unless(linear || uses.constants > 0 || uses.arrays > 0, !0),
         ];
-        Self { code, kind, uses, unused }
+        Self { code, kind, uses, built, unused }
     }
 }
 
 macro_rules! operations {
-    ($($(#[$doc:meta])* $NAME:ident = $code:literal $text:literal $($label:literal)?: $kind:expr, $uses:expr;)*) => {
+    ($($(#[$doc:meta])* $NAME:ident = $code:literal $text:literal $($label:literal)?: $kind:expr, $uses:expr $(, if $feature:literal)?;)*) => {
         $($(#[$doc])* pub const $NAME: u8 = $code;)*
 
         /// The names of the codes above, from code 1 on.
         pub(crate) const NAMES: &[&str] = &[$(stringify!($NAME)),*];
 
-        /// Human-readable names, and what they call their constants and third region.
+        /// Human-readable names, what they call their constants and third region, and the feature that has them.
         #[cfg(feature = "writer")]
-        static TEXTS: [[&str; 2]; NAMES.len()] = [$([$text, concat!($($label)?)]),*];
+        static TEXTS: [[&str; 3]; NAMES.len()] = [$([$text, concat!($($label)?), concat!($($feature)?)]),*];
 
         /// By operation code, from 1 on.
-        static FORMS: [Form; NAMES.len()] = [$(Form::new($NAME, $kind, $uses)),*];
+        static FORMS: [Form; NAMES.len()] = [$(Form::new($NAME, $kind, $uses, true $(&& cfg!(feature = $feature))?)),*];
+
+        /// `true` if the build leaves an operation out.
+        const IS_PARTIAL: bool = !(true $($(&& cfg!(feature = $feature))?)*);
 
         const _: () = {
             let codes = [$($NAME),*];
@@ -205,39 +219,39 @@ operations! {
     /// [`OpKind::Function`]
     FUNCTION = 3 "function": OpKind::Function(Function::Relu), Uses { max_detail: u8::MAX, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::LayerNorm`]
-    LAYER_NORM = 4 "layernorm" "eps": OpKind::LayerNorm, Uses { constants: 1, arrays: 2, passes: 3, reads_dst: true, ..Uses::NONE };
+    LAYER_NORM = 4 "layernorm" "eps": OpKind::LayerNorm, Uses { constants: 1, arrays: 2, passes: 3, reads_dst: true, ..Uses::NONE }, if "norm";
     /// [`OpKind::RmsNorm`]
-    RMS_NORM = 5 "rmsnorm" "eps": OpKind::RmsNorm, Uses { constants: 1, arrays: 1, passes: 2, reads_dst: true, ..Uses::NONE };
+    RMS_NORM = 5 "rmsnorm" "eps": OpKind::RmsNorm, Uses { constants: 1, arrays: 1, passes: 2, reads_dst: true, ..Uses::NONE }, if "norm";
     /// [`OpKind::Add`]
     ADD = 6 "add": OpKind::Add, Uses { src: 1, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::Copy`]
     COPY = 7 "copy": OpKind::Copy, Uses { src: 1, ..Uses::NONE };
     /// [`OpKind::LstmCell`]
-    LSTM_CELL = 8 "lstm cell" "cell": OpKind::LstmCell, Uses { src: 4, third: 1, ..Uses::NONE };
+    LSTM_CELL = 8 "lstm cell" "cell": OpKind::LstmCell, Uses { src: 4, third: 1, ..Uses::NONE }, if "recurrent";
     /// [`OpKind::GruCell`]
-    GRU_CELL = 9 "gru cell" "gates": OpKind::GruCell, Uses { src: 3, third: 3, reads_dst: true, ..Uses::NONE };
+    GRU_CELL = 9 "gru cell" "gates": OpKind::GruCell, Uses { src: 3, third: 3, reads_dst: true, ..Uses::NONE }, if "recurrent";
     /// [`OpKind::Mul`]
     MUL = 10 "mul": OpKind::Mul, Uses { src: 1, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::Noise`]
-    NOISE = 11 "noise": OpKind::Noise, Uses::NONE;
+    NOISE = 11 "noise": OpKind::Noise, Uses::NONE, if "flow";
     /// [`OpKind::Table`]
-    TABLE = 12 "table": OpKind::Table, Uses { arrays: 1, ..Uses::NONE };
+    TABLE = 12 "table": OpKind::Table, Uses { arrays: 1, ..Uses::NONE }, if "flow";
     /// [`OpKind::Denoise`]
-    DENOISE = 13 "denoise": OpKind::Denoise, Uses { src: 1, third: 1, constants: h::DENOISE_WORDS as u8, reads_dst: true, ..Uses::NONE };
+    DENOISE = 13 "denoise": OpKind::Denoise, Uses { src: 1, third: 1, constants: h::DENOISE_WORDS as u8, reads_dst: true, ..Uses::NONE }, if "flow";
     /// [`OpKind::Select`], whose data has the length of `src`.
-    SELECT = 14 "select": OpKind::Select, Uses { src: 1, arrays: 1, ..Uses::NONE };
+    SELECT = 14 "select": OpKind::Select, Uses { src: 1, arrays: 1, ..Uses::NONE }, if "around";
     /// [`OpKind::Clip`]
-    CLIP = 15 "clip" "high": OpKind::Clip, Uses { src: 1, third: 1, reads_dst: true, ..Uses::NONE };
+    CLIP = 15 "clip" "high": OpKind::Clip, Uses { src: 1, third: 1, reads_dst: true, ..Uses::NONE }, if "around";
     /// [`OpKind::Constant`]
-    CONSTANT = 16 "constant": OpKind::Constant, Uses { arrays: 1, ..Uses::NONE };
+    CONSTANT = 16 "constant": OpKind::Constant, Uses { arrays: 1, ..Uses::NONE }, if "around";
     /// [`OpKind::Start`], whose third region is one word.
-    START = 17 "start": OpKind::Start, Uses { third: 1, arrays: 1, reads_dst: true, ..Uses::NONE };
+    START = 17 "start": OpKind::Start, Uses { third: 1, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
     /// [`OpKind::Row`], whose third region is one word.
-    ROW = 18 "row": OpKind::Row, Uses { third: 1, constants: 2, arrays: 1, ..Uses::NONE };
+    ROW = 18 "row": OpKind::Row, Uses { third: 1, constants: 2, arrays: 1, ..Uses::NONE }, if "around";
     /// [`OpKind::Stand`], whose data has the length of `src`, and whose third region is one word.
-    STAND = 19 "stand": OpKind::Stand, Uses { src: 1, third: 1, constants: 2, arrays: 1, reads_dst: true, ..Uses::NONE };
+    STAND = 19 "stand": OpKind::Stand, Uses { src: 1, third: 1, constants: 2, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
     /// [`OpKind::History`], whose data has the lengths of `src` and of the third region.
-    HISTORY = 20 "history": OpKind::History, Uses { src: 1, third: 1, constants: 3, ..Uses::NONE };
+    HISTORY = 20 "history": OpKind::History, Uses { src: 1, third: 1, constants: 3, ..Uses::NONE }, if "around";
 }
 
 /// The fields of an operation's record, for a writer.
@@ -422,8 +436,8 @@ impl<'a> Image<'a> {
         let [head, places, lengths, data] = op.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
         let form = FORMS.get(usize::from(code).wrapping_sub(1)).ok_or(ImageError::Op)?;
-        if !cfg!(feature = "around") && code >= SELECT {
-            return Err(ImageError::Op);
+        if IS_PARTIAL && !form.built {
+            return Err(ImageError::LeftOut);
         }
         let [mut src, third] = [form.uses.src, form.uses.third].map(|times| len * usize::from(times));
         let mut third = Region { offset: high(lengths), len: third };
@@ -433,7 +447,13 @@ impl<'a> Image<'a> {
                 OpKind::Linear { accumulate: detail == 1 }
             }
             OpKind::Normalize { .. } => OpKind::Normalize { added: detail == 1 },
-            OpKind::Function(_) => OpKind::Function(Function::from_code(detail).ok_or(ImageError::Op)?),
+            OpKind::Function(_) => {
+                let function = Function::from_code(detail).ok_or(ImageError::Op)?;
+                if !cfg!(feature = "functions") && !function.is_basic() {
+                    return Err(ImageError::LeftOut);
+                }
+                OpKind::Function(function)
+            }
             kind if kind.is_around() && kind != OpKind::Clip => {
                 // Lengths in the data's first word: of a frame, or of all of `src`; of a history's slots.
                 let sizes = self.word(data as usize);

@@ -9,12 +9,12 @@ use super::view::Image;
 impl Image<'_> {
     /// Returns the number of chunks that a temporal ensemble averages for an action; 0 without an ensemble.
     pub fn horizon(&self) -> usize {
-        self.header.horizon()
+        if cfg!(feature = "chunks") { self.header.horizon() } else { 0 }
     }
 
     /// Returns the number of actions that blend the rest of a chunk into the next one; 0 if the rest is dropped.
     pub fn overlap(&self) -> usize {
-        self.header.overlap()
+        if cfg!(feature = "chunks") { self.header.overlap() } else { 0 }
     }
 
     /// Returns the age, in control periods since its observation, from which on an action never plays; `None` if

@@ -54,12 +54,12 @@ impl<'a> Image<'a> {
 
     /// Returns the number of actions in the network's output.
     pub fn chunk(&self) -> usize {
-        self.header.chunk()
+        if cfg!(feature = "chunks") { self.header.chunk() } else { 1 }
     }
 
     /// Returns the number of a chunk's actions that are executed before the network runs again.
     pub fn execute(&self) -> usize {
-        self.header.execute()
+        if cfg!(feature = "chunks") { self.header.execute() } else { 1 }
     }
 
     writer_methods! {

@@ -42,20 +42,20 @@
     allow(dead_code, reason = "the assembler computes what a layout file computes in Rust")
 )]
 
-/// The registry: a line for every width, with its bits, the grid of its levels (`Grid`), and its layouts of single and
-/// of paired lanes. It passes all lines to another macro, after a first argument for that.
+/// The registry: a line for every width, with its bits, its feature, the grid of its levels (`Grid`), and its layouts
+/// of single and of paired lanes. It passes all lines to another macro, after a first argument for that.
 macro_rules! registry {
     ($for_all:ident $first:tt) => {
         $for_all! {
             $first
             /// 2 bits: levels -3, -1, 1, 3.
-            W2 = 2, Odd: crate::layout::w2::W2, crate::layout::w2_paired::W2Paired;
+            W2 = 2 if "w2", Odd: crate::layout::w2::W2, crate::layout::w2_paired::W2Paired;
             /// 3 bits: odd levels -7 to 7.
-            W3 = 3, Odd: crate::layout::w3::W3, crate::layout::w3_paired::W3Paired;
+            W3 = 3 if "w3", Odd: crate::layout::w3::W3, crate::layout::w3_paired::W3Paired;
             /// 4 bits: odd levels -15 to 15.
-            W4 = 4, Odd: crate::layout::w4::W4, crate::layout::w4_paired::W4Paired;
+            W4 = 4 if "w4", Odd: crate::layout::w4::W4, crate::layout::w4_paired::W4Paired;
             /// 8 bits: levels -128 to 127.
-            W8 = 8, Whole: crate::layout::w8::W8, crate::layout::w8_paired::W8Paired;
+            W8 = 8 if "w8", Whole: crate::layout::w8::W8, crate::layout::w8_paired::W8Paired;
         }
     };
 }

@@ -62,7 +62,7 @@ impl Layout {
 }
 
 macro_rules! table {
-    (() $($(#[$doc:meta])* $width:ident = $bits:literal, $grid:ident: $single:path, $paired:path;)*) => {
+    (() $($(#[$doc:meta])* $width:ident = $bits:literal if $feature:literal, $grid:ident: $single:path, $paired:path;)*) => {
         /// Layouts by width and lanes. A table in memory takes fewer instructions than a branch for every constant.
         pub static LAYOUTS: [[Layout; Lanes::ALL.len()]; Width::ALL.len()] =
             [$([Layout::of::<$single>(), Layout::of::<$paired>()]),*];

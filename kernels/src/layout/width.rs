@@ -1,7 +1,7 @@
 //! Code widths, and the levels of codes.
 
 macro_rules! widths {
-    (() $($(#[$doc:meta])* $width:ident = $bits:literal, $grid:ident: $($layouts:path),*;)*) => {
+    (() $($(#[$doc:meta])* $width:ident = $bits:literal if $feature:literal, $grid:ident: $($layouts:path),*;)*) => {
         /// Bits of a code.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -25,6 +25,21 @@ macro_rules! widths {
             pub const fn bits(self) -> u32 {
                 match self {
                     $(Self::$width => $bits,)*
+                }
+            }
+
+            /// Returns the feature of this crate with the width's kernels.
+            #[cfg(feature = "writer")]
+            pub const fn feature(self) -> &'static str {
+                match self {
+                    $(Self::$width => $feature,)*
+                }
+            }
+
+            /// Returns `true` if this build has the width's kernels.
+            pub(crate) const fn is_built(self) -> bool {
+                match self {
+                    $(Self::$width => cfg!(feature = $feature),)*
                 }
             }
 

@@ -57,7 +57,7 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
     }
     let units = cursor.done..cursor.done + units;
     cursor.done = units.end;
-    if op.kind == OpKind::Denoise {
+    if cfg!(feature = "flow") && op.kind == OpKind::Denoise {
         let (by, noise) = op.coefficients(cursor.step);
         let by = Coefficients::from_array(by);
         let noise = if by.sigma == 0.0 { Region::default() } else { Region { offset: noise, len: dst.len } };
@@ -72,7 +72,7 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         around::run(op, arena, &units)?;
         return Ok(units.end == len);
     }
-    let is_norm = matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
+    let is_norm = cfg!(feature = "norm") && matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
     let range = if is_norm { 0..dst.len } else { units.clone() };
     let [mut dst, mut src, third, _] = match op.src().len {
         0 => [part(arena, &(dst.offset + range.start..dst.offset + range.end)), &mut [], &mut [], &mut []],
@@ -90,24 +90,26 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         OpKind::Mul => elementwise::mul(f(src), f(dst)),
         OpKind::Copy => copy(src, dst),
         OpKind::Noise => {
-            if let Some([seed, draw]) = cursor.draw {
+            if let Some([seed, draw]) = cursor.draw.filter(|_| cfg!(feature = "flow")) {
                 f(dst).iter_mut().zip(range.start as u32..).for_each(|(x, index)| *x = normal(seed, draw, index));
             }
         }
         OpKind::Table => copy_le(op.part(cursor.step, &range), dst),
-        OpKind::LstmCell => {
+        OpKind::LstmCell if cfg!(feature = "recurrent") => {
             arch::lstm_elements(range.clone(), f(src), f(third), f(dst));
         }
-        OpKind::GruCell => {
+        OpKind::GruCell if cfg!(feature = "recurrent") => {
             arch::gru_elements(range.clone(), f(src), f(third), f(dst));
         }
         // The match has no wildcard: it does not compile without an arm for every operation. `Linear`, `Denoise` and
-        // the operations around a network have returned above.
+        // the operations around a network have returned above, and a checked image has none that the build leaves out.
         kind @ (OpKind::LayerNorm
         | OpKind::RmsNorm
         | OpKind::Normalize { .. }
         | OpKind::Linear { .. }
         | OpKind::Denoise
+        | OpKind::LstmCell
+        | OpKind::GruCell
         | OpKind::Select
         | OpKind::Clip
         | OpKind::Constant

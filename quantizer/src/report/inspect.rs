@@ -65,7 +65,9 @@ pub fn report(image: &Image<'_>) -> String {
     let Peak { op, words, placed } = peak(image);
     let name = image.ops().nth(op).map_or("", |op| op.kind.name());
     let _ = writeln!(text, "values        {} bytes, {} of them in use at op {op} ({name})", 4 * placed, 4 * words);
-    let _ = writeln!(text, "self-test     {} steps\n", image.self_test_steps());
+    let _ = writeln!(text, "self-test     {} steps", image.self_test_steps());
+    let features: Vec<_> = image.features().collect();
+    let _ = writeln!(text, "features      {}, of the kernels on the target\n", features.join(" "));
     let mut ops = table(&["op", "output", "input", "detail", "bits", "group", "x max", "bytes"]);
     for op in image.ops() {
         ops.add_row(row(&op));

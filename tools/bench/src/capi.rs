@@ -1,12 +1,17 @@
 //! Packages the C interface for a core: header, library, files for build systems, licences and a manifest.
 
 use std::fs;
+use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 
 use actq_boards::{Target, root, target_dir, version};
 use actq_cli::report::export::sha256;
 use anyhow::{Context as _, Result, ensure};
 use serde_json::{Value, json};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+use actq_kernels::Image;
 
 use crate::firmware::cargo;
 
@@ -46,15 +51,16 @@ impl Core {
         CORES.iter().find(|core| core.name == name).copied()
     }
 
-    /// Builds the library for this core, and returns its path.
+    /// Builds the library for this core with these features, and returns its path.
     ///
     /// # Errors
     ///
     /// If cargo cannot build it.
-    pub fn library(self) -> Result<PathBuf> {
+    fn library(self, features: &str) -> Result<PathBuf> {
         let profile = if self.target.is_some_and(Target::has_assembler) { "capi" } else { "capi-portable" };
         let mut arguments = vec!["rustc", "--quiet", "--package", "actq-capi", "--lib", "--crate-type", "staticlib"];
-        arguments.extend(["--features", "panic-handler", "--profile", profile]);
+        let features = format!("panic-handler {features}");
+        arguments.extend(["--no-default-features", "--features", &features, "--profile", profile]);
         let mut folder = target_dir();
         if let Some(target) = self.target {
             arguments.extend(["--target", target.triple()]);
@@ -64,20 +70,25 @@ impl Core {
         Ok(folder.join(profile).join("libactq_c.a"))
     }
 
-    /// Writes the package into `out`, a folder that does not exist or is empty.
+    /// Writes the package to `out`: an archive if its name ends in `.zip`, otherwise a folder. Neither may exist before,
+    /// but for an empty folder. The library runs any image, or only images that need no other features of the kernels
+    /// than `image`.
     ///
     /// # Errors
     ///
     /// If the library cannot be built, or a file cannot be written.
-    pub fn package(self, out: &Path) -> Result<()> {
-        let shown = out.display();
-        let is_free = fs::read_dir(out).map_or(true, |mut entries| entries.next().is_none());
-        ensure!(is_free, "{shown}: is not an empty folder; remove it, or name another one");
-        let mut files = Files { out, written: Vec::new() };
-        files.put("lib/libactq.a", &fs::read(self.library()?)?)?;
+    pub fn package(self, out: &Path, image: Option<&Image<'_>>) -> Result<()> {
+        let is_archive = out.extension().is_some_and(|extension| extension == "zip");
+        let is_free =
+            if is_archive { !out.exists() } else { fs::read_dir(out).map_or(true, |mut files| files.next().is_none()) };
+        ensure!(is_free, "{}: is not empty; remove it, or name another file or folder", out.display());
+        let mut files = Files::default();
+        let features =
+            image.map_or_else(|| "default".to_owned(), |image| image.features().collect::<Vec<_>>().join(" "));
+        files.put("lib/libactq.a", &fs::read(self.library(&features)?)?);
         let capi = root().join("capi");
         for header in ["actq.h", "actq.hpp"] {
-            files.put(&format!("include/{header}"), &fs::read(capi.join("include").join(header))?)?;
+            files.put(&format!("include/{header}"), &fs::read(capi.join("include").join(header))?);
         }
         for (from, to) in [
             ("CMakeLists.txt", "CMakeLists.txt"),
@@ -91,14 +102,16 @@ impl Core {
             ("library.properties", "library.properties"),
         ] {
             let text = fs::read_to_string(capi.join("package").join(from)).with_context(|| from.to_owned())?;
-            files.put(to, text.replace("@VERSION@", VERSION).replace("@CORE@", self.name).as_bytes())?;
+            files.put(to, text.replace("@VERSION@", VERSION).replace("@CORE@", self.name).as_bytes());
         }
         let parts = licences(&mut files)?;
-        let digests: serde_json::Map<String, Value> = files.written.iter().cloned().collect();
+        let digests: serde_json::Map<String, Value> =
+            files.0.iter().map(|(name, bytes)| (name.clone(), sha256(bytes).into())).collect();
         let manifest = json!({
             "schema": 1,
             "actq": VERSION,
             "core": self.name,
+            "features": features,
             "flags": self.flags,
             "compiler": version("rustc")?,
             "parts": parts,
@@ -106,34 +119,46 @@ impl Core {
             "not_measured": ["time, stack and power on a real board"],
             "not_run": ["the files for Zephyr, ESP-IDF, PlatformIO and Arduino"],
         });
-        files.put("manifest.json", format!("{manifest:#}\n").as_bytes())
+        files.put("manifest.json", format!("{manifest:#}\n").as_bytes());
+        let write = || if is_archive { files.write_archive(out, self.name) } else { files.write_folder(out) };
+        write().with_context(|| out.display().to_string())
     }
 }
 
-/// The files of a package.
-struct Files<'a> {
-    out: &'a Path,
-    /// Names and SHA-256.
-    written: Vec<(String, Value)>,
-}
+/// The files of a package: names and content.
+#[derive(Default)]
+struct Files(Vec<(String, Vec<u8>)>);
 
-impl Files<'_> {
-    fn put(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
-        let path = self.out.join(name);
-        let write = || {
-            fs::create_dir_all(path.parent().unwrap_or(self.out))?;
-            fs::write(&path, bytes)
-        };
-        write().with_context(|| path.display().to_string())?;
-        self.written.push((name.to_owned(), sha256(bytes).into()));
+impl Files {
+    fn put(&mut self, name: &str, bytes: &[u8]) {
+        self.0.push((name.to_owned(), bytes.to_vec()));
+    }
+
+    fn write_folder(&self, out: &Path) -> Result<()> {
+        for (name, bytes) in &self.0 {
+            let path = out.join(name);
+            fs::create_dir_all(path.parent().unwrap_or(out))?;
+            fs::write(&path, bytes).with_context(|| name.clone())?;
+        }
         Ok(())
+    }
+
+    /// Writes a zip archive with one folder, uncompressed: the same bytes for the same content.
+    fn write_archive(&self, out: &Path, core: &str) -> Result<()> {
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, bytes) in &self.0 {
+            let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+            archive.start_file(format!("actq-{core}/{name}"), stored)?;
+            archive.write_all(bytes)?;
+        }
+        Ok(fs::write(out, archive.finish()?.into_inner())?)
     }
 }
 
 /// Adds the licences of the crates in the library; returns these with their versions and licences.
-fn licences(files: &mut Files<'_>) -> Result<Vec<Value>> {
+fn licences(files: &mut Files) -> Result<Vec<Value>> {
     for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
-        files.put(name, &fs::read(root().join(name))?)?;
+        files.put(name, &fs::read(root().join(name))?);
     }
     let metadata = cargo("the list of crates", &["metadata", "--format-version", "1", "--locked"], &[])?;
     let metadata: Value = serde_json::from_str(&metadata)?;
@@ -160,7 +185,7 @@ fn licences(files: &mut Files<'_>) -> Result<Vec<Value>> {
             let file = entry.file_name().to_string_lossy().into_owned();
             if entry.path().is_file() && ["LICENSE", "COPYING"].iter().any(|start| file.starts_with(start)) {
                 let to = format!("licences/{name}/{file}");
-                files.put(&to, &fs::read(folder.join(&file))?)?;
+                files.put(&to, &fs::read(folder.join(&file))?);
                 found.push(to);
             }
         }

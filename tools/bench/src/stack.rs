@@ -106,6 +106,18 @@ pub fn worst_case(elf: &Path) -> Result<Worst> {
     worst(&program, &tasks()?).with_context(|| elf.display().to_string())
 }
 
+/// Computes the deepest path of a function and what it calls, without interrupts.
+///
+/// # Errors
+///
+/// Those of [`worst_case`], and if the file has no function of this name.
+pub fn deepest_path(elf: &Path, function: &str) -> Result<Vec<Call>> {
+    let program = Program::read(elf)?;
+    let known = program.functions.values().find(|known| known.name == function);
+    let address = known.with_context(|| format!("{}: no function {function}", elf.display()))?.address;
+    Depths::new(&program).path(address).with_context(|| elf.display().to_string())
+}
+
 fn worst(program: &Program, tasks: &BTreeMap<String, u8>) -> Result<Worst> {
     let mut depths = Depths::new(program);
     let mut handlers: BTreeMap<Priority, Vec<u32>> = BTreeMap::new();

@@ -10,8 +10,10 @@ use actq_bench::capi::Core;
 use actq_bench::command::{actq, run, succeeded};
 use actq_bench::controller::Controller;
 use actq_bench::qemu::Counter;
+use actq_bench::stack::deepest_path;
 use actq_bench::{Target, evaluation, firmware, root, skipped, ur3};
 use actq_boards::Clock;
+use actq_c::ACTQ_STACK_BYTES;
 use actq_client::port::Address;
 use actq_link::code::State;
 use actq_ur3::{ACT_DIM, OBS_DIM};
@@ -31,15 +33,26 @@ fn listings(document: &str) -> Vec<&str> {
     document.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next()).collect()
 }
 
+/// What the library in the package runs.
+#[derive(Clone, Copy, PartialEq)]
+enum Runs {
+    AnyImage,
+    /// What needs no more than the built-in image.
+    BuiltIn,
+}
+
 /// A folder with the package, the examples and the built-in image as C source; `None`, with a note, without a compiler.
-fn folder() -> Result<Option<TempDir>> {
+fn folder(runs: Runs) -> Result<Option<TempDir>> {
     if !is_installed("arm-none-eabi-gcc") {
         skipped("arm-none-eabi-gcc is not installed");
         return Ok(None);
     }
     let dir = TempDir::new()?;
     let at = |name: &str| dir.path().join(name);
-    Core::of("cortex-m4f").context("a core")?.package(&at("actq-cortex-m4f"))?;
+    let buffer = ImageBuffer::read(firmware::built_in()?)?;
+    let image = buffer.image(firmware::built_in()?)?;
+    let only = Some(&image).filter(|_| runs == Runs::BuiltIn);
+    Core::of("cortex-m4f").context("a core")?.package(&at("actq-cortex-m4f"), only)?;
     fs::create_dir(at("c"))?;
     for entry in fs::read_dir(root().join("examples/c"))? {
         let entry = entry?;
@@ -63,7 +76,7 @@ fn shell(dir: &TempDir, commands: &str) -> Result<String> {
 
 #[test]
 fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
-    let Some(dir) = folder()? else { return Ok(()) };
+    let Some(dir) = folder(Runs::AnyImage)? else { return Ok(()) };
     let at = |name: &str| dir.path().join(name);
     let document = fs::read_to_string(root().join("docs/C.md"))?;
     let listings = listings(&document);
@@ -90,6 +103,31 @@ fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
     let elf = object::File::parse(&*bytes)?;
     let names: Vec<&str> = elf.symbols().filter_map(|symbol| symbol.name().ok()).collect();
     ensure!(names.contains(&"actq_step") && !names.iter().any(|name| name.contains("panic")), "{names:?}");
+
+    // Every function of the interface that the program calls stays within the stack that the header states.
+    for function in ["actq_image_open", "actq_head_init", "actq_step", "actq_begin", "actq_poll"] {
+        let path = deepest_path(&at("main-mps2-an386.elf"), function)?;
+        let bytes: u32 = path.iter().map(|call| call.frame).sum();
+        println!("{function}: {bytes} bytes of stack");
+        ensure!(bytes as usize <= ACTQ_STACK_BYTES, "{function}: {bytes} bytes of stack: {path:?}");
+    }
+    Ok(())
+}
+
+/// The same for a library that runs only what the built-in image needs.
+const CODE_LIMIT_OF_ONE: u64 = 22 << 10;
+
+#[test]
+fn a_library_for_one_image_is_smaller_and_gives_the_same_bits() -> Result<()> {
+    let Some(dir) = folder(Runs::BuiltIn)? else { return Ok(()) };
+    let document = fs::read_to_string(root().join("docs/C.md"))?;
+    let printed = shell(&dir, &listings(&document)[..2].concat())?;
+    ensure!(printed.lines().count() == 2 && printed.lines().all(|line| line.ends_with("host's: 0")), "{printed}");
+    let code = code_bytes(&dir.path().join("minimal.elf"))? - fs::metadata(firmware::built_in()?)?.len();
+    let manifest = fs::read_to_string(dir.path().join("actq-cortex-m4f/manifest.json"))?;
+    let manifest: serde_json::Value = serde_json::from_str(&manifest)?;
+    println!("{code} bytes of code with the features {}", manifest["features"]);
+    ensure!(code <= CODE_LIMIT_OF_ONE, "{code} bytes of code, more than {CODE_LIMIT_OF_ONE}");
     Ok(())
 }
 
@@ -124,7 +162,7 @@ const CALL_LIMIT: u64 = 200;
 
 #[test]
 fn a_step_from_c_costs_what_one_from_rust_does() -> Result<()> {
-    let Some(dir) = folder()? else { return Ok(()) };
+    let Some(dir) = folder(Runs::AnyImage)? else { return Ok(()) };
     let buffer = ImageBuffer::read(firmware::built_in()?)?;
     let image = buffer.image(firmware::built_in()?)?;
     let heldout = eval::heldout(&ur3(), &image)?;

@@ -44,12 +44,26 @@ pub(super) type Kernels = [Kernel; 2];
 /// A layout's kernels for row scales and for group scales.
 type Both = [Kernels; 2];
 
+/// Stands for the kernels of a width that the build leaves out. It does nothing: `image::matrix` refuses such blocks.
+unsafe extern "C" fn left_out(_: *const u32, _: *const u32, _: *mut i32, _: usize, _: *const u32, _: usize, _: usize) {}
+
+/// Returns a width's kernels if the build has them.
+const fn built(width: Width, kernels: [Both; Lanes::ALL.len()]) -> [Both; Lanes::ALL.len()] {
+    if width.is_built() { kernels } else { [[[left_out; 2]; 2]; Lanes::ALL.len()] }
+}
+
 /// Kernels by width and lanes.
 static KERNELS: [[Both; Lanes::ALL.len()]; Width::ALL.len()] = [
-    [[[actq_w2; 2]; 2], [[actq_w2_paired_row, actq_w2_paired_row4], [actq_w2_paired_group, actq_w2_paired_group4]]],
-    [[[actq_w3; 2]; 2], [[actq_w3_paired_row; 2], [actq_w3_paired_group; 2]]],
-    [[[actq_w4; 2]; 2], [[actq_w4_paired_row, actq_w4_paired_row4], [actq_w4_paired_group, actq_w4_paired_group4]]],
-    [[[actq_w8; 2]; 2], [[actq_w8_paired_row; 2], [actq_w8_paired_group; 2]]],
+    built(
+        Width::W2,
+        [[[actq_w2; 2]; 2], [[actq_w2_paired_row, actq_w2_paired_row4], [actq_w2_paired_group, actq_w2_paired_group4]]],
+    ),
+    built(Width::W3, [[[actq_w3; 2]; 2], [[actq_w3_paired_row; 2], [actq_w3_paired_group; 2]]]),
+    built(
+        Width::W4,
+        [[[actq_w4; 2]; 2], [[actq_w4_paired_row, actq_w4_paired_row4], [actq_w4_paired_group, actq_w4_paired_group4]]],
+    ),
+    built(Width::W8, [[[actq_w8; 2]; 2], [[actq_w8_paired_row; 2], [actq_w8_paired_group; 2]]]),
 ];
 
 /// Returns the kernels for blocks of this shape.

@@ -1,6 +1,6 @@
 //! The quantizer of every layout.
 
-use crate::layout::{LAYOUTS, XLayout};
+use crate::layout::{LAYOUTS, Width, XLayout};
 
 macro_rules! quantize_kernels {
     ($($name:ident)*) => {
@@ -23,7 +23,31 @@ macro_rules! quantize_kernels {
 quantize_kernels!(actq_quantize0 actq_quantize1 actq_quantize2 actq_quantize3);
 
 /// Quantizers by the shift of the layout's activations.
-static QUANTIZERS: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
+static QUANTIZERS: [Quantize; 4] = {
+    let mut quantizers: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
+    let mut shift = 0;
+    while shift < quantizers.len() {
+        if !is_used(shift as u8) {
+            // No layout of the build has this shift; single lanes always have a quantizer.
+            quantizers[shift] = actq_quantize0;
+        }
+        shift += 1;
+    }
+    quantizers
+};
+
+/// Returns `true` if the build has a width with a layout of this shift.
+const fn is_used(shift: u8) -> bool {
+    let mut i = 0;
+    while i < Width::ALL.len() {
+        let [single, paired] = &LAYOUTS[i];
+        if Width::ALL[i].is_built() && (single.x.shift == shift || paired.x.shift == shift) {
+            return true;
+        }
+        i += 1;
+    }
+    false
+}
 
 /// Returns the quantizer for a layout with this shift.
 #[inline(always)]

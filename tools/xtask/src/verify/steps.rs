@@ -24,10 +24,10 @@ const ONNX_TESTS: &str = "actq-onnx-tests";
 /// The check of the C header, whose generator takes long to build, too.
 const C_HEADER: &str = "actq-capi-header";
 
-/// The tests in QEMU that `cargo verify` runs, and those that only `cargo verify --all` runs: modules of
-/// `host-tests/tests/all`.
-const SMOKE: &str = "smoke::";
+/// The tests that only `cargo verify --all` runs, modules of `host-tests/tests/all`: those in QEMU beyond the smoke run,
+/// and those that learn for long.
 const ON_TARGET: &str = "on_target::";
+const LEARNING: &str = "learning::";
 
 /// A command with a name.
 pub(super) struct Step {
@@ -59,8 +59,7 @@ impl Installed {
 pub(super) fn short() -> Vec<Step> {
     let mut steps = Steps::default();
     steps.format_and_lints();
-    steps.add("tests", &[&TESTS, &["--", "--skip", SMOKE, "--skip", ON_TARGET][..]].concat());
-    steps.add("smoke run in QEMU", &["test", "--release", "--package", "actq-host-tests", "--", SMOKE]);
+    steps.add("tests", &[&TESTS, &["--", "--skip", ON_TARGET, "--skip", LEARNING][..]].concat());
     steps.0
 }
 
@@ -69,6 +68,7 @@ pub(super) fn all(installed: Installed) -> Vec<Step> {
     let mut steps = Steps::default();
     steps.format_and_lints();
     steps.add("tests", &TESTS);
+    steps.least_kernels();
     steps.board_lints();
     steps.application_lints();
     steps.documentation();
@@ -114,6 +114,13 @@ impl Steps {
     fn add_of_firmware(&mut self, name: &str, arguments: &[&str], environment: &[(&str, &str)]) {
         let image = root().join("kernels/tests/valid.actq").display().to_string();
         self.add_with(name, arguments, &[environment, &[("ACTQ_IMAGE", &image)]].concat());
+    }
+
+    /// Adds lints and a test of the kernels with the features that every build has.
+    fn least_kernels(&mut self) {
+        let least = ["--release", "--package", "actq-kernels", "--no-default-features"];
+        self.add("lints of the least kernels", &[&["clippy", "--all-targets"], &least[..], &DENY].concat());
+        self.add("test of the least kernels", &[&["test"], &least[..], &["--test", "left_out"]].concat());
     }
 
     fn format_and_lints(&mut self) {

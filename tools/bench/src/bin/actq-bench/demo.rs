@@ -3,6 +3,7 @@
 
 use std::fs;
 use std::path::PathBuf;
+use std::thread;
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
@@ -78,6 +79,13 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     let distill =
         |bits, steps| Options { steps: Some(steps), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
     let counter = Counter::build()?;
+    // The firmware compiles while policies learn: with the images that follow, little is left to build.
+    thread::spawn(|| {
+        // An error comes again where the firmware is needed.
+        let _ = firmware::harness(Target::Fpu);
+        let _ = firmware::controller(Target::Fpu, "");
+        let _ = firmware::binary("bench", Target::Fpu);
+    });
     let reach = Trial {
         name: "UR3 reach",
         dir: ur3(),

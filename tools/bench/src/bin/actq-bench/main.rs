@@ -17,6 +17,7 @@ mod trials;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use actq::runtime::ImageBuffer;
 use actq_bench::capi::{CORES, Core};
 use anyhow::{Context as _, Result};
 use clap::{Parser, Subcommand};
@@ -81,18 +82,24 @@ enum Command {
         /// The core: cortex-m0plus, cortex-m3, cortex-m4, cortex-m4f, cortex-m7, cortex-m33, rv32imac or host
         #[arg(long, value_name = "CORE")]
         target: String,
-        /// The folder for the package; new, or empty
-        #[arg(long, value_name = "DIR")]
+        /// A new folder for the package, or a new file F.zip
+        #[arg(long, value_name = "DIR|F.zip")]
         out: PathBuf,
+        /// Leave out what this image does not need: widths, operations, functions. The library refuses images that need it
+        #[arg(long, value_name = "F.actq")]
+        image: Option<PathBuf>,
     },
 }
 
 /// Packages the C interface for a core.
-fn capi(core: &str, out: &Path) -> Result<()> {
+fn capi(core: &str, out: &Path, image: Option<&Path>) -> Result<()> {
     let names: Vec<_> = CORES.iter().map(|core| core.name).collect();
     let known = Core::of(core);
     let known = known.with_context(|| format!("--target {core}: use one of {}", names.join(", ")))?;
-    known.package(out)?;
+    match image {
+        None => known.package(out, None)?,
+        Some(path) => known.package(out, Some(&ImageBuffer::read(path)?.image(path)?))?,
+    }
     println!("{}: the C interface for {core}; build with {}", out.display(), known.flags.join(" "));
     Ok(())
 }
@@ -104,7 +111,7 @@ fn main() -> ExitCode {
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
         Command::Fit => fit::run(),
-        Command::Capi { target, out } => capi(&target, &out),
+        Command::Capi { target, out, image } => capi(&target, &out, image.as_deref()),
         Command::Stack { board: Some(board), .. } => stack::of_board(&board),
         Command::Stack { elf, .. } => stack::show(&elf.unwrap_or_default()),
     };

@@ -14,7 +14,7 @@ use actq_bench::{shared_policies, ur3};
 use actq_kernels::Width;
 use anyhow::Result;
 
-use crate::recorded::TOLERANCE;
+use super::recorded::TOLERANCE;
 
 fn image(quantizer: &Quantizer<'_>, options: &Options) -> actq::error::Result<Vec<u8>> {
     Ok(quantizer.quantize(options, ())?.image)

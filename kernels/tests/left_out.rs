@@ -1,0 +1,26 @@
+//! A build without some of the features refuses an image that needs them, and runs the same image with them.
+
+use actq_kernels::{Image, ImageError};
+
+#[repr(align(4))]
+struct Aligned<const N: usize>([u8; N]);
+
+/// An image with every kind of section. It needs the features below.
+static VALID: Aligned<{ include_bytes!("valid.actq").len() }> = Aligned(*include_bytes!("valid.actq"));
+
+#[test]
+fn an_image_that_needs_more_than_the_build_has_is_refused() {
+    let all = cfg!(all(
+        feature = "w2",
+        feature = "w3",
+        feature = "w4",
+        feature = "w8",
+        feature = "norm",
+        feature = "recurrent",
+        feature = "chunks"
+    ));
+    match Image::new_checked(&VALID.0) {
+        Ok(_) => assert!(all, "a build without some features takes the image"),
+        Err(error) => assert!(!all && error == ImageError::LeftOut, "{error}"),
+    }
+}
