@@ -76,6 +76,8 @@ pub(super) fn all(installed: Installed) -> Vec<Step> {
     steps.add("faults on the line", &["run", "--release", "--package", "actq-bench", "--", "faults"]);
     steps.add("ONNX files against tract", &["test", "--release", "--package", ONNX_TESTS]);
     steps.add("C header", &["test", "--release", "--package", C_HEADER]);
+    let publish = ["publish", "--workspace", "--dry-run", "--no-verify", "--allow-dirty", "--locked"];
+    steps.add("crates to publish", &publish);
     steps.narrow(installed.narrow);
     steps.oldest(installed.oldest);
     steps.0
