@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use actq::runtime::ImageBuffer;
-use actq_bench::command::{actq, failed, run, succeeded};
+use actq_bench::command::{actq, failed, research, run, succeeded};
 use actq_bench::ur3;
 use actq_kernels::Width;
 use anyhow::{Context, Result, ensure};
@@ -179,6 +179,42 @@ fn groups_and_activations_reach_the_image() -> Result<()> {
         fixture.eval(&path)?;
     }
     Ok(())
+}
+
+#[test]
+fn choices_of_actquant_reach_the_image() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let (policy, out) = (fixture.policy(), fixture.out("image.actq"));
+    let quantize = |options: &str| {
+        let mut command = research(&["quantize"]);
+        command.arg(&policy).arg("--out").arg(&out).args(options.split_whitespace());
+        run(command, b"")
+    };
+    let image = |choices: &str| -> Result<Vec<u8>> {
+        succeeded(&quantize(&format!("--method actquant --bpw 4 {choices}"))?)?;
+        Ok(fs::read(&out)?)
+    };
+    let plain = image("")?;
+    let defaults =
+        "bandwidth=median,frames=512,score=gain,noise=codes,widest=8,head=free,samples=4096,batch=1,signs=random";
+    ensure!(image(&format!("--actquant {defaults},magnitude=no"))? == plain, "these are the defaults");
+    for choices in ["magnitude=yes", "samples=16"] {
+        ensure!(image(&format!("--actquant {choices}"))? != plain, "{choices} changes nothing");
+    }
+
+    fs::remove_file(&out)?;
+    for (options, status, words) in [
+        ("--method gptq --actquant authors", 1, "--actquant has no effect on gptq"),
+        ("--actquant authors", 1, "no effect on distill"),
+        ("--method actquant --actquant heads=8", 2, "heads is not a key; the keys are bandwidth, frames"),
+        ("--method actquant --actquant head=5", 2, "head takes 2, 3, 4 or 8, or free"),
+    ] {
+        failed(&quantize(options)?, status, &[words])?;
+    }
+    ensure!(!out.exists(), "a file was written");
+    let mut sweep = research(&["sweep"]);
+    sweep.arg(&policy).args(["--methods", "rtn", "--actquant", "head=4"]);
+    failed(&run(sweep, b"")?, 1, &["no effect on rtn"])
 }
 
 #[test]
