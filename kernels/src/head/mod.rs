@@ -2,6 +2,8 @@
 //! chunks.
 
 mod contract;
+#[cfg(feature = "writer")]
+mod lockstep;
 mod playback;
 mod saved;
 mod self_test;

@@ -6,7 +6,7 @@ use super::{Head, Phase, contract};
 use crate::arena::regions;
 use crate::cursor::Cursor;
 use crate::error::{Fault, StepError};
-use crate::image::Region;
+use crate::image::{Image, Region};
 use crate::meter::{Meter, Unlimited, Work};
 use crate::ops::elementwise::copy;
 use crate::ops::run;
@@ -267,12 +267,7 @@ impl Head<'_, '_> {
             if done != Ok(true) {
                 return done;
             }
-            let Cursor { mut op, mut step, draw, .. } = *cursor;
-            op += 1;
-            if op == self.image.op_count() && step + 1 < self.image.denoising_steps() {
-                (op, step) = (self.image.first_denoising_op(), step + 1);
-            }
-            *cursor = Cursor { op, step, draw, ..Cursor::default() };
+            to_next_op(&self.image, cursor);
             if one_op {
                 return Ok(false);
             }
@@ -294,4 +289,15 @@ impl Head<'_, '_> {
         self.playback.pass(&self.image, self.arena, 1);
         Ok(())
     }
+}
+
+/// Moves the cursor to the start of the operation after its own.
+#[inline(always)]
+pub(super) fn to_next_op(image: &Image<'_>, cursor: &mut Cursor) {
+    let Cursor { mut op, mut step, draw, .. } = *cursor;
+    op += 1;
+    if op == image.op_count() && step + 1 < image.denoising_steps() {
+        (op, step) = (image.first_denoising_op(), step + 1);
+    }
+    *cursor = Cursor { op, step, draw, ..Cursor::default() };
 }

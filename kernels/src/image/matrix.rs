@@ -193,6 +193,12 @@ impl<'a> Matrix<'a> {
         self.bias.get(row).map_or(0.0, |w| f32::from_bits(u32::from_le(*w)))
     }
 
+    /// Returns `true` if the matrix has biases: a product that accumulates adds those that it has.
+    #[cfg(feature = "writer")]
+    pub fn has_bias(&self) -> bool {
+        !self.bias.is_empty()
+    }
+
     /// Returns the bits of the biases if the output starts from them and every row is written one time, in order.
     pub fn start_values(&self, accumulate: bool) -> Option<&[u32]> {
         if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) }
