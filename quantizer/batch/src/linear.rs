@@ -1,13 +1,16 @@
-//! A linear operation for several heads: its matrix in the form that [`product`] multiplies, and what is done for each
-//! head before and after the sums, in the order of operations of `actq-kernels`' `ops/linear.rs`.
+//! A linear operation for several heads: its matrix in the form that [`product`] multiplies, and the work for each head
+//! before and after, in the order of operations of `actq-kernels`' `ops/linear.rs`.
+//!
+//! Functions that are compiled for a level have no closures that the standard library calls: those would be compiled
+//! without the level's instructions if they are not inlined.
 
 use actq_kernels::StepError;
-use actq_kernels::image::{Matrix, Op, OpKind, Region};
+use actq_kernels::image::{Op, OpKind, Region, RowBlock};
 use actq_kernels::round::ROUND;
 use actq_kernels::x::Scale;
-use fearless_simd::Simd;
+use fearless_simd::prelude::*;
 
-use crate::product::{Activations, COLS, HEADS, ROWS, Weights, product};
+use crate::product::{HEADS, ROWS, Weights, product};
 
 /// A linear operation.
 #[derive(Debug)]
@@ -16,83 +19,95 @@ pub(crate) struct Linear {
     dst: Region,
     x_max: u16,
     accumulate: bool,
-    /// The biases, or zeros if an output starts without; empty if it keeps its value.
+    /// The biases, or zeros if outputs start without; empty if they keep their values.
     biases: Vec<f32>,
-    /// Steps of [`COLS`] columns.
-    steps: usize,
+    /// Pairs of columns.
+    pairs: usize,
+    /// Weights of the rows in the order of `scales`.
     weights: Vec<Weights>,
-    /// Output and scale of each row that has weights, in the order of the outputs.
-    rows: Vec<(usize, f32)>,
-    /// `true` if every output has a row.
-    is_whole: bool,
+    /// Scales of the rows that have weights, in the order of their outputs.
+    scales: Vec<f32>,
+    /// Outputs of these rows; empty if they are all outputs.
+    outputs: Vec<usize>,
 }
 
-/// Vectors and sums of several heads.
+/// Vectors of several heads, and their sums.
 #[derive(Debug, Default)]
 pub(crate) struct Operands {
-    x: Vec<Activations>,
+    /// Pairs of integers.
+    x: Vec<i32>,
+    sums: Vec<[i32; ROWS]>,
     /// Scales of the vectors.
     scales: Vec<f32>,
-    sums: Vec<[i32; ROWS]>,
 }
 
 impl Linear {
     /// Unpacks the matrix of an operation; `None` if the operation is not linear.
     pub(crate) fn new(op: &Op<'_>) -> Option<Self> {
         let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) else { return None };
-        let mut rows: Vec<_> = matrix
-            .blocks()
-            .flat_map(|rows| rows.outputs().enumerate().map(move |(i, output)| (output, rows, i)))
-            .collect();
-        // Of two rows with one output, the first of the image is added first.
+        let of_block = |block| {
+            let outputs = RowBlock::outputs(&block).enumerate();
+            outputs.map(move |(i, output)| (output, block, i))
+        };
+        let mut rows: Vec<(usize, RowBlock<'_>, usize)> = matrix.blocks().flat_map(of_block).collect();
+        // The order of sums does not matter, except of those of one output, which stay in the image's order.
         rows.sort_by_key(|(output, ..)| *output);
-        let steps = matrix.cols.div_ceil(COLS);
-        let mut weights = vec![[[0; COLS]; ROWS]; rows.len().div_ceil(ROWS) * steps];
+        let pairs = matrix.cols.div_ceil(2);
+        let mut weights = vec![[0; 2 * ROWS]; rows.len().div_ceil(ROWS) * pairs];
         for (at, (_, rows, i)) in rows.iter().enumerate() {
-            let weights = &mut weights[at / ROWS * steps..][..steps];
+            let weights = &mut weights[at / ROWS * pairs..][..pairs];
             for col in 0..matrix.cols {
+                // A level is in -128 ..= 127 and a scale at most 255, so that the product fits.
                 let weight = rows.block.level(*i, col) * i32::from(rows.block.group_scale(*i, col));
-                // A level is in -128 ..= 127, and a scale at most 255.
-                weights[col / COLS][at % ROWS][col % COLS] = weight as i16;
+                weights[col / 2][at % ROWS * 2 + col % 2] = weight as i16;
             }
         }
-        let rows: Vec<_> = rows.iter().map(|(output, rows, i)| (*output, rows.scale(*i))).collect();
-        let is_whole = rows.len() == matrix.rows && rows.iter().enumerate().all(|(i, (output, _))| i == *output);
-        let biases = if accumulate && !matrix.has_bias() { Vec::new() } else { biases(&matrix) };
-        let (src, dst) = (op.src(), op.dst());
-        Some(Self { src, dst, x_max: matrix.x_max, accumulate, biases, steps, weights, rows, is_whole })
+        let mut outputs: Vec<usize> = rows.iter().map(|(output, ..)| *output).collect();
+        if outputs.iter().copied().eq(0..matrix.rows) {
+            outputs.clear();
+        }
+        let has_start = !accumulate || matrix.has_bias();
+        Some(Self {
+            src: op.src(),
+            dst: op.dst(),
+            x_max: matrix.x_max,
+            accumulate,
+            biases: (0..matrix.rows).filter(|_| has_start).map(|row| matrix.bias(row)).collect(),
+            pairs,
+            weights,
+            scales: rows.iter().map(|(_, rows, i)| rows.scale(*i)).collect(),
+            outputs,
+        })
     }
 
-    /// Prepares for `heads` vectors.
+    /// Returns the blocks of [`ROWS`] rows.
+    fn blocks(&self) -> usize {
+        self.scales.len().div_ceil(ROWS)
+    }
+
+    /// Prepares for the vectors of up to `heads` heads.
     pub(crate) fn begin(&self, operands: &mut Operands, heads: usize) {
         let heads = heads.next_multiple_of(HEADS);
-        operands.x.resize(heads / HEADS * self.steps, [[0; COLS]; HEADS]);
-        operands.sums.resize(heads * self.rows.len().div_ceil(ROWS), [0; ROWS]);
-        operands.scales.clear();
+        let Operands { x, sums, scales } = operands;
+        x.resize(x.len().max(heads * self.pairs), 0);
+        sums.resize(sums.len().max(heads * self.blocks()), [0; ROWS]);
+        scales.clear();
     }
 
-    /// Quantizes the next head's vector.
+    /// Quantizes the vector of the next head.
     ///
     /// # Errors
     ///
-    /// [`StepError::NotFinite`] if a value is NaN or infinite; then the next vector takes this one's place.
+    /// [`StepError::NotFinite`] if a value is NaN or infinite. Then it is not among the vectors.
     #[inline(always)]
-    pub(crate) fn quantize<S: Simd>(&self, _: S, operands: &mut Operands, x: &[u32]) -> Result<(), StepError> {
-        // Without their signs, bits compare as whole numbers, and signed ones suit more instruction sets.
-        let magnitude = x.iter().fold(0, |most, bits| most.max((bits & 0x7fff_ffff) as i32));
-        let scale = Scale::of_magnitude(magnitude as u32, self.x_max).map_err(|_| StepError::NotFinite)?;
-        let inverse = scale.inverse();
-        let integer = |bits: u32| (f32::from_bits(bits) * inverse + ROUND).to_bits() as i16;
-        let head = operands.scales.len();
-        let steps = &mut operands.x[head / HEADS * self.steps..][..self.steps];
-        let (whole, rest) = x.as_chunks::<COLS>();
-        for (to, from) in steps.iter_mut().zip(whole) {
-            to[head % HEADS] = from.map(integer);
+    pub(crate) fn quantize<S: Simd>(&self, simd: S, operands: &mut Operands, x: &[u32]) -> Result<(), StepError> {
+        let mut magnitude = 0;
+        for bits in x {
+            magnitude = magnitude.max(bits & 0x7fff_ffff);
         }
-        if let Some(step) = steps.get_mut(whole.len()) {
-            step[head % HEADS] = [0; COLS];
-            step[head % HEADS].iter_mut().zip(rest).for_each(|(to, from)| *to = integer(*from));
-        }
+        let scale = Scale::of_magnitude(magnitude, self.x_max).map_err(|_| StepError::NotFinite)?;
+        let pairs = &mut operands.x[operands.scales.len() * self.pairs..][..self.pairs];
+        integers(simd, scale.inverse(), bytemuck::must_cast_slice(x), bytemuck::must_cast_slice_mut(pairs));
         operands.scales.push(scale.get());
         Ok(())
     }
@@ -100,30 +115,56 @@ impl Linear {
     /// Computes the sums of all vectors.
     #[inline(always)]
     pub(crate) fn multiply<S: Simd>(&self, simd: S, operands: &mut Operands) {
-        product(simd, self.steps, &self.weights, &operands.x, &mut operands.sums);
+        let heads = operands.scales.len().next_multiple_of(HEADS);
+        let (x, sums) = (&operands.x[..heads * self.pairs], &mut operands.sums[..heads * self.blocks()]);
+        product(simd, self.pairs, &self.weights, x, sums);
     }
 
     /// Computes the outputs of the head with this vector, in its arena.
     #[inline(always)]
     pub(crate) fn scale_back<S: Simd>(&self, _: S, operands: &Operands, vector: usize, arena: &mut [u32]) {
-        let (scale, rows) = (operands.scales[vector], self.rows.len().div_ceil(ROWS));
-        let sums = operands.sums[vector * rows..][..rows].as_flattened();
+        let sums = operands.sums[vector * self.blocks()..][..self.blocks()].as_flattened();
+        let x_scale = operands.scales[vector];
         let y: &mut [f32] = bytemuck::must_cast_slice_mut(&mut arena[self.dst.range()]);
+        let rows = sums.iter().zip(&self.scales);
+        if self.outputs.is_empty() && !self.accumulate {
+            for ((y, bias), (sum, scale)) in y.iter_mut().zip(&self.biases).zip(rows) {
+                *y = bias + *sum as f32 * (scale * x_scale);
+            }
+            return;
+        }
         if self.accumulate {
-            y.iter_mut().zip(&self.biases).for_each(|(y, bias)| *y += bias);
+            for (y, bias) in y.iter_mut().zip(&self.biases) {
+                *y += bias;
+            }
         } else {
             y.copy_from_slice(&self.biases);
         }
-        let scaled =
-            sums.iter().zip(&self.rows).map(|(sum, (output, row_scale))| (*output, *sum as f32 * (row_scale * scale)));
-        if self.is_whole {
-            y.iter_mut().zip(scaled).for_each(|(y, (_, x))| *y += x);
+        if self.outputs.is_empty() {
+            for (y, (sum, scale)) in y.iter_mut().zip(rows) {
+                *y += *sum as f32 * (scale * x_scale);
+            }
         } else {
-            scaled.for_each(|(output, x)| y[output] += x);
+            for (output, (sum, scale)) in self.outputs.iter().zip(rows) {
+                y[*output] += *sum as f32 * (scale * x_scale);
+            }
         }
     }
 }
 
-fn biases(matrix: &Matrix<'_>) -> Vec<f32> {
-    (0..matrix.rows).map(|row| matrix.bias(row)).collect()
+/// Converts values to integers, by the rule of [`actq_kernels::round`]. Zeros follow.
+#[inline(always)]
+fn integers<S: Simd>(simd: S, inverse: f32, values: &[f32], to: &mut [i16]) {
+    let (to, zeros) = to.split_at_mut(values.len());
+    zeros.fill(0);
+    let (mut some, mut some_to) = (values.chunks_exact(S::i16s::LEN), to.chunks_exact_mut(S::i16s::LEN));
+    for (values, to) in (&mut some).zip(&mut some_to) {
+        let (low, high) = values.split_at(S::f32s::LEN);
+        let low: S::i32s = (S::f32s::from_slice(simd, low) * inverse + ROUND).bitcast();
+        let high: S::i32s = (S::f32s::from_slice(simd, high) * inverse + ROUND).bitcast();
+        low.narrow(high).store_slice(to);
+    }
+    for (value, to) in some.remainder().iter().zip(some_to.into_remainder()) {
+        *to = (value * inverse + ROUND).to_bits() as i16;
+    }
 }

@@ -8,7 +8,7 @@ use crate::linear::{Linear, Operands};
 use crate::program::Operation;
 
 /// Most heads of a tile.
-pub(crate) const MOST: usize = 64;
+pub(crate) const MOST: usize = 32;
 
 /// Memory for the work on a tile, which any tile can use.
 #[derive(Debug, Default)]
@@ -25,6 +25,9 @@ pub(crate) struct Tile<'t, 'o> {
     pub(crate) reset: Option<&'t [bool]>,
     pub(crate) actions: &'t mut [f32],
 }
+
+/// A head at an operation, and its error.
+type AtOp<'t, 'o> = (&'t mut Head<'o, 'o>, &'t mut Option<StepError>);
 
 impl Tile<'_, '_> {
     /// Runs a step of each head. A head without an action gets NaN; the first of them is returned.
@@ -77,14 +80,9 @@ impl Tile<'_, '_> {
     }
 }
 
-/// Runs a linear operation for heads that are at it.
+/// Runs a linear operation for the heads that are at it.
 #[inline(always)]
-fn multiply<S: Simd>(
-    simd: S,
-    linear: &Linear,
-    operands: &mut Operands,
-    heads: &mut [(&mut Head<'_, '_>, &mut Option<StepError>)],
-) {
+fn multiply<S: Simd>(simd: S, linear: &Linear, operands: &mut Operands, heads: &mut [AtOp<'_, '_>]) {
     linear.begin(operands, heads.len());
     for (head, error) in heads.iter_mut() {
         if let Err(failed) = linear.quantize(simd, operands, &head.arena()[linear.src.range()]) {
@@ -92,12 +90,20 @@ fn multiply<S: Simd>(
         }
     }
     linear.multiply(simd, operands);
-    for (vector, (head, error)) in heads.iter_mut().filter(|(_, error)| error.is_none()).enumerate() {
-        **error = head
-            .replace_op(|arena| {
-                linear.scale_back(simd, operands, vector, arena);
-                Ok(())
-            })
-            .err();
+    let mut vector = 0;
+    for (head, error) in heads.iter_mut() {
+        if error.is_none() {
+            **error = head
+                .replace_op(|arena| {
+                    // The closure is not compiled for the level.
+                    simd.vectorize(
+                        #[inline(always)]
+                        || linear.scale_back(simd, operands, vector, arena),
+                    );
+                    Ok(())
+                })
+                .err();
+            vector += 1;
+        }
     }
 }
