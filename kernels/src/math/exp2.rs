@@ -14,8 +14,31 @@ pub(super) fn exp2(y: f32, one: f32) -> (f32, f32) {
     let [round, ..] = exp2_constants(one);
     let whole = (y + round) - round;
     let (n, d) = fraction(y - whole, one);
-    // With 26 bits after the point, 6 remain for the whole part: the conversion limits it.
-    (n * power((whole * (FIXED_ONE / one)) as i32 >> (26 - EXPONENT)), d)
+    #[cfg(not(feature = "writer"))]
+    let exponent = by_conversion(whole, one);
+    #[cfg(feature = "writer")]
+    let exponent = by_comparison(whole, one);
+    (n * power(exponent), d)
+}
+
+/// Returns a whole number of units at the bits of an exponent. With 26 bits after the point, 6 remain for the whole
+/// part: the conversion limits it.
+#[inline(always)]
+#[cfg(any(test, not(feature = "writer")))]
+fn by_conversion(whole: f32, one: f32) -> i32 {
+    (whole * (FIXED_ONE / one)) as i32 >> (26 - EXPONENT)
+}
+
+/// Computes [`by_conversion`] for hosts, whose vector instructions have no conversion that limits.
+#[inline(always)]
+#[cfg(any(test, feature = "writer"))]
+fn by_comparison(whole: f32, one: f32) -> i32 {
+    const END: f32 = 32.0;
+    let n = whole * (1.0 / one);
+    let n = if n < -END { -END } else { n };
+    let n = if n > END { END } else { n };
+    // The sum's last bits are the whole number. The conversion ends just below 32.
+    ((n + ROUND).to_bits() << EXPONENT) as i32 - i32::from(n == END)
 }
 
 /// Computes `2^(f / one)` as in [`exp2`], for `|f| <= one / 2`.
@@ -67,4 +90,22 @@ pub(crate) fn exp_fraction(x: f32) -> (f32, f32) {
 pub(crate) fn tanh_fraction(x: f32) -> (f32, f32) {
     let (n, d) = exp2(x * (2.0 * EXP), QUARTER);
     (n - d, n + d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exponents_are_equal_on_hosts() {
+        for one in [QUARTER, 1.0, FIXED_ONE] {
+            let wholes = (-1000..=1000).map(|n| n as f32);
+            let large =
+                (0..0x7f80_0000u32).step_by(4001).map(|bits| f32::from_bits(bits).round()).flat_map(|x| [x, -x]);
+            for whole in wholes.chain(large) {
+                let whole = whole * one;
+                assert_eq!(by_conversion(whole, one), by_comparison(whole, one), "{whole} {one}");
+            }
+        }
+    }
 }
