@@ -29,6 +29,9 @@ self_cell! {
     }
 }
 
+/// The number of a tile, its heads, and the room for their actions.
+type Part<'p, 'm> = (usize, (&'p mut [Head<'m, 'm>], &'p mut [f32]));
+
 /// Independent heads of one image.
 pub struct Batch {
     heads: OwnedHeads,
@@ -156,27 +159,28 @@ impl Batch {
         if let Some(given) = reset.map(<[bool]>::len).filter(|given| *given != heads) {
             return Err(Error::Reset { expected: heads, given });
         }
-        let rows = observations.par_chunks_exact(obs_len).with_min_len(tile::MOST).enumerate();
-        if let Some((head, error)) = rows.find_map_first(|(head, row)| self.check(row).map(|error| (head, error))) {
+        let mut rows = observations.chunks_exact(obs_len).enumerate();
+        if let Some((head, error)) = rows.find_map(|(head, row)| Some((head, self.check(row)?))) {
             return Err(Error::Head { head, error });
         }
-        let Self { program, level, .. } = self;
-        let size = heads.div_ceil(rayon::current_num_threads()).min(tile::MOST);
+        let (level, program) = (self.level, &self.program[..]);
+        let size = heads.div_ceil(rayon::current_num_threads()).next_multiple_of(tile::LEAST).min(tile::MOST);
+        let step = |work: &mut Work, (i, (heads, actions)): Part<'_, '_>| {
+            let from = i * size;
+            let observations = &observations[from * obs_len..][..heads.len() * obs_len];
+            let reset = reset.map(|reset| &reset[from..][..heads.len()]);
+            let (head, error) = Tile { heads, observations, reset, actions }.step(level, program, work)?;
+            Some(Error::Head { head: from + head, error })
+        };
         let failed = self.heads.with_dependent_mut(|_, Heads { heads, .. }| {
+            if heads.len() <= size {
+                return step(&mut Work::default(), (0, (heads, actions)));
+            }
             let tiles = heads.par_chunks_mut(size).zip(actions.par_chunks_mut(size * act_len)).enumerate();
-            let steps = tiles.map_init(Work::default, |work, (i, (heads, actions))| {
-                let from = i * size;
-                let observations = &observations[from * obs_len..][..heads.len() * obs_len];
-                let reset = reset.map(|reset| &reset[from..][..heads.len()]);
-                let failed = Tile { heads, observations, reset, actions }.step(*level, program, work);
-                failed.map(|(head, error)| (from + head, error))
-            });
-            steps.flatten().min_by_key(|(head, _)| *head)
+            // The first of all, whichever thread is done first.
+            tiles.map_init(Work::default, step).collect::<Vec<_>>().into_iter().flatten().next()
         });
-        match failed {
-            Some((head, error)) => Err(Error::Head { head, error }),
-            None => Ok(()),
-        }
+        failed.map_or(Ok(()), Err)
     }
 
     /// Returns the error of [`Head::step`] for an observation.

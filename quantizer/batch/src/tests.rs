@@ -115,3 +115,13 @@ proptest! {
 fn products_that_accumulate_have_the_bits_of_heads() -> Result<()> {
     same_bits(&images::accumulating()?, 67, 1)
 }
+
+#[test]
+fn the_number_of_threads_does_not_change_the_bits() -> Result<()> {
+    let bytes = images::network(3)?;
+    for threads in [1, 3, 8] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        pool.install(|| same_bits(&bytes, 101, 3))?;
+    }
+    Ok(())
+}

@@ -5,8 +5,11 @@ use fearless_simd::{Level, Simd, dispatch};
 
 use crate::functions;
 use crate::linear::{Linear, Operands};
+use crate::product;
 use crate::program::Operation;
 
+/// Heads of a tile come in this number, for which a product is fastest.
+pub(crate) const LEAST: usize = product::HEADS;
 /// Most heads of a tile.
 pub(crate) const MOST: usize = 32;
 
