@@ -1,13 +1,13 @@
 //! One file for each subcommand of `actq`. Programs of other crates run [`quantize`] and [`sweep`] with methods of
-//! their own.
+//! their own, and read bundles and write exports as the command does.
 
-pub(crate) mod bundle;
+pub mod bundle;
 pub(crate) mod check;
 pub(crate) mod constants;
 pub(crate) mod deploy;
 mod drive;
 pub(crate) mod eval;
-pub(crate) mod export_c;
+pub mod export_c;
 pub(crate) mod import;
 pub(crate) mod inspect;
 pub(crate) mod link;

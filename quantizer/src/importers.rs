@@ -17,7 +17,7 @@ fn importer(path: &Path) -> &'static dyn Importer {
 }
 
 /// Reads a policy in any of the formats.
-pub(crate) fn load(path: &Path) -> Result<Policy> {
+pub fn load(path: &Path) -> Result<Policy> {
     Ok(importer(path).load(path)?)
 }
 
@@ -30,12 +30,27 @@ pub(crate) fn policy_files(path: &Path) -> Vec<PathBuf> {
 /// Reads what a policy learns from: `files`, or without any the recording in its folder. With a description, `files`
 /// are recordings of raw values, as images of the folder receive them, and the folder's recording holds what the
 /// networks read.
-pub(crate) fn learned(path: &Path, policy: &Policy, files: &[PathBuf]) -> Result<Option<Learned>> {
-    let Some(around) = policy.around.as_ref().filter(|_| !files.is_empty()) else {
+pub fn learned(policy: &Policy, files: &[PathBuf]) -> Result<Option<Learned>> {
+    if files.is_empty() {
         return Ok(Learned::load(policy, files)?);
-    };
-    let sizes = Sizes { obs: around.raw_len(), noise: 0, out: around.action_len(), state: 0 };
-    let read = |file: &PathBuf| observed(path, &Dataset::load(file, sizes)?);
-    let mut parts = files.iter().map(read).collect::<actq::error::Result<Vec<_>>>()?;
-    Ok(Some(Learned::join(&mut parts, &policy.graph)?))
+    }
+    let sizes = recorded_sizes(policy);
+    let parts = files.iter().map(|file| Dataset::load(file, sizes)).collect::<actq::error::Result<Vec<_>>>()?;
+    learned_from(policy, parts).map(Some)
+}
+
+/// Returns the sizes of recordings that a user makes for a policy: those of raw values, if it has a description.
+pub fn recorded_sizes(policy: &Policy) -> Sizes {
+    match &policy.around {
+        Some(around) => Sizes { obs: around.raw_len(), noise: 0, out: around.action_len(), state: 0 },
+        None => Sizes::of(policy),
+    }
+}
+
+/// Joins recordings of [`recorded_sizes`] to what the policy's networks learn from.
+pub fn learned_from(policy: &Policy, mut parts: Vec<Dataset>) -> Result<Learned> {
+    if policy.around.is_some() {
+        parts = parts.iter().map(|raw| observed(&policy.dir, raw)).collect::<actq::error::Result<_>>()?;
+    }
+    Ok(Learned::join(&mut parts, &policy.graph)?)
 }

@@ -7,7 +7,7 @@ pub mod args;
 mod check;
 pub mod commands;
 mod group;
-mod importers;
+pub mod importers;
 #[cfg(unix)]
 mod interrupts;
 pub mod outputs;

@@ -42,12 +42,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     };
     note(deployment::unread(&reading.unread));
 
-    let (description, copies) = gathered(&reading.description)?;
-    let inputs: Vec<PathBuf> = copies.keys().map(|file| bundle.path(file)).collect::<actq::error::Result<_>>()?;
-    let mut files = vec![(DESCRIPTION.to_owned(), description.to_toml(&reading.sources)?.into_bytes())];
-    for (name, path) in copies.into_values().zip(&inputs) {
-        files.push((name, fs::read(path).with_context(|| path.display().to_string())?));
-    }
+    let Gathered { mut files, inputs } = Gathered::of(&bundle, &reading)?;
     if let Some(raw) = &args.calib {
         files.push(("calib.npz".to_owned(), calibration(&reading.description, &bundle, raw)?));
     }
@@ -77,6 +72,9 @@ fn answered(bundle: &Bundle, args: &ReadingArgs) -> Result<Reading> {
     };
     if !args.ask {
         let reading = read(bundle, args.accept_profile, answers)?;
+        if !reading.questions.is_empty() {
+            print(&deployment::questions(&reading.questions))?;
+        }
         refuse_open_questions(&reading)?;
         return Ok(reading);
     }
@@ -86,8 +84,8 @@ fn answered(bundle: &Bundle, args: &ReadingArgs) -> Result<Reading> {
     Ok(reading)
 }
 
-/// Fails with the questions that nothing answers.
-fn refuse_open_questions(reading: &Reading) -> Result<()> {
+/// Fails if there are questions that nothing answers.
+pub fn refuse_open_questions(reading: &Reading) -> Result<()> {
     let questions = &reading.questions;
     if questions.is_empty() {
         return Ok(());
@@ -97,7 +95,6 @@ fn refuse_open_questions(reading: &Reading) -> Result<()> {
         0 => String::new(),
         n => format!("pass --accept-profile to accept what the deploy code says to {n} of them; "),
     };
-    print(&deployment::questions(questions))?;
     bail!(
         "the bundle (family {}) leaves {} questions open; {accept}write answers to a file as KEY = VALUE, and pass it to --answers, or \
          pass --ask. Nothing was written",
@@ -122,6 +119,28 @@ fn compare(description: &Description, plan: Plan, bundle: &Bundle, reference: &R
         note([format!("no input has the name of these raw arrays of the reference: {}", unused.join(", "))]);
     }
     Ok(deployment::agreement(&comparison))
+}
+
+/// The description of a bundle with copies of its networks, as the files of one folder.
+#[derive(Debug)]
+pub struct Gathered {
+    /// Names and contents; the description is the first.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// Files of the bundle that were copied.
+    pub inputs: Vec<PathBuf>,
+}
+
+impl Gathered {
+    /// Reads the files that a description names.
+    pub fn of(bundle: &Bundle, reading: &Reading) -> Result<Self> {
+        let (description, copies) = gathered(&reading.description)?;
+        let inputs: Vec<PathBuf> = copies.keys().map(|file| bundle.path(file)).collect::<actq::error::Result<_>>()?;
+        let mut files = vec![(DESCRIPTION.to_owned(), description.to_toml(&reading.sources)?.into_bytes())];
+        for (name, path) in copies.into_values().zip(&inputs) {
+            files.push((name, fs::read(path).with_context(|| path.display().to_string())?));
+        }
+        Ok(Self { files, inputs })
+    }
 }
 
 /// Returns the description with its files in one folder, and their names there by their paths in the bundle.

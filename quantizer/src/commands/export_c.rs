@@ -14,22 +14,35 @@ use crate::terminal::{print, reserve};
 
 /// Writes an image as source code of C.
 pub(crate) fn run(args: &ExportCArgs) -> Result<()> {
-    let name = &args.name;
+    let buffer = ImageBuffer::read(&args.image)?;
+    let image = buffer.image(&args.image)?;
+    let golden = args.golden.as_deref().map(|recording| (recording, args.steps));
+    let paths = export(image, buffer.bytes(), &args.out, &args.name, golden, Some(&args.image))?;
+    let list: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+    print(&format!("{}\n", list.join("\n")))
+}
+
+/// Writes an image of these `bytes` as source code of C into a folder, and returns the paths. `golden` is a recording,
+/// and the most steps of it to run. `file` is the image's own, which no output may replace.
+pub fn export(
+    image: Image<'_>,
+    bytes: &[u8],
+    folder: &Path,
+    name: &str,
+    golden: Option<(&Path, usize)>,
+    file: Option<&Path>,
+) -> Result<Vec<PathBuf>> {
     let is_identifier = name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
     ensure!(is_identifier, "--name {name:?}: use lower-case letters, digits and underscores, a letter first");
-    let buffer = ImageBuffer::read(&args.image)?;
-    let image = buffer.image(&args.image)?;
-    let golden = args.golden.as_ref().map(|recording| replay(image, recording, args.steps)).transpose()?;
-    let bytes = fs::read(&args.image).with_context(|| args.image.display().to_string())?;
-    let files = files(&image, &bytes, name, golden.as_ref());
+    let run = golden.map(|(recording, steps)| replay(image, recording, steps)).transpose()?;
+    let files = files(&image, bytes, name, run.as_ref());
 
-    fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
-    let paths: Vec<PathBuf> = files.iter().map(|(name, _)| args.out.join(name)).collect();
-    let outputs = reserve(&paths, [&args.image].into_iter().chain(&args.golden))?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let paths: Vec<PathBuf> = files.iter().map(|(name, _)| folder.join(name)).collect();
+    let outputs = reserve(&paths, file.into_iter().chain(golden.map(|(recording, _)| recording)))?;
     outputs.write(&files.iter().map(|(_, text)| text).collect::<Vec<_>>())?;
-    let list: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-    print(&format!("{}\n", list.join("\n")))
+    Ok(paths)
 }
 
 /// Runs the image from a reset on the first `steps` observations of a recording's first episode.

@@ -38,7 +38,7 @@ pub fn run(
     let options = options(args, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }));
     options.check()?;
     check_budget(&source, &options)?;
-    let (calib, shares) = learned_from(&args.policy_dir, &source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
+    let (calib, shares) = learned_from(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
     let shares = shares.unwrap_or_default();
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
     let recordings = Recordings { calib, heldout };

@@ -29,7 +29,7 @@ pub fn run(args: &SweepArgs, methods: &[Method]) -> Result<()> {
     let mut sweeps = Vec::new();
     for (p, policy) in policies.iter().enumerate() {
         let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));
-        let calib = learned(&policy.dir, policy, &calib)?.map(|learned| learned.dataset);
+        let calib = learned(policy, &calib)?.map(|learned| learned.dataset);
         let heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
         let recordings = Recordings { calib, heldout: Some(heldout) };
         note(notes::of_recordings(&recordings));

@@ -36,6 +36,12 @@ impl Arrays {
         }
     }
 
+    /// Takes arrays in memory.
+    pub(super) fn of(mut arrays: BTreeMap<String, Tensor>) -> Self {
+        let names = arrays.keys().cloned().collect();
+        Self { names, known: NAMES.into_iter().filter_map(|name| Some((name, arrays.remove(name)?))).collect() }
+    }
+
     pub(super) fn take(&mut self, name: &str) -> Option<Tensor> {
         self.known.remove(name)
     }

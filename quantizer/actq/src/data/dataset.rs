@@ -2,6 +2,7 @@
 //! describes the files.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use actq_kernels::Image;
@@ -64,11 +65,16 @@ pub struct Dataset {
 impl Dataset {
     /// Reads a recording and checks it against the sizes. Every error names the file and its fault.
     pub fn load(path: &Path, sizes: Sizes) -> Result<Self> {
-        Self::read(path, sizes).with_context(|| path.display().to_string())
+        let read = || Self::new(path, Arrays::read(path)?, sizes);
+        read().with_context(|| path.display().to_string())
     }
 
-    fn read(path: &Path, sizes: Sizes) -> Result<Self> {
-        let mut arrays = Arrays::read(path)?;
+    /// Makes a recording of arrays in memory by the rules for a file's arrays. Errors call it `name`.
+    pub fn of_arrays(name: &Path, arrays: BTreeMap<String, Tensor>, sizes: Sizes) -> Result<Self> {
+        Self::new(name, Arrays::of(arrays), sizes).with_context(|| name.display().to_string())
+    }
+
+    fn new(path: &Path, mut arrays: Arrays, sizes: Sizes) -> Result<Self> {
         let Some(obs) = arrays.take("obs") else {
             bail!("array \"obs\" is missing; the file holds {}", arrays.names())
         };

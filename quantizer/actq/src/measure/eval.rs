@@ -190,7 +190,7 @@ pub fn heldout_from(
 }
 
 /// Fills in missing actions by `source`, the policy that the image was made from.
-pub(super) fn fill_actions(dataset: &mut Dataset, source: Option<&Policy>) -> Result<()> {
+pub fn fill_actions(dataset: &mut Dataset, source: Option<&Policy>) -> Result<()> {
     if dataset.action.is_none() {
         let source = source.with_context(|| {
             format!(
