@@ -1,0 +1,36 @@
+"""Quantize robot policies below 4 bits, and run them with the bits of a microcontroller.
+
+    import actq
+    policy = actq.import_policy("walker.onnx")
+    image = actq.quantize(policy, "observations.npy", bpw=2)
+    head = actq.Head(image)
+    action = head(observation)
+
+`import_policy` reads a policy, `quantize` and `tune` make an `Image` of it, `Head` runs the image, `evaluate` measures
+its errors, `FakeQuant` is its network in torch, and `Link` talks to a motor controller. Every failure is an `actq.Error`
+with the text of the command `actq`. The log `actq` has what the command calls notes.
+"""
+
+from ._actq import Error, Head, Image, Link, Policy, __version__
+from ._evaluate import Errors, evaluate
+from ._import import import_policy
+from ._quantize import quantize
+from ._rollout import Episode
+from ._tune import Round, Tuned, tune
+
+__all__ = [
+    "Episode",
+    "Error",
+    "Errors",
+    "Head",
+    "Image",
+    "Link",
+    "Policy",
+    "Round",
+    "Tuned",
+    "__version__",
+    "evaluate",
+    "import_policy",
+    "quantize",
+    "tune",
+]

@@ -1,0 +1,241 @@
+"""Types of the compiled part. Shapes are in brackets; n is the number of robots."""
+
+import os
+import pathlib
+from typing import Any, Callable, Dict, List, Optional, Tuple, TypedDict, Union
+
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import final
+
+_Path = Union[str, os.PathLike[str]]
+_Report = Optional[Callable[[str, float], object]]
+_Floats = npt.NDArray[np.float32]
+
+__version__: str
+
+class Error(ValueError):
+    """A policy, recording, image, option or controller cannot be used as it is; the text is that of the command `actq`."""
+
+@final
+class Policy:
+    """A policy in f32, as it was trained. `actq.import_policy` makes one."""
+
+    @property
+    def name(self) -> str:
+        """Name of the policy."""
+    @property
+    def obs_len(self) -> int:
+        """Values of an observation; of a policy from a deploy bundle, raw values."""
+    @property
+    def act_len(self) -> int:
+        """Values of an action."""
+    @property
+    def chunk(self) -> int:
+        """Actions in the network's output; 1 without action chunks."""
+    @property
+    def execute(self) -> int:
+        """Actions executed of a chunk."""
+    @property
+    def rate_hz(self) -> float:
+        """Control rate in Hz."""
+    @property
+    def parameters(self) -> int:
+        """Number of trained values."""
+    @property
+    def state_len(self) -> int:
+        """Values of the recurrent state; 0 without one."""
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the policy's files, as `Image.source` has it."""
+
+class Cost(TypedDict):
+    """The predicted cost of a step that evaluates the network, and the memory that it needs."""
+
+    board: str
+    clock_hz: float
+    milliseconds: float
+    cycles: int
+    instructions: int
+    macs: int
+    image_bytes: int
+    scratch_bytes: int
+    scratch_limit: Optional[int]
+
+@final
+class Image:
+    """An image: what a microcontroller runs. `actq.quantize` makes one, `Image.load` reads a file.
+
+    `Image(bytes)` checks an image of `bytes`. Images compare by their bytes, and can be pickled.
+    """
+
+    def __new__(cls, bytes: bytes) -> Image: ...
+    @staticmethod
+    def load(path: _Path) -> Image:
+        """Reads and checks the file of an image.
+
+        Raises `actq.Error` if it cannot be read, is damaged, or has another format version.
+        """
+    def save(self, path: _Path) -> None:
+        """Writes the file, whole or not at all.
+
+        Raises `actq.Error` if the file cannot be written.
+        """
+    def inspect(self, *, clock: float = 168e6) -> str:
+        """Returns the report of `actq inspect`: operations, bits, memory, contract, time at `clock` in Hz."""
+    def cost(self, board: str = "stm32f405", *, clock: float = 168e6) -> Cost:
+        """Predicts the cost of a step on a board at `clock` in Hz.
+
+        The model is that of a Cortex-M4 with FPU and memory that never waits. Raises `actq.Error` for a board without
+        the kernels in assembler.
+        """
+    def export_c(
+        self, folder: _Path, *, name: str = "policy", golden: Optional[_Path] = None, steps: int = 100
+    ) -> List[pathlib.Path]:
+        """Writes the image as source code of C into `folder`, as `actq export-c` does; returns the paths.
+
+        golden: a recording; NAME_golden.c gets `steps` of its observations with the bits of this host's actions.
+        """
+    @property
+    def bytes(self) -> bytes:
+        """The bytes of the image's file."""
+    @property
+    def name(self) -> str:
+        """Name of the policy."""
+    @property
+    def obs_len(self) -> int:
+        """Values of an observation."""
+    @property
+    def act_len(self) -> int:
+        """Values of an action."""
+    @property
+    def rate_hz(self) -> float:
+        """Control rate in Hz."""
+    @property
+    def crc32(self) -> int:
+        """CRC-32 of the image, as in its header."""
+    @property
+    def source(self) -> str:
+        """SHA-256 of the policy that the image was made from, as hexadecimal digits."""
+    @property
+    def bits_per_weight(self) -> float:
+        """Bits per weight of the original network, everything counted."""
+    @property
+    def scratch_bytes(self) -> int:
+        """Bytes of scratch memory that a head needs."""
+    @property
+    def ports(self) -> List[Tuple[str, str, List[str], int]]:
+        """Raw inputs in the order of the observation, then targets in the order of the action: kind ("input",
+        "position", "velocity", "torque"), name, names of the values, their number. Empty without a description."""
+    def __len__(self) -> int: ...
+    def __bytes__(self) -> bytes: ...
+
+@final
+class Head:
+    """The executor of an image, with n independent states: the bits of the microcontroller, on all cores.
+
+    image: the image.
+    n: number of states; without it, the first observations decide.
+    seed: seed of a flow or diffusion policy's noise; state i has the seed plus i.
+    """
+
+    def __new__(cls, image: Image, n: Optional[int] = None, *, seed: int = 0) -> Head: ...
+    def __call__(self, observations: npt.ArrayLike, reset: Optional[npt.ArrayLike] = None) -> _Floats:
+        """Steps every state on its observation and returns the actions, after the action contract.
+
+        observations: [n_obs] for one state, or [n, n_obs]. They are converted to float32.
+        reset: array of bool [n]; where it is true, the state is reset before the step.
+
+        Returns [n_act], or [n, n_act]: the bits of `actq serve`. Other threads of Python run meanwhile.
+
+        Raises `actq.Error` for another shape, for an observation that is not finite, and if a value inside the network
+        exceeds float32. It names the first state that failed.
+        """
+    def reset(self) -> None:
+        """Resets every state: recurrent values, chunks, and the last action."""
+    @property
+    def image(self) -> Image:
+        """The image."""
+    @property
+    def n(self) -> Optional[int]:
+        """Number of states; `None` before the first observations, unless n was given."""
+
+class Status(TypedDict):
+    """The state of a controller (docs/LINK.md)."""
+
+    state: str
+    fault: Optional[str]
+    refusal: Optional[str]
+    reset: str
+    ticks: int
+    image: int
+    slot: int
+    act_len: int
+    obs_len: int
+    refused: int
+
+class Timing(TypedDict):
+    """The measured times of a controller and its most stack; 0 is not measured."""
+
+    period_ns: int
+    worst_tick_ns: int
+    worst_jitter_ns: int
+    worst_head_us: int
+    overruns: int
+    stack_bytes: int
+
+@final
+class Link:
+    """A connection to a motor controller (docs/LINK.md), which is closed at the end of a `with` block.
+
+    port: NAME or NAME@BAUD of a serial port, tcp:HOST:PORT, or unix:PATH.
+    timeout: seconds without an answer before a request fails.
+
+    Every method raises `actq.Error` without an answer, and if the controller refuses.
+    """
+
+    def __new__(cls, port: str, *, timeout: float = 2.0) -> Link: ...
+    def status(self) -> Status:
+        """Returns the controller's status."""
+    def timing(self) -> Timing:
+        """Returns the measured times."""
+    def arm(self) -> None:
+        """Arms the controller: its outputs follow the head."""
+    def disarm(self) -> None:
+        """Disarms the controller: its outputs coast."""
+    def step(self, observation: npt.ArrayLike, *, timeout: Optional[float] = None) -> _Floats:
+        """Sends an observation [n_obs] and returns the head's action for it [n_act].
+
+        If the controller is armed and its safety allows it, the outputs follow the action.
+        """
+    def push(
+        self, image: Image, *, version: int = 0, signature: Optional[bytes] = None, progress: _Report = None
+    ) -> None:
+        """Sends an image to the slot that does not run; the controller checks it, tests it, and runs it.
+
+        version: must not be below that of an image that ran before.
+        signature: 64 bytes by `actq sign`, for controllers that require one.
+        """
+    def close(self) -> None:
+        """Closes the port."""
+    def __enter__(self) -> Link: ...
+    def __exit__(self, *exception: object) -> None: ...
+
+def import_path(
+    path: _Path, *, output: Optional[str], states: List[Tuple[str, str]], accept_profile: bool, answers: str
+) -> Policy: ...
+def import_onnx(bytes: bytes, *, name: str, output: Optional[str], states: List[Tuple[str, str]]) -> Policy: ...
+def quantize(
+    policy: Policy, recordings: Any, heldout: Any, request: Dict[str, Any], progress: _Report
+) -> Tuple[Image, List[str]]: ...
+def evaluate(image: Image, recordings: Any, policy: Optional[Policy], progress: _Report) -> Dict[str, Any]: ...
+def stand_in(policy: Policy) -> Image: ...
+def tune(
+    policy: Policy,
+    recordings: Any,
+    heldout: Any,
+    request: Dict[str, Any],
+    rounds: int,
+    rollout: Callable[[int, Image], Tuple[Any, str]],
+    progress: _Report,
+) -> Tuple[Image, List[Image], str, str, Optional[int]]: ...

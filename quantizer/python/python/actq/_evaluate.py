@@ -1,0 +1,44 @@
+"""Errors of an image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Optional
+
+from . import _actq
+from ._actq import Image, Policy
+from ._progress import Progress, reporter
+from ._typing import Recordings
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of an image's raw outputs against the f32 policy's, as `actq eval --json` prints them."""
+
+    #: Mean squared error over variance, averaged over the output's dimensions.
+    nmse: float
+    #: The largest of a dimension.
+    worst_nmse: float
+    #: Largest absolute error, in units of the raw output.
+    max_abs: float
+    #: Compared observations.
+    steps: int
+    #: Bits per weight, everything counted.
+    bpw: float
+    #: Bytes of the image.
+    bytes: int
+
+
+def evaluate(
+    image: Image, recordings: Recordings, policy: Optional[Policy] = None, *, progress: Progress = False
+) -> Errors:
+    """Runs an image over recordings and compares it with the f32 policy.
+
+    image: what `quantize` returned.
+    recordings: as for `quantize`. If they hold no actions, `policy` computes them.
+    policy: the policy that the image was made from.
+
+    Raises `actq.Error` if a recording does not fit, or has no actions and no policy is given.
+    """
+    with reporter(progress) as report:
+        return Errors(**_actq.evaluate(image, recordings, policy, report))

@@ -1,0 +1,87 @@
+"""Quantization of a policy."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any, Dict, Mapping, Optional
+
+from . import _actq
+from ._actq import Image, Policy
+from ._progress import Progress, reporter
+from ._typing import Recordings
+
+#: Where the notes of the command go.
+log = logging.getLogger("actq")
+
+#: Hz; that of an STM32F405.
+CLOCK = 168e6
+
+
+def request(**given: Any) -> Dict[str, Any]:
+    """Completes the options of a quantization by the defaults of the command."""
+    unset = dict.fromkeys(
+        ["bits", "bpw", "flash", "ms", "max_nmse", "method", "group", "activations", "steps", "minutes"]
+    )
+    options: Dict[str, Any] = {**unset, "clock": CLOCK, "widths": [], "relative": False, "seed": 1, **given}
+    options["widths"] = list(dict(options["widths"] or {}).items())
+    return options
+
+
+def quantize(
+    policy: Policy,
+    recordings: Optional[Recordings] = None,
+    *,
+    bits: Optional[int] = None,
+    bpw: Optional[float] = None,
+    flash: Optional[int] = None,
+    ms: Optional[float] = None,
+    clock: float = CLOCK,
+    max_nmse: Optional[float] = None,
+    heldout: Optional[Recordings] = None,
+    method: Optional[str] = None,
+    group: Optional[int] = None,
+    activations: Optional[int] = None,
+    widths: Optional[Mapping[str, int]] = None,
+    steps: Optional[int] = None,
+    minutes: Optional[float] = None,
+    relative: bool = False,
+    seed: int = 1,
+    progress: Progress = None,
+) -> Image:
+    """Quantizes a policy to an image. The same arguments give the bytes of `actq quantize`.
+
+    policy: what `import_policy` returned.
+    recordings: observations of the policy's task, float32 or float64, at least 200 and better thousands:
+        - an array [frame, value] (one episode) or [episode, step, value];
+        - a pair (array [frame, value], array of bool [frame] that is true at the first frame of each episode);
+        - a mapping with "obs", and optionally "action", "length" and "state", as a file has them (docs/QUANTIZER.md);
+        - the path of an .npy, .npz or .safetensors file, or of a folder of them;
+        - a list of these.
+        Without them, those in the policy's folder.
+    bits: bits of every weight: 2, 3, 4 or 8. The default is 3.
+    bpw: bits per weight of all weights, with scales and padding.
+    flash: most bytes of the image.
+    ms, clock: most milliseconds of a step on a Cortex-M4 at a clock in Hz, as predicted.
+    max_nmse: largest error; searches the fewest bits that keep it. At most one of these budgets may be given.
+    heldout: recordings that nothing learns from; errors are measured on them.
+    method: "distill" (the default with recordings), "gptq" or "rtn" (the default without).
+    group: columns that share a scale: 0, 32, 64 or 128.
+    activations: bits of the activations: 8 or 16.
+    widths: bits of single matrices, by their names.
+    steps, minutes: most steps or minutes of learning; steps=0 for error feedback instead.
+    relative: weigh errors relative to the action's size.
+    seed: seed of all random numbers.
+    progress: called as progress(work, share); or True, False, or None for a bar in a notebook or on a terminal.
+
+    Raises `actq.Error` if the policy, a recording or an option cannot be used, or a budget cannot be kept. Ctrl-C ends it
+    at once. What the command prints as notes goes to the log `actq`.
+    """
+    options = request(
+        bits=bits, bpw=bpw, flash=flash, ms=ms, clock=clock, max_nmse=max_nmse, method=method, group=group,
+        activations=activations, widths=widths, steps=steps, minutes=minutes, relative=relative, seed=seed,
+    )  # fmt: skip
+    with reporter(progress) as report:
+        image, notes = _actq.quantize(policy, recordings, heldout, options, report)
+    for note in notes:
+        log.warning(note)
+    return image

@@ -1,0 +1,117 @@
+"""On-policy rounds in Gymnasium's vector environments."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple
+
+from . import _actq
+from ._actq import Head, Image, Policy
+from ._progress import Progress, reporter
+from ._quantize import request
+from ._rollout import Act, Observe, Success, rollout
+from ._typing import Recordings
+
+if TYPE_CHECKING:
+    import gymnasium
+
+
+@dataclass(frozen=True)
+class Round:
+    """An image of a round, the recordings that it learned from, and its rollout."""
+
+    #: The image.
+    image: Image
+    #: Episodes and frames that it learned from.
+    episodes: int
+    frames: int
+    #: Error (NMSE) where the f32 policy leads.
+    nmse: float
+    #: Error (NMSE) on its own rollout; `None` if the f32 policy's actions never vary there.
+    own_nmse: Optional[float]
+    #: Numbers of its rollout: episodes, mean_return, and success, a share, if it is known.
+    outcome: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """The result of `tune`."""
+
+    #: The image of the last round.
+    image: Image
+    #: All rounds, from 0 on.
+    rounds: Sequence[Round]
+    #: The table of `actq tune`.
+    table: str = field(repr=False)
+    #: The round whose image had the most success, if it is not the last one.
+    better: Optional[int] = None
+
+    def __str__(self) -> str:
+        return self.table
+
+
+def tune(
+    policy: Policy,
+    env: gymnasium.vector.VectorEnv[Any, Any, Any],
+    recordings: Optional[Recordings] = None,
+    *,
+    bits: Optional[int] = None,
+    bpw: Optional[float] = None,
+    rounds: int = 1,
+    frames: int = 10_000,
+    observe: Optional[Observe] = None,
+    act: Optional[Act] = None,
+    success: Optional[Success] = None,
+    heldout: Optional[Recordings] = None,
+    steps: Optional[int] = None,
+    minutes: Optional[float] = None,
+    relative: bool = False,
+    seed: int = 1,
+    progress: Progress = None,
+) -> Tuned:
+    """Quantizes in on-policy rounds: rolls out the newest image, labels by the f32 policy, and learns again (DAgger).
+
+    policy: what `import_policy` returned.
+    env: a vector environment of Gymnasium. All of its robots step together; it stays open.
+    recordings: observations of the f32 policy, as for `quantize`. Without them, an image of 8 bits of the policy is
+        rolled out in `env` and stands in for it.
+    bits, bpw: bits of every weight, or bits per weight of all weights; the default is 3 bits.
+    rounds: on-policy rounds after the first image, 1 to 100. N rounds make N + 1 rollouts.
+    frames: frames of a rollout, of all robots together.
+    observe: makes the policy's observations [n, n_obs] of the environment's; the default flattens arrays.
+    act: makes the environment's actions of the policy's [n, n_act]; the default clips to a Box, and takes the largest
+        value for Discrete.
+    success: is called with an `Episode` and says if it succeeded. The default reads "is_success" or "success" of the
+        environment's info; without them, no success is known.
+    heldout, steps, minutes, relative, seed, progress: as for `quantize`.
+
+    The same seed gives the same images if the environment does the same. Raises `actq.Error` as `quantize` does, and what
+    the environment raises. Ctrl-C ends it at once.
+    """
+    options = request(bits=bits, bpw=bpw, steps=steps, minutes=minutes, relative=relative, seed=seed)
+    outcomes: List[Dict[str, float]] = []
+
+    def drive(image: Image, number: int) -> Tuple[Tuple[Any, Any], Dict[str, float]]:
+        head = Head(image, env.num_envs)
+        # Other episodes in every rollout.
+        first = (seed + number * env.num_envs) % 2**31
+        recording, outcome = rollout(head, env, policy, frames, first, observe, act, success)
+        return recording, outcome
+
+    def driven(number: int, image: Image) -> Tuple[Tuple[Any, Any], str]:
+        recording, outcome = drive(image, number + 1)
+        outcomes.append(outcome)
+        return recording, json.dumps(outcome)
+
+    with reporter(progress) as report:
+        if recordings is None:
+            if report is not None:
+                report("rollout of the f32 policy", 0.0)
+            recordings = drive(_actq.stand_in(policy), 0)[0]
+        image, images, rows, table, better = _actq.tune(policy, recordings, heldout, options, rounds, driven, report)
+    found = [
+        Round(image, row["episodes"], row["frames"], row["nmse"], row["own_nmse"], outcome)
+        for image, row, outcome in zip(images, json.loads(rows), outcomes)
+    ]
+    return Tuned(image, found, table, better)

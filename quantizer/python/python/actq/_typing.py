@@ -1,0 +1,16 @@
+"""Types of arguments."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, List, Mapping, Tuple, Union
+
+import numpy as np
+import numpy.typing as npt
+
+Path = Union[str, "os.PathLike[str]"]
+Floats = npt.NDArray[np.float32]
+Array = npt.NDArray[Any]
+#: A recording, or several; `actq.quantize` describes them.
+Recording = Union[Array, Tuple[Array, Array], Mapping[str, Array], Path]
+Recordings = Union[Recording, List[Recording]]

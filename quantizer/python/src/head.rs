@@ -1,0 +1,123 @@
+//! Heads: the executor of the microcontroller, for one robot or thousands.
+
+use std::sync::{Mutex, PoisonError};
+
+use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _, TypeMustMatch};
+use numpy::{IntoPyArray as _, PyUntypedArrayMethods as _};
+use pyo3::prelude::*;
+
+use crate::batch::Batch;
+use crate::error::{OrRaise as _, error};
+use crate::image::Image;
+
+/// The executor of an image, with n independent states.
+#[pyclass(frozen, module = "actq")]
+pub(crate) struct Head {
+    image: Py<Image>,
+    obs_len: usize,
+    act_len: usize,
+    seed: u32,
+    /// `None` until the first observations decide how many states there are.
+    batch: Mutex<Option<States>>,
+}
+
+struct States {
+    batch: Batch,
+    heads: usize,
+}
+
+impl Head {
+    /// Makes states in their beginning. State i has the seed of the head plus i.
+    fn states(&self, image: &Image, heads: usize) -> PyResult<States> {
+        let mut batch = Batch::new(image.buffer().bytes(), heads).or_raise()?;
+        let seeds: Vec<u32> = (0..heads).map(|i| self.seed.wrapping_add(i as u32)).collect();
+        batch.seed(&seeds);
+        Ok(States { batch, heads })
+    }
+}
+
+#[pymethods]
+impl Head {
+    #[new]
+    #[pyo3(signature = (image, n = None, *, seed = 0))]
+    fn new(py: Python<'_>, image: Py<Image>, n: Option<usize>, seed: u32) -> PyResult<Self> {
+        let view = image.get().image()?;
+        let (obs_len, act_len) = (view.obs_len(), view.act_len());
+        let head = Self { image: image.clone_ref(py), obs_len, act_len, seed, batch: Mutex::new(None) };
+        if let Some(n) = n {
+            if n == 0 {
+                return Err(error!("n is 0; a head needs at least one state"));
+            }
+            let states = head.states(image.get(), n)?;
+            *head.batch.lock().unwrap_or_else(PoisonError::into_inner) = Some(states);
+        }
+        Ok(head)
+    }
+
+    /// Steps every state on its observation.
+    #[pyo3(signature = (observations, reset = None))]
+    fn __call__<'py>(
+        &self,
+        py: Python<'py>,
+        observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
+        reset: Option<PyArrayLikeDyn<'py, bool, TypeMustMatch>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let given = observations.shape().to_vec();
+        let (heads, shape) = match given[..] {
+            [values] if values == self.obs_len => (1, vec![self.act_len]),
+            [heads, values] if values == self.obs_len && heads > 0 => (heads, vec![heads, self.act_len]),
+            _ => {
+                return Err(error!(
+                    "the observations have the shape {given:?}; use [{0}] for one, or [n, {0}] for a batch",
+                    self.obs_len
+                ));
+            }
+        };
+        let reset: Option<Vec<bool>> = reset.map(|mask| mask.as_array().iter().copied().collect());
+        if let Some(mask) = reset.as_ref().filter(|mask| mask.len() != heads) {
+            return Err(error!("reset has {} values for {heads} observations; pass one for each", mask.len()));
+        }
+        // Copies: another thread may change numpy's memory.
+        let observations: Vec<f32> = observations.as_array().iter().copied().collect();
+        let actions = py.detach(|| {
+            let mut batch = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
+            let states = match &mut *batch {
+                Some(states) => states,
+                none => none.insert(self.states(self.image.get(), heads)?),
+            };
+            if states.heads != heads {
+                return Err(error!("{heads} observations for a head of {} states; make another head", states.heads));
+            }
+            let mut actions = vec![0.0; heads * self.act_len];
+            states.batch.step(&observations, reset.as_deref(), &mut actions).or_raise()?;
+            Ok(actions)
+        })?;
+        actions.into_pyarray(py).reshape(shape)
+    }
+
+    /// Resets every state: recurrent values, chunks, and the last action.
+    fn reset(&self, py: Python<'_>) {
+        py.detach(|| {
+            if let Some(states) = &mut *self.batch.lock().unwrap_or_else(PoisonError::into_inner) {
+                states.batch.reset();
+            }
+        });
+    }
+
+    /// The image.
+    #[getter]
+    fn image(&self, py: Python<'_>) -> Py<Image> {
+        self.image.clone_ref(py)
+    }
+
+    /// Number of states; `None` before the first observations, unless n was given.
+    #[getter]
+    fn n(&self) -> Option<usize> {
+        self.batch.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(|states| states.heads)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let n = self.n().map_or("None".to_owned(), |n| n.to_string());
+        Ok(format!("Head({}, n={n})", self.image.bind(py).repr()?))
+    }
+}

@@ -1,0 +1,219 @@
+//! Images: their files, reports and sizes.
+
+use std::path::{Path, PathBuf};
+
+use actq::measure::size::{bits_per_weight, hex};
+use actq::measure::time::{CLOCK, StepTime};
+use actq::runtime::ImageBuffer;
+use actq_boards::Target;
+use actq_cli::commands::export_c::export;
+use actq_cli::outputs::files::write;
+use actq_cli::report::{inspect, time};
+use actq_kernels::PortKind;
+use pyo3::IntoPyObjectExt as _;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
+
+use crate::error::{OrRaise as _, error};
+
+/// An image: what a microcontroller runs.
+///
+/// `Image(bytes)` checks an image of `bytes`. `actq.quantize` makes one, `Image.load` reads a file.
+#[pyclass(frozen, module = "actq")]
+pub(crate) struct Image {
+    buffer: ImageBuffer,
+    name: PathBuf,
+}
+
+impl Image {
+    /// Checks an image; errors call it `name`.
+    pub(crate) fn of(buffer: ImageBuffer, name: &Path) -> PyResult<Self> {
+        buffer.image(name).or_raise()?;
+        Ok(Self { buffer, name: name.to_owned() })
+    }
+
+    pub(crate) fn image(&self) -> PyResult<actq_kernels::Image<'_>> {
+        self.buffer.image(&self.name).or_raise()
+    }
+
+    pub(crate) fn buffer(&self) -> &ImageBuffer {
+        &self.buffer
+    }
+}
+
+#[pymethods]
+impl Image {
+    #[new]
+    fn new(bytes: &[u8]) -> PyResult<Self> {
+        Self::of(ImageBuffer::new(bytes), Path::new("image"))
+    }
+
+    /// Reads and checks the file of an image.
+    #[staticmethod]
+    fn load(path: PathBuf) -> PyResult<Self> {
+        Self::of(ImageBuffer::read(&path).or_raise()?, &path)
+    }
+
+    /// Writes the file, whole or not at all.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| write(&path, self.buffer.bytes())).or_raise()
+    }
+
+    /// The bytes of the image's file.
+    #[getter]
+    fn bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, self.buffer.bytes())
+    }
+
+    /// Name of the policy.
+    #[getter]
+    fn name(&self) -> PyResult<String> {
+        Ok(self.image()?.name().to_owned())
+    }
+
+    /// Values of an observation.
+    #[getter]
+    fn obs_len(&self) -> PyResult<usize> {
+        Ok(self.image()?.obs_len())
+    }
+
+    /// Values of an action.
+    #[getter]
+    fn act_len(&self) -> PyResult<usize> {
+        Ok(self.image()?.act_len())
+    }
+
+    /// Control rate in Hz.
+    #[getter]
+    fn rate_hz(&self) -> PyResult<f32> {
+        Ok(self.image()?.rate_hz())
+    }
+
+    /// CRC-32 of the image, as in its header.
+    #[getter]
+    fn crc32(&self) -> PyResult<u32> {
+        Ok(self.image()?.crc())
+    }
+
+    /// SHA-256 of the policy that the image was made from, as hexadecimal digits.
+    #[getter]
+    fn source(&self) -> PyResult<String> {
+        Ok(hex(&self.image()?.digest()))
+    }
+
+    /// Bits per weight of the original network, everything counted.
+    #[getter]
+    fn bits_per_weight(&self) -> PyResult<f64> {
+        Ok(bits_per_weight(&self.image()?))
+    }
+
+    /// Bytes of scratch memory that a head needs.
+    #[getter]
+    fn scratch_bytes(&self) -> PyResult<usize> {
+        Ok(4 * self.image()?.scratch_words())
+    }
+
+    /// Raw inputs in the order of the observation, then targets in the order of the action, each as (kind, name, names
+    /// of the values). Empty without a description (docs/DEPLOY.md).
+    #[getter]
+    fn ports(&self) -> PyResult<Vec<(&'static str, String, Vec<String>, usize)>> {
+        let port = |port: actq_kernels::Port<'_>| {
+            let kind = match port.kind {
+                PortKind::Input => "input",
+                PortKind::Position => "position",
+                PortKind::Velocity => "velocity",
+                PortKind::Torque => "torque",
+                _ => "output",
+            };
+            (kind, port.name.to_owned(), port.names.lines().map(str::to_owned).collect(), port.len)
+        };
+        Ok(self.image()?.ports().map(port).collect())
+    }
+
+    /// Returns the report of `actq inspect`.
+    #[pyo3(signature = (*, clock = CLOCK))]
+    fn inspect(&self, clock: f64) -> PyResult<String> {
+        let image = self.image()?;
+        Ok(format!("{}\n{}", inspect::report(&image), time::report(&StepTime::new(&image, positive("clock", clock)?))))
+    }
+
+    /// Predicts the cost of a step on a board, as a dict.
+    #[pyo3(signature = (board = "stm32f405", *, clock = CLOCK))]
+    fn cost<'py>(&self, py: Python<'py>, board: &str, clock: f64) -> PyResult<Bound<'py, PyDict>> {
+        let image = self.image()?;
+        let known = Target::ALL.into_iter().filter(|target| target.has_assembler());
+        let Some(target) = known.clone().find(|target| target.board().name == board) else {
+            let mut names: Vec<&str> = known.map(|target| target.board().name).collect();
+            names.dedup();
+            return Err(error!("board {board:?} has no cost model; use one of {}", names.join(", ")));
+        };
+        let step = StepTime::new(&image, positive("clock", clock)?);
+        let cost = PyDict::new(py);
+        cost.set_item("board", board)?;
+        cost.set_item("clock_hz", clock)?;
+        cost.set_item("milliseconds", step.milliseconds)?;
+        cost.set_item("cycles", step.cycles)?;
+        cost.set_item("instructions", step.instructions)?;
+        cost.set_item("macs", step.macs)?;
+        cost.set_item("image_bytes", image.bytes())?;
+        cost.set_item("scratch_bytes", 4 * image.scratch_words())?;
+        cost.set_item("scratch_limit", target.board().application.map(|application| 4 * application.scratch))?;
+        Ok(cost)
+    }
+
+    /// Writes the image as source code of C into `folder`, as `actq export-c` does; returns the paths.
+    #[pyo3(signature = (folder, *, name = "policy", golden = None, steps = 100))]
+    fn export_c(
+        &self,
+        py: Python<'_>,
+        folder: PathBuf,
+        name: &str,
+        golden: Option<PathBuf>,
+        steps: usize,
+    ) -> PyResult<Vec<PathBuf>> {
+        let image = self.image()?;
+        py.detach(|| {
+            export(image, self.buffer.bytes(), &folder, name, golden.as_deref().map(|file| (file, steps)), None)
+        })
+        .or_raise()
+    }
+
+    fn __len__(&self) -> usize {
+        self.buffer.bytes().len()
+    }
+
+    fn __bytes__<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        self.bytes(py)
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.buffer.bytes() == other.buffer.bytes()
+    }
+
+    fn __hash__(&self) -> PyResult<u64> {
+        Ok(self.image()?.crc().into())
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        let image = self.image()?;
+        Ok(format!(
+            "Image({:?}, {} observations -> {} actions, {:.3} bits per weight, {} bytes)",
+            image.name(),
+            image.obs_len(),
+            image.act_len(),
+            bits_per_weight(&image),
+            image.bytes()
+        ))
+    }
+
+    /// Makes images picklable.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let class = py.get_type::<Self>().into_bound_py_any(py)?;
+        (class, (self.bytes(py),)).into_pyobject(py)
+    }
+}
+
+/// Refuses a number that is not above 0.
+pub(crate) fn positive(name: &str, value: f64) -> PyResult<f64> {
+    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(error!("{name} is {value}; use a number above 0")) }
+}

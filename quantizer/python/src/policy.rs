@@ -1,0 +1,172 @@
+//! Policies: their import from files, bundles and bytes.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use actq::import::Importer as _;
+use actq::measure::size::hex;
+use actq_cli::commands::bundle::{Gathered, refuse_open_questions};
+use actq_cli::importers::load;
+use actq_cli::outputs::unfinished::Scratch;
+use actq_cli::report::deployment;
+use actq_deploy::{Answers, Bundle, DESCRIPTION, DeployFolder, read};
+use actq_onnx::{Choice, Onnx, import, import_bytes};
+use pyo3::prelude::*;
+
+use crate::error::{OrRaise as _, error, raise};
+
+/// A policy in f32, as it was trained.
+///
+/// `actq.import_policy` makes one.
+#[pyclass(frozen, module = "actq")]
+pub(crate) struct Policy {
+    pub(crate) policy: Arc<actq::policy::Policy>,
+    /// Folder of a bundle's description, which recordings of raw values need.
+    _folder: Option<Scratch>,
+}
+
+impl Policy {
+    fn new(policy: actq::policy::Policy) -> Self {
+        Self { policy: Arc::new(policy), _folder: None }
+    }
+
+    /// Returns the folder of its recordings; `None` if it was not read from files.
+    pub(crate) fn folder(&self) -> Option<&Path> {
+        Some(&*self.policy.dir).filter(|folder| !folder.as_os_str().is_empty())
+    }
+}
+
+#[pymethods]
+impl Policy {
+    /// Name of the policy.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.policy.name
+    }
+
+    /// Values of an observation; of a policy from a deploy bundle, raw values.
+    #[getter]
+    fn obs_len(&self) -> usize {
+        self.policy.around.as_ref().map_or(self.policy.graph.obs_len, actq::around::Around::raw_len)
+    }
+
+    /// Values of an action.
+    #[getter]
+    fn act_len(&self) -> usize {
+        self.policy.around.as_ref().map_or(self.policy.act_len, actq::around::Around::action_len)
+    }
+
+    /// Actions in the network's output; 1 without action chunks.
+    #[getter]
+    fn chunk(&self) -> usize {
+        self.policy.chunk
+    }
+
+    /// Actions executed of a chunk.
+    #[getter]
+    fn execute(&self) -> usize {
+        self.policy.execute
+    }
+
+    /// Control rate in Hz.
+    #[getter]
+    fn rate_hz(&self) -> f32 {
+        self.policy.rate_hz
+    }
+
+    /// Number of trained values.
+    #[getter]
+    fn parameters(&self) -> usize {
+        self.policy.parameters
+    }
+
+    /// Values of the recurrent state; 0 without one.
+    #[getter]
+    fn state_len(&self) -> usize {
+        self.policy.graph.state_len()
+    }
+
+    /// SHA-256 of the policy's files, as `Image.source` has it.
+    #[getter]
+    fn digest(&self) -> String {
+        hex(&self.policy.digest)
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Policy({:?}, {} observations -> {} actions, {} parameters)",
+            self.policy.name,
+            self.obs_len(),
+            self.act_len(),
+            self.policy.parameters
+        )
+    }
+}
+
+/// Reads a policy folder, an ONNX file, or a deploy bundle.
+#[pyfunction]
+#[pyo3(signature = (path, *, output, states, accept_profile, answers))]
+pub(crate) fn import_path(
+    py: Python<'_>,
+    path: PathBuf,
+    output: Option<String>,
+    states: Vec<(String, String)>,
+    accept_profile: bool,
+    answers: &str,
+) -> PyResult<Policy> {
+    py.detach(|| {
+        let choice = Choice { output, states, is_fed: false };
+        if Onnx.accepts(&path) {
+            let imported = import(&path, &choice).or_raise()?;
+            let policy =
+                actq::policy::Policy::of_files(&path, [&path, &path], &imported.json, &imported.weights).or_raise()?;
+            return Ok(Policy::new(policy));
+        }
+        if choice.output.is_some() || !choice.states.is_empty() {
+            return Err(error!("{}: only an ONNX file takes output and states", path.display()));
+        }
+        let is_policy = DeployFolder.accepts(&path) || path.join(actq::import::FILES[0]).is_file();
+        let is_bundle = path.is_dir() || path.extension().is_some_and(|ending| ending == "kinfer");
+        if is_bundle && !is_policy {
+            return import_bundle(&path, accept_profile, answers);
+        }
+        Ok(Policy::new(load(&path).or_raise()?))
+    })
+}
+
+/// Imports a bundle into a temporary folder, as `actq import` does into a lasting one.
+fn import_bundle(path: &Path, accept_profile: bool, answers: &str) -> PyResult<Policy> {
+    let bundle = Bundle::open(path).or_raise()?;
+    let reading = read(&bundle, accept_profile, Answers::parse(answers).or_raise()?).or_raise()?;
+    refuse_open_questions(&reading)
+        .map_err(|error| error.context(deployment::questions(&reading.questions)))
+        .or_raise()?;
+    let folder = Scratch::new().or_raise()?;
+    for (name, content) in Gathered::of(&bundle, &reading).or_raise()?.files {
+        fs::write(folder.path().join(name), content).or_raise()?;
+    }
+    let mut policy = load(folder.path()).map_err(|error| error.context(DESCRIPTION)).or_raise()?;
+    policy.dir = folder.path().to_owned();
+    Ok(Policy { policy: Arc::new(policy), _folder: Some(folder) })
+}
+
+/// Reads the bytes of an ONNX file.
+#[pyfunction]
+#[pyo3(signature = (bytes, *, name, output, states))]
+pub(crate) fn import_onnx(
+    py: Python<'_>,
+    bytes: Vec<u8>,
+    name: &str,
+    output: Option<String>,
+    states: Vec<(String, String)>,
+) -> PyResult<Policy> {
+    py.detach(|| {
+        let choice = Choice { output, states, is_fed: false };
+        let imported = import_bytes(bytes, Path::new(""), name, &choice).map_err(|error| error.context(name));
+        let imported = imported.map_err(raise)?;
+        let names = [Path::new(name); 2];
+        let policy = actq::policy::Policy::of_files(Path::new(""), names, &imported.json, &imported.weights);
+        Ok(Policy::new(policy.or_raise()?))
+    })
+}

@@ -1,0 +1,207 @@
+//! Quantization, and the errors of an image.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use actq::budget::{Budget, TimeLimit};
+use actq::data::{Recording, Recordings, Sizes, joined};
+use actq::measure::{check, eval};
+use actq::methods::{Activations, Method, Options};
+use actq::pipeline;
+use actq::runtime::ImageBuffer;
+use actq_cli::importers::{learned, learned_from, recorded_sizes};
+use actq_cli::report::notes;
+use actq_kernels::Width;
+use anyhow::bail;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::error::{OrRaise as _, error};
+use crate::image::{Image, positive};
+use crate::policy::Policy;
+use crate::recordings::{Passed, passed};
+use crate::work;
+
+/// What Python passed, with the names of the arguments.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Request {
+    bits: Option<u32>,
+    bpw: Option<f64>,
+    flash: Option<usize>,
+    ms: Option<f64>,
+    max_nmse: Option<f64>,
+    clock: f64,
+    method: Option<String>,
+    group: Option<usize>,
+    activations: Option<u32>,
+    widths: Vec<(String, u32)>,
+    steps: Option<usize>,
+    minutes: Option<f64>,
+    relative: bool,
+    seed: u64,
+}
+
+impl Request {
+    /// Returns the budget: 3 bits for every weight if none is given.
+    fn budget(&self) -> PyResult<Budget> {
+        let budgets = [
+            self.bits.map(|bits| Ok(Budget::Width(width("bits", bits)?))),
+            self.bpw.map(|bits| Ok(Budget::BitsPerWeight(positive("bpw", bits)?))),
+            self.flash.map(|bytes| Ok(Budget::ImageBytes(bytes))),
+            self.ms.map(|milliseconds| {
+                let (milliseconds, clock_hz) = (positive("ms", milliseconds)?, positive("clock", self.clock)?);
+                Ok(Budget::Time(TimeLimit { milliseconds, clock_hz }))
+            }),
+            self.max_nmse.map(|limit| Ok(Budget::MaxNmse(positive("max_nmse", limit)?))),
+        ];
+        let mut given = budgets.into_iter().flatten();
+        let budget = given.next().unwrap_or(Ok(Budget::Width(Width::W3)));
+        if given.next().is_some() {
+            return Err(error!("more than one budget is given; pass one of bits, bpw, flash, ms and max_nmse"));
+        }
+        budget
+    }
+
+    /// Returns the method; `None` for the default, which depends on the recordings.
+    fn method(&self) -> PyResult<Option<Method>> {
+        Ok(match self.method.as_deref() {
+            None => None,
+            Some("rtn") => Some(Method::Rtn),
+            Some("gptq") => Some(Method::Gptq),
+            Some("distill") => Some(Method::Distill),
+            Some(other) => return Err(error!("method is {other:?}; use \"rtn\", \"gptq\" or \"distill\"")),
+        })
+    }
+
+    /// Returns the options of a quantization by `method`.
+    pub(crate) fn options(&self, method: Method) -> PyResult<Options> {
+        let forced = self.widths.iter().map(|(name, bits)| Ok((name.clone(), width(name, *bits)?)));
+        let minutes = self.minutes.map(|minutes| positive("minutes", minutes)).transpose()?;
+        let options = Options {
+            group: self.group.unwrap_or(method.default_group()),
+            activations: match self.activations {
+                None => Activations::Auto,
+                Some(8) => Activations::Int8,
+                Some(16) => Activations::Int16,
+                Some(bits) => return Err(error!("activations is {bits}; use 8 or 16 bits")),
+            },
+            steps: self.steps,
+            minutes,
+            relative: self.relative,
+            seed: self.seed,
+            forced: forced.collect::<PyResult<_>>()?,
+            ..Options::new(method, self.budget()?)
+        };
+        options.check().or_raise()?;
+        Ok(options)
+    }
+}
+
+fn width(name: &str, bits: u32) -> PyResult<Width> {
+    Width::from_bits(bits).ok_or_else(|| error!("{name} is {bits}; use 2, 3, 4 or 8 bits"))
+}
+
+/// Quantizes a policy. Returns the image, and notes for the user.
+#[pyfunction]
+#[pyo3(signature = (policy, recordings, heldout, request, progress))]
+pub(crate) fn quantize(
+    py: Python<'_>,
+    policy: &Policy,
+    recordings: Option<&Bound<'_, PyAny>>,
+    heldout: Option<&Bound<'_, PyAny>>,
+    request: Request,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Image, Vec<String>)> {
+    let (calib, heldout) = (passed(recordings, "recordings")?, passed(heldout, "heldout")?);
+    let folder = policy.folder();
+    let found = folder.map(|folder| Recording::Calib.find(folder)).transpose().or_raise()?.flatten();
+    let has_calib = !calib.is_empty() || found.is_some();
+    let method = request.method()?;
+    if !has_calib && method != Some(Method::Rtn) && folder.is_none_or(Path::is_file) {
+        return Err(error!("{}", notes::how_to_record(&policy.policy)));
+    }
+    let options = request.options(method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }))?;
+    let (policy, in_folder) = (policy.policy.clone(), folder.is_some());
+    let (bytes, notes) = work::run(py, progress, move |worker| {
+        pipeline::check_budget(&policy, &options)?;
+        let recordings = read(&policy, calib, heldout, in_folder)?;
+        let mut notes: Vec<String> = notes::of_recordings(&recordings).into_iter().collect();
+        notes.extend(match &policy.around {
+            Some(around) => notes::targets_without_limits(around),
+            None => notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))),
+        });
+        let found = pipeline::quantize(&policy, &recordings, &options, |work: &str, share| worker.report(work, share))?;
+        notes.extend(notes::unused_budget(&found, &options));
+        worker.report("measuring the error", 0.0);
+        let alone = found.buffer();
+        if let Some(check) = check::check(&policy, alone.image(Path::new("image"))?, &recordings)? {
+            notes.extend(notes::overfit_warning(&check));
+            notes.extend(notes::error_warning(&check));
+        }
+        Ok((found.whole_image()?, notes))
+    })?;
+    Ok((Image::of(ImageBuffer::new(&bytes), Path::new("image"))?, notes))
+}
+
+/// Reads what was passed, or else what is in the policy's folder.
+fn read(
+    policy: &actq::policy::Policy,
+    calib: Vec<Passed>,
+    heldout: Vec<Passed>,
+    in_folder: bool,
+) -> anyhow::Result<Recordings> {
+    let parts = |passed: Vec<Passed>| {
+        let sizes = recorded_sizes(policy);
+        passed.into_iter().map(|passed| passed.load(sizes)).collect::<Result<Vec<_>, _>>()
+    };
+    let calib = match calib.is_empty() {
+        false => Some(learned_from(policy, parts(calib)?)?),
+        true if in_folder => learned(policy, &[])?,
+        true => None,
+    };
+    let heldout = match heldout.is_empty() {
+        false => Some(learned_from(policy, parts(heldout)?)?.dataset),
+        true if in_folder => Recording::Heldout.load(Some(&policy.dir), None, Sizes::of(policy))?,
+        true => None,
+    };
+    Ok(Recordings { calib: calib.map(|learned| learned.dataset), heldout })
+}
+
+/// Runs an image over recordings; returns its errors against the f32 policy as a dict.
+#[pyfunction]
+#[pyo3(signature = (image, recordings, policy, progress))]
+pub(crate) fn evaluate<'py>(
+    py: Python<'py>,
+    image: &Bound<'py, Image>,
+    recordings: &Bound<'py, PyAny>,
+    policy: Option<&Policy>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let passed = passed(Some(recordings), "recordings")?;
+    let (buffer, policy) = (image.get().buffer().clone(), policy.map(|policy| Arc::clone(&policy.policy)));
+    let report = work::run(py, progress, move |worker| {
+        let image = buffer.image(Path::new("image"))?;
+        if image.has_around() {
+            bail!("image: it takes raw inputs; compare it with a reference by `actq check`");
+        }
+        let source = policy.as_deref().filter(|policy| policy.digest == image.digest());
+        let parts: Vec<_> =
+            passed.into_iter().map(|passed| passed.load(Sizes::of_image(&image))).collect::<Result<_, _>>()?;
+        let mut dataset = match <[_; 1]>::try_from(parts) {
+            Ok([one]) => one,
+            Err(parts) => joined(&parts, image.state().len)?,
+        };
+        eval::fill_actions(&mut dataset, source)?;
+        worker.report("running the image over the recordings", 0.0);
+        Ok(eval::evaluate(image, &dataset)?)
+    })?;
+    let errors = PyDict::new(py);
+    errors.set_item("nmse", report.nmse)?;
+    errors.set_item("worst_nmse", report.worst_nmse)?;
+    errors.set_item("max_abs", report.max_abs)?;
+    errors.set_item("steps", report.steps)?;
+    errors.set_item("bpw", report.bpw)?;
+    errors.set_item("bytes", report.bytes)?;
+    Ok(errors)
+}

@@ -1,0 +1,128 @@
+"""Errors have the text of the command; Ctrl-C ends the work at once."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import actq
+from conftest import UR3
+
+
+def test_errors_are_those_of_the_command(command, mlp, observations, tmp_path):
+    np.save(tmp_path / "narrow.npy", observations[:, :5])
+    cases = [
+        (lambda: actq.import_policy(tmp_path / "no.onnx"), ["quantize", tmp_path / "no.onnx"]),
+        (lambda: actq.import_policy(tmp_path / "none"), ["quantize", tmp_path / "none"]),
+        (
+            lambda: actq.quantize(actq.import_policy(mlp), tmp_path / "narrow.npy", progress=False),
+            ["quantize", mlp, "--calib", tmp_path / "narrow.npy"],
+        ),
+        (
+            lambda: actq.quantize(actq.import_policy(mlp), observations, bpw=0.01, progress=False),
+            ["quantize", mlp, "--calib", tmp_path / "narrow.npy", "--bpw", "0.01"],
+        ),
+        (
+            lambda: actq.quantize(actq.import_policy(mlp), observations, relative=True, steps=0, progress=False),
+            ["quantize", mlp, "--calib", tmp_path / "narrow.npy", "--relative", "--steps", "0"],
+        ),
+    ]
+    for python, arguments in cases:
+        text = command(*arguments, "--out", tmp_path / "out.actq", "--quiet", fails=True).removeprefix("actq: ")
+        with pytest.raises(actq.Error) as raised:
+            python()
+        assert str(raised.value) == text.splitlines()[-1].removeprefix("actq: ")
+    assert issubclass(actq.Error, ValueError)
+
+
+def test_arguments_are_named(mlp, observations):
+    policy = actq.import_policy(mlp)
+    wrong = [
+        ({"bits": 5}, "bits is 5; use 2, 3, 4 or 8 bits"),
+        ({"bpw": 0}, "bpw is 0; use a number above 0"),
+        ({"bpw": 2, "flash": 90_000}, "more than one budget is given; pass one of bits, bpw, flash, ms and max_nmse"),
+        ({"method": "best"}, 'method is "best"; use "rtn", "gptq" or "distill"'),
+        ({"activations": 4}, "activations is 4; use 8 or 16 bits"),
+        ({"group": 5}, "group is 5; it must be 0 or one of [32, 64, 128]"),
+    ]
+    for options, text in wrong:
+        with pytest.raises(actq.Error) as raised:
+            actq.quantize(policy, observations, progress=False, **options)
+        assert str(raised.value) == text
+    recordings = [
+        (3, "recordings is a int; pass a path, an array"),
+        ((observations,), "recordings is a tuple of 1 items; pass (observations, starts)"),
+        ((observations, np.zeros(3, dtype=bool)), "recordings[1] has 3 values for 500 frames; pass one for each frame"),
+        ((observations, np.zeros(500)), "recordings[1] is no array of bool [frame]"),
+        (observations.astype(np.int32), 'recordings: array "obs" is of type int32; use float32 or float64'),
+        ([observations, observations[:, :3]], 'recordings[1]: array "obs" has 3 values per step'),
+        ({"observation": observations}, 'recordings: array "obs" is missing; the file holds observation'),
+    ]
+    for recording, text in recordings:
+        with pytest.raises(actq.Error) as raised:
+            actq.quantize(policy, recording, progress=False)
+        assert str(raised.value).startswith(text)
+    with pytest.raises(actq.Error, match="no calibration recording; pass one by --calib FILE"):
+        actq.quantize(policy, progress=False)
+    with pytest.raises(actq.Error, match="image: not an actq image"):
+        actq.Image(b"no image")
+
+
+def test_ctrl_c_ends_quantize_at_once(tmp_path):
+    """In a process of its own, as at a prompt."""
+    script = f"""
+import actq, time, sys
+policy = actq.import_policy({str(UR3)!r})
+def told(work, share):
+    print("begun", flush=True)
+try:
+    actq.quantize(policy, bpw=2, progress=told).save({str(tmp_path / "i.actq")!r})
+except KeyboardInterrupt:
+    print("interrupted", time.time(), flush=True)
+    # The process can go on.
+    head = actq.Head(actq.quantize(policy, bits=3, method="rtn", progress=False))
+    print("goes on", head([0.0] * head.image.obs_len).shape, flush=True)
+"""
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "begun\n"
+    time.sleep(0.5)
+    sent = time.time()
+    process.send_signal(signal.SIGINT)
+    lines = process.communicate(timeout=60)[0].splitlines()
+    interrupted = next(line for line in lines if line.startswith("interrupted"))
+    assert float(interrupted.split()[1]) - sent < 0.5
+    assert lines[-1].startswith("goes on") and process.returncode == 0
+    assert os.listdir(tmp_path) == []
+
+
+def test_an_exception_of_a_callback_ends_the_work():
+    class Enough(Exception):
+        pass
+
+    def told(work, share):
+        raise Enough
+
+    threads = threading.active_count()
+    with pytest.raises(Enough):
+        actq.quantize(actq.import_policy(UR3), bpw=2, progress=told)
+    assert threading.active_count() == threads
+
+
+def test_progress_is_reported(mlp, observations):
+    told = []
+    policy = actq.import_policy(mlp)
+    actq.quantize(policy, observations, bpw=3, steps=2000, progress=lambda work, share: told.append((work, share)))
+    works, shares = zip(*told)
+    assert any(work.startswith("learning, error ") for work in works)
+    assert all(0 <= share <= 1 for share in shares)
+
+
+def test_a_bar_shows_progress(mlp, observations, capsys):
+    pytest.importorskip("tqdm", reason="tqdm is not installed")
+    actq.quantize(actq.import_policy(mlp), observations, bpw=3, steps=2000, progress=True)
+    assert "left" in capsys.readouterr().err

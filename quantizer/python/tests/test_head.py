@@ -1,0 +1,102 @@
+"""Actions are those of `actq serve`, bit for bit."""
+
+import threading
+
+import numpy as np
+import pytest
+
+import actq
+from conftest import FLOW, UR3
+
+
+def served(command, path, observations):
+    given = b"".join(b"S" + row.tobytes() for row in observations)
+    out = command("serve", path, given=b"R" + given)
+    return np.frombuffer(out, dtype="<f4").reshape(len(observations), -1)
+
+
+@pytest.fixture(scope="module", params=[UR3, FLOW], ids=["step", "flow"])
+def image(request):
+    return actq.quantize(actq.import_policy(request.param), bits=3, method="rtn", progress=False)
+
+
+@pytest.fixture(scope="module")
+def rows(image):
+    return np.random.default_rng(3).normal(size=(40, image.obs_len)).astype(np.float32)
+
+
+def test_one_robot_has_the_bits_of_serve(command, image, rows, tmp_path):
+    image.save(tmp_path / "i.actq")
+    head = actq.Head(image)
+    actions = np.stack([head(row) for row in rows])
+    assert actions.dtype == np.float32
+    assert actions.tobytes() == served(command, tmp_path / "i.actq", rows).tobytes()
+
+
+def test_robots_are_independent(image, rows):
+    batch = rows.reshape(4, 10, -1)
+    alone = [actq.Head(image, seed=robot) for robot in range(4)]
+    together = actq.Head(image, 4)
+    for step in range(10):
+        mask = np.array([step == 5, False, step == 7, False])
+        found = together(batch[:, step], mask)
+        expected = [head(row, [reset]) for head, row, reset in zip(alone, batch[:, step], mask)]
+        assert found.tobytes() == np.stack(expected).tobytes()
+    assert found.shape == (4, image.act_len) and together.n == 4
+
+
+def test_reset_begins_again(image, rows):
+    head = actq.Head(image)
+    first = [head(row) for row in rows[:5]]
+    head.reset()
+    assert np.array_equal(first, [head(row) for row in rows[:5]])
+
+
+def test_seeds_of_a_flow_policy_differ():
+    image = actq.quantize(actq.import_policy(FLOW), bits=8, method="rtn", progress=False)
+    row = np.zeros(image.obs_len, dtype=np.float32)
+    assert np.array_equal(actq.Head(image, seed=1)(row), actq.Head(image, seed=1)(row))
+    assert not np.array_equal(actq.Head(image, seed=1)(row), actq.Head(image, seed=2)(row))
+
+
+def test_observations_of_other_types_and_layouts(image, rows):
+    expected = actq.Head(image)(rows[:4]).tobytes()
+    for form in (rows[:4].astype(np.float64), np.asfortranarray(rows[:4]), rows[:4].tolist(), rows[:8][::2][:4]):
+        same = np.asarray(form, dtype=np.float32)
+        assert actq.Head(image)(form).tobytes() == actq.Head(image)(np.ascontiguousarray(same)).tobytes()
+    assert actq.Head(image)(rows[:4].astype(np.float64)).tobytes() == expected
+
+
+def test_wrong_shapes_and_values_are_named(image, rows):
+    head, n = actq.Head(image, 4), image.obs_len
+    with pytest.raises(actq.Error, match=rf"the observations have the shape \[4, 3\]; use \[{n}\] for one, or \[n, {n}\]"):
+        head(np.zeros((4, 3)))
+    with pytest.raises(actq.Error, match="2 observations for a head of 4 states; make another head"):
+        head(rows[:2])
+    with pytest.raises(actq.Error, match="reset has 3 values for 4 observations"):
+        head(rows[:4], [True, False, True])
+    bad = rows[:4].copy()
+    bad[2, 1] = np.nan
+    with pytest.raises(actq.Error, match="head 2: "):
+        head(bad)
+    with pytest.raises(TypeError):
+        head(rows[:4], np.array([1, 0, 0, 2]))
+
+
+def test_other_threads_run_during_a_step(image):
+    rows = np.zeros((20_000, image.obs_len), dtype=np.float32)
+    head, counted, stop = actq.Head(image, len(rows)), [0], threading.Event()
+
+    def count():
+        while not stop.is_set():
+            counted[0] += 1
+
+    head(rows)
+    thread = threading.Thread(target=count)
+    thread.start()
+    before = counted[0]
+    head(rows)
+    during = counted[0] - before
+    stop.set()
+    thread.join()
+    assert during > 1000

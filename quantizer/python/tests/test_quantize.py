@@ -1,0 +1,107 @@
+"""Images are the command's, byte for byte."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+import actq
+from conftest import FLOW, UR3
+
+
+@pytest.fixture(scope="session")
+def image(mlp, observations):
+    return actq.quantize(actq.import_policy(mlp), observations, bpw=3, steps=100, progress=False)
+
+
+OPTIONS = [
+    ({"bpw": 3.0}, ["--bpw", "3"]),
+    ({"bits": 4}, ["--bits", "4"]),
+    ({"flash": 3000}, ["--flash", "3000"]),
+    ({"ms": 0.2, "clock": 100e6}, ["--ms", "0.2", "--clock", "100M"]),
+    ({"method": "gptq", "bits": 3, "group": 32}, ["--method", "gptq", "--bits", "3", "--group", "32"]),
+    ({"activations": 16, "seed": 7, "relative": True}, ["--activations", "16", "--seed", "7", "--relative"]),
+]
+
+
+@pytest.mark.parametrize(("options", "arguments"), OPTIONS)
+def test_same_options_give_the_bytes_of_the_command(command, mlp, observations, tmp_path, options, arguments):
+    steps, words = ({}, []) if options.get("method") == "gptq" else ({"steps": 30}, ["--steps", "30"])
+    np.save(tmp_path / "obs.npy", observations)
+    command("quantize", mlp, "--calib", tmp_path / "obs.npy", "--out", tmp_path / "c.actq", *words, *arguments)
+    image = actq.quantize(actq.import_policy(mlp), observations, progress=False, **steps, **options)
+    assert image.bytes == (tmp_path / "c.actq").read_bytes()
+
+
+def test_every_form_of_a_recording_gives_one_image(mlp, observations, tmp_path):
+    np.save(tmp_path / "a.npy", observations)
+    np.savez(tmp_path / "b.npz", obs=observations)
+    policy, starts = actq.import_policy(mlp), np.zeros(len(observations), dtype=bool)
+    forms = [
+        observations,
+        observations.astype(np.float64),
+        np.asfortranarray(observations),
+        observations[None],
+        {"obs": observations},
+        (observations, starts),
+        tmp_path / "a.npy",
+        str(tmp_path / "b.npz"),
+        np.load(tmp_path / "b.npz"),
+    ]
+    images = [actq.quantize(policy, form, bpw=3, steps=5, progress=False) for form in forms]
+    assert all(image == images[0] for image in images)
+
+
+def test_episodes_are_those_of_a_padded_file(command, mlp, observations, tmp_path):
+    lengths = [100, 250, 150]
+    padded = np.zeros((3, 250, 12), dtype=np.float32)
+    starts, at = np.zeros(500, dtype=bool), 0
+    for i, length in enumerate(lengths):
+        padded[i, :length], starts[at] = observations[at : at + length], True
+        at += length
+    recording = {"obs": padded, "length": np.array(lengths)}
+    np.savez(tmp_path / "a.npz", **recording)
+    policy = actq.import_policy(mlp)
+    image = actq.quantize(policy, recording, bpw=3, steps=5, progress=False)
+    command("quantize", mlp, "--calib", tmp_path / "a.npz", "--out", tmp_path / "c", "--bpw", "3", "--steps", "5")
+    assert image.bytes == (tmp_path / "c").read_bytes()
+    assert actq.evaluate(image, (observations, starts), policy) == actq.evaluate(image, recording, policy)
+
+
+@pytest.mark.parametrize(("folder", "method"), [(UR3, "distill"), (FLOW, "rtn")])
+def test_a_policy_folder_brings_its_recordings(command, folder, method, tmp_path):
+    options = ["--bits", "3", "--steps", "2", "--method", method]
+    command("quantize", folder, "--out", tmp_path / "c.actq", *options)
+    image = actq.quantize(actq.import_policy(folder), bits=3, steps=2, method=method, progress=False)
+    assert image.bytes == (tmp_path / "c.actq").read_bytes()
+
+
+def test_errors_of_an_image_are_those_of_eval(command, image, mlp, observations, tmp_path):
+    np.save(tmp_path / "heldout.npy", observations[:200])
+    (tmp_path / "mlp.onnx").write_bytes(mlp.read_bytes())
+    image.save(tmp_path / "i.actq")
+    told = json.loads(command("eval", tmp_path / "i.actq", "--policy", tmp_path / "mlp.onnx", "--json"))
+    errors = actq.evaluate(image, tmp_path / "heldout.npy", actq.import_policy(mlp))
+    assert vars(errors) == told
+
+
+def test_an_image_survives_its_file(image, tmp_path):
+    image.save(tmp_path / "i.actq")
+    loaded = actq.Image.load(tmp_path / "i.actq")
+    assert loaded == image == pickle.loads(pickle.dumps(image)) == actq.Image(image.bytes)
+    assert (image.name, image.obs_len, image.act_len, len(image)) == ("mlp", 12, 4, len(image.bytes))
+    assert image.bits_per_weight < 3.01 and image.rate_hz == 50.0
+
+
+def test_reports_are_those_of_the_command(command, image, tmp_path):
+    image.save(tmp_path / "i.actq")
+    assert image.inspect() == command("inspect", tmp_path / "i.actq").decode()
+    cost = image.cost("stm32f405")
+    assert f"{cost['milliseconds']:.3f} ms at 168 MHz" in image.inspect()
+    assert 0 < cost["scratch_bytes"] < cost["scratch_limit"]
+    command("export-c", tmp_path / "i.actq", "--out", tmp_path / "c")
+    paths = image.export_c(tmp_path / "py")
+    assert len(paths) == 3
+    for path in paths:
+        assert path.read_bytes() == (tmp_path / "c" / path.name).read_bytes()
