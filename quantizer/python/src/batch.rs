@@ -70,8 +70,7 @@ impl Batch {
     ) -> Result<(), Error> {
         let (obs_len, act_len) = (self.obs_len, self.act_len);
         self.cell.with_dependent_mut(|_, heads| {
-            let rows = observations.par_chunks_exact(obs_len).zip(actions.par_chunks_exact_mut(act_len));
-            let step = |(i, (head, (observation, action))): (usize, (&mut Head<'_, '_>, (&[f32], &mut [f32])))| {
+            let step = |head: &mut Head<'_, '_>, i: usize, observation: &[f32], action: &mut [f32]| {
                 if reset.is_some_and(|reset| reset[i]) {
                     head.reset();
                 }
@@ -84,7 +83,11 @@ impl Batch {
                 }
                 None
             };
-            heads.par_iter_mut().zip(rows).enumerate().map(step).find_map_first(|failed| failed).map_or(Ok(()), Err)
+            let rows = observations.par_chunks_exact(obs_len).zip(actions.par_chunks_exact_mut(act_len));
+            let heads = heads.par_iter_mut().enumerate().zip(rows);
+            let failed = heads.filter_map(|((i, head), (observation, action))| step(head, i, observation, action));
+            // All heads step, whichever fails.
+            failed.min_by_key(|failed| failed.head).map_or(Ok(()), Err)
         })
     }
 

@@ -16,6 +16,9 @@ use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::error::{OrRaise as _, error};
 
+/// A port: kind, name, names of its values, and their number.
+type Port = (&'static str, String, Vec<String>, usize);
+
 /// An image: what a microcontroller runs.
 ///
 /// `Image(bytes)` checks an image of `bytes`. `actq.quantize` makes one, `Image.load` reads a file.
@@ -116,7 +119,7 @@ impl Image {
     /// Raw inputs in the order of the observation, then targets in the order of the action, each as (kind, name, names
     /// of the values). Empty without a description (docs/DEPLOY.md).
     #[getter]
-    fn ports(&self) -> PyResult<Vec<(&'static str, String, Vec<String>, usize)>> {
+    fn ports(&self) -> PyResult<Vec<Port>> {
         let port = |port: actq_kernels::Port<'_>| {
             let kind = match port.kind {
                 PortKind::Input => "input",

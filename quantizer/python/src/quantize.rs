@@ -7,7 +7,7 @@ use actq::budget::{Budget, TimeLimit};
 use actq::data::{Recording, Recordings, Sizes, joined};
 use actq::measure::{check, eval};
 use actq::methods::{Activations, Method, Options};
-use actq::pipeline;
+use actq::pipeline::{Quantizer, check_budget};
 use actq::runtime::ImageBuffer;
 use actq_cli::importers::{learned, learned_from, recorded_sizes};
 use actq_cli::report::notes;
@@ -102,7 +102,7 @@ fn width(name: &str, bits: u32) -> PyResult<Width> {
     Width::from_bits(bits).ok_or_else(|| error!("{name} is {bits}; use 2, 3, 4 or 8 bits"))
 }
 
-/// Quantizes a policy. Returns the image, and notes for the user.
+/// Quantizes a policy. Returns the image, warnings, and notes that matter on a motor controller only.
 #[pyfunction]
 #[pyo3(signature = (policy, recordings, heldout, request, progress))]
 pub(crate) fn quantize(
@@ -112,7 +112,7 @@ pub(crate) fn quantize(
     heldout: Option<&Bound<'_, PyAny>>,
     request: Request,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Image, Vec<String>)> {
+) -> PyResult<(Image, Vec<String>, Vec<String>)> {
     let (calib, heldout) = (passed(recordings, "recordings")?, passed(heldout, "heldout")?);
     let folder = policy.folder();
     let found = folder.map(|folder| Recording::Calib.find(folder)).transpose().or_raise()?.flatten();
@@ -123,25 +123,28 @@ pub(crate) fn quantize(
     }
     let options = request.options(method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }))?;
     let (policy, in_folder) = (policy.policy.clone(), folder.is_some());
-    let (bytes, notes) = work::run(py, progress, move |worker| {
-        pipeline::check_budget(&policy, &options)?;
+    let (bytes, warnings, notes) = work::run(py, progress, move |worker| {
+        check_budget(&policy, &options)?;
         let recordings = read(&policy, calib, heldout, in_folder)?;
-        let mut notes: Vec<String> = notes::of_recordings(&recordings).into_iter().collect();
-        notes.extend(match &policy.around {
+        let mut warnings: Vec<String> = notes::of_recordings(&recordings).into_iter().collect();
+        let limits = match &policy.around {
             Some(around) => notes::targets_without_limits(around),
             None => notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))),
-        });
-        let found = pipeline::quantize(&policy, &recordings, &options, |work: &str, share| worker.report(work, share))?;
-        notes.extend(notes::unused_budget(&found, &options));
+        };
+        let calibrating = |share| worker.report("calibrating", share);
+        let quantizer = Quantizer::new(&policy, &recordings, options.method.clone(), options.minutes, calibrating)?;
+        warnings.extend(notes::mixed_units(quantizer.method().mixed_units()));
+        let found = quantizer.quantize(&options, |work: &str, share| worker.report(work, share))?;
+        warnings.extend(notes::unused_budget(&found, &options));
         worker.report("measuring the error", 0.0);
         let alone = found.buffer();
         if let Some(check) = check::check(&policy, alone.image(Path::new("image"))?, &recordings)? {
-            notes.extend(notes::overfit_warning(&check));
-            notes.extend(notes::error_warning(&check));
+            warnings.extend(notes::overfit_warning(&check));
+            warnings.extend(notes::error_warning(&check));
         }
-        Ok((found.whole_image()?, notes))
+        Ok((found.whole_image()?, warnings, limits.into_iter().collect()))
     })?;
-    Ok((Image::of(ImageBuffer::new(&bytes), Path::new("image"))?, notes))
+    Ok((Image::of(ImageBuffer::new(&bytes), Path::new("image"))?, warnings, notes))
 }
 
 /// Reads what was passed, or else what is in the policy's folder.

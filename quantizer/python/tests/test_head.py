@@ -84,7 +84,7 @@ def test_wrong_shapes_and_values_are_named(image, rows):
 
 
 def test_other_threads_run_during_a_step(image):
-    rows = np.zeros((20_000, image.obs_len), dtype=np.float32)
+    rows = np.zeros((4000, image.obs_len), dtype=np.float32)
     head, counted, stop = actq.Head(image, len(rows)), [0], threading.Event()
 
     def count():

@@ -66,7 +66,7 @@ def import_policy(
     name = name or type(source).__name__
     if example is None:
         raise _actq.Error(f"{name}: pass an example of the module's input, as torch.zeros(1, n_obs)")
-    content = onnx_bytes(source, example, input_names, output_names)
+    content = onnx_bytes(source, example, name, input_names, output_names)
     return _actq.import_onnx(content, name=name, output=output, states=pairs)
 
 

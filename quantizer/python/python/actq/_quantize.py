@@ -81,7 +81,9 @@ def quantize(
         activations=activations, widths=widths, steps=steps, minutes=minutes, relative=relative, seed=seed,
     )  # fmt: skip
     with reporter(progress) as report:
-        image, notes = _actq.quantize(policy, recordings, heldout, options, report)
+        image, warnings, notes = _actq.quantize(policy, recordings, heldout, options, report)
+    for warning in warnings:
+        log.warning(warning)
     for note in notes:
-        log.warning(note)
+        log.info(note)
     return image

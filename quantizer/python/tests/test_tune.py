@@ -1,0 +1,115 @@
+"""On-policy rounds in Gymnasium's vector environments."""
+
+import numpy as np
+import pytest
+
+import actq
+
+gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
+from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
+
+
+class Reach(gymnasium.Env):
+    """A point is moved to a goal: [x, goal] of 6 dimensions each; the policy's first 4 actions move it."""
+
+    def __init__(self, length=30):
+        self.observation_space = gymnasium.spaces.Box(-10, 10, (12,), np.float32)
+        self.action_space = gymnasium.spaces.Box(-1, 1, (4,), np.float32)
+        self.length = length
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.steps, self.at = 0, self.np_random.normal(size=12).astype(np.float32)
+        return self.at.copy(), {}
+
+    def step(self, action):
+        self.steps += 1
+        self.at[:4] += 0.1 * action
+        ended = self.steps >= self.length
+        seen = np.full(12, np.nan, np.float32) if ended else self.at.copy()
+        return seen, -float(np.abs(action).sum()), ended, False, {"is_success": bool(self.at[0] > 0)} if ended else {}
+
+
+def envs(mode, n=3):
+    return SyncVectorEnv([Reach] * n, autoreset_mode=mode)
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_rollouts_record_what_the_policy_acted_on(mlp, mode):
+    from actq._rollout import rollout
+
+    policy, env = actq.import_policy(mlp), envs(mode)
+    image = actq.quantize(policy, bits=8, method="rtn", progress=False)
+    (observations, starts), outcome = rollout(actq.Head(image, 3), env, policy, 400, 5)
+    assert observations.shape[1] == 12 and 400 <= len(observations) < 403
+    # The last observation of an episode, here not a number, is not among them.
+    assert np.isfinite(observations).all() and len(starts) == len(observations)
+    lengths = np.diff(np.flatnonzero(np.append(starts, True)))
+    assert set(lengths[lengths < 30]) <= {len(observations) // 3 % 30, -(-len(observations) // 3) % 30}
+    assert outcome["episodes"] == (lengths == 30).sum() == 12
+    assert outcome["mean_return"] < 0 and 0 <= outcome["success"] <= 1
+    # The first observation of the first robot is that of its seed.
+    assert np.array_equal(observations[0], Reach().reset(seed=5)[0])
+
+
+def test_rounds_learn_from_their_rollouts(mlp):
+    policy = actq.import_policy(mlp)
+    tuned = [
+        actq.tune(policy, envs(AutoresetMode.NEXT_STEP), bpw=2.5, rounds=2, frames=300, steps=20, progress=False)
+        for _ in range(2)
+    ]
+    first, second = tuned
+    assert first.image == second.image, "the same seed gives the same image"
+    assert first.image == first.rounds[-1].image and len(first.rounds) == 3
+    assert [row.frames for row in first.rounds] == [300, 600, 900]
+    assert first.image.bits_per_weight <= 2.5
+    assert all(row.own_nmse < 1 and row.outcome["episodes"] == 9 for row in first.rounds)
+    assert "own path" in str(first)
+
+
+def test_recordings_and_functions_of_the_caller(mlp, observations):
+    told = []
+
+    def success(episode):
+        told.append(episode)
+        return episode.length == 30
+
+    tuned = actq.tune(
+        actq.import_policy(mlp),
+        envs(AutoresetMode.SAME_STEP),
+        observations,
+        bits=4,
+        frames=100,
+        observe=lambda seen: np.nan_to_num(seen),
+        act=lambda actions: np.tanh(actions),
+        success=success,
+        steps=5,
+        progress=False,
+    )
+    assert tuned.rounds[0].frames == 500 and tuned.rounds[1].frames >= 600
+    assert told and all(episode.terminated and "is_success" in episode.info for episode in told)
+    assert tuned.rounds[0].outcome["success"] == 1.0
+
+
+def test_discrete_actions_are_the_largest(mlp):
+    from actq._rollout import _actions
+
+    class Env:
+        num_envs, single_action_space = 2, gymnasium.spaces.Discrete(4, start=1)
+
+    assert _actions(Env)(np.array([[0, 3, 1, 2], [9, 3, 1, 2]])).tolist() == [2, 1]
+
+
+def test_exceptions_of_the_environment_end_the_rounds(mlp):
+    class Broken(Reach):
+        def step(self, action):
+            raise RuntimeError("broken")
+
+    with pytest.raises(RuntimeError, match="broken"):
+        actq.tune(actq.import_policy(mlp), SyncVectorEnv([Broken]), bpw=3, steps=5, frames=10, progress=False)
+    with pytest.raises(actq.Error, match=r"the observations of the environment are \(1, 4\); \(1, 12\) is needed"):
+        env = gymnasium.make_vec("CartPole-v1", num_envs=1)
+        actq.tune(actq.import_policy(mlp), env, bpw=3, steps=5, frames=10, progress=False)
+    with pytest.raises(actq.Error, match="rounds is 0; use 1 to 100 rounds"):
+        env = envs(AutoresetMode.NEXT_STEP)
+        actq.tune(actq.import_policy(mlp), env, np.zeros((1, 12)), bpw=3, rounds=0, frames=10, progress=False)
