@@ -347,11 +347,13 @@ impl<'a> Op<'a> {
         (0..usize::from(self.form.uses.constants)).map(|i| self.constant(i))
     }
 
-    /// Returns the coefficients of denoising step `step`, and the arena offset of its noise.
-    pub(crate) fn coefficients(&self, step: usize) -> ([f32; h::COEFFICIENTS], usize) {
-        let first = h::DENOISE_WORDS + step * h::COEFFICIENTS;
-        let noise = word(self.image, self.data().wrapping_add(1)) as usize;
-        (core::array::from_fn(|i| self.constant(first + i)), noise.wrapping_add(step * self.dst().len))
+    writer_methods! {
+        /// Returns the coefficients of denoising step `step`, and the arena offset of its noise.
+        fn coefficients(&self, step: usize) -> ([f32; h::COEFFICIENTS], usize) {
+            let first = h::DENOISE_WORDS + step * h::COEFFICIENTS;
+            let noise = word(self.image, self.data().wrapping_add(1)) as usize;
+            (core::array::from_fn(|i| self.constant(first + i)), noise.wrapping_add(step * self.dst().len))
+        }
     }
 
     /// Returns array `i` of f32 bits, of the length of `dst`: see [`OpKind`].

@@ -1,4 +1,4 @@
-//! Importer of policies from ONNX files, by the rules in docs/IMPORT.md.
+//! Importer of policies from ONNX files, by the rules in docs/IMPORT.md, and images as ONNX files ([`export`]).
 //!
 //! The import parses a file (`file`) and follows its graph from the inputs to the chosen output (`nodes`), which gives
 //! expressions (`values`). It recognizes norms, activations and cells that exporters decompose, and simplifies
@@ -6,6 +6,7 @@
 #![deny(unsafe_code)]
 
 mod action;
+pub mod export;
 mod file;
 mod lower;
 mod network;

@@ -6,13 +6,16 @@ use actq::measure::size::{bits_per_weight, hex};
 use actq::measure::time::{CLOCK, StepTime};
 use actq::runtime::ImageBuffer;
 use actq_boards::Target;
-use actq_cli::commands::export_c::export;
+use actq_cli::commands::export_c;
 use actq_cli::outputs::files::write;
 use actq_cli::report::{inspect, time};
 use actq_kernels::PortKind;
+use actq_onnx::export::{self, Attribute, Data, Tensor};
+use anyhow::Context as _;
+use numpy::{IntoPyArray as _, PyArrayMethods as _};
 use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyTuple};
+use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 
 use crate::error::{OrRaise as _, error};
 
@@ -176,9 +179,58 @@ impl Image {
     ) -> PyResult<Vec<PathBuf>> {
         let image = self.image()?;
         py.detach(|| {
-            export(image, self.buffer.bytes(), &folder, name, golden.as_deref().map(|file| (file, steps)), None)
+            export_c::export(
+                image,
+                self.buffer.bytes(),
+                &folder,
+                name,
+                golden.as_deref().map(|file| (file, steps)),
+                None,
+            )
         })
         .or_raise()
+    }
+
+    /// Writes the image's network as an ONNX file in f32, whole or not at all.
+    fn to_onnx(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let image = self.image()?;
+        py.detach(|| {
+            let network = export::network(&image).with_context(|| self.name.display().to_string())?;
+            write(&path, &export::file(&network, image.name()))
+        })
+        .or_raise()
+    }
+
+    /// Returns the same network for `actq.FakeQuant`: inputs, outputs, constants, and nodes as (operator, inputs, output,
+    /// attributes, magnitude to which the first input is rounded).
+    fn network<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let network = export::network(&self.image()?).or_raise()?;
+        let dict = PyDict::new(py);
+        dict.set_item("inputs", network.inputs)?;
+        dict.set_item("outputs", network.outputs)?;
+        let tensors = PyDict::new(py);
+        for Tensor { name, shape, data } in network.tensors {
+            let array = match data {
+                Data::Floats(values) => values.into_pyarray(py).reshape(shape)?.into_any(),
+                Data::Integers(values) => values.into_pyarray(py).reshape(shape)?.into_any(),
+            };
+            tensors.set_item(name, array)?;
+        }
+        dict.set_item("tensors", tensors)?;
+        let nodes = PyList::empty(py);
+        for node in network.nodes {
+            let attributes = PyDict::new(py);
+            for (name, value) in node.attributes {
+                match value {
+                    Attribute::Int(i) => attributes.set_item(name, i)?,
+                    Attribute::Ints(ints) => attributes.set_item(name, ints)?,
+                    Attribute::Float(f) => attributes.set_item(name, f)?,
+                }
+            }
+            nodes.append((node.op, node.inputs, node.output, attributes, node.x_max))?;
+        }
+        dict.set_item("nodes", nodes)?;
+        Ok(dict)
     }
 
     fn __len__(&self) -> usize {

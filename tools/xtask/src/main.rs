@@ -1,6 +1,6 @@
 //! The commands for users and CI: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`,
 //! `cargo xtask fit`, `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`,
-//! `cargo xtask capi`, `cargo xtask doctor`.
+//! `cargo xtask capi`, `cargo xtask python`, `cargo xtask doctor`.
 //!
 //! This crate has few dependencies, so that it builds fast and prints soon. The binaries of `actq-bench` and
 //! `actq-research` measure.
@@ -9,6 +9,7 @@
 mod cost;
 mod firmware;
 mod limits;
+mod python;
 mod relay;
 mod setup;
 mod verify;
@@ -31,9 +32,10 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   fit      Measure the cost model's rates again (after every change of the kernels)
   verify   Format, lints, tests, a smoke run in QEMU; with --all everything that CI checks
   capi     Package the C interface: --target CORE --out DIR [--image F.actq]
+  python   Build and test the Python package in a virtual environment; --optional with torch
   doctor   Check and install the other commands' requirements: Rust targets and QEMU
 
-demo, verify, bench, budgets, compare, faults, fit, firmware and stack show their options with --help.";
+demo, verify, bench, budgets, compare, faults, fit, firmware, python and stack show their options with --help.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -48,6 +50,13 @@ fn main() -> ExitCode {
         },
         ["doctor"] => setup::ensure(&Target::ALL).map(|()| println!("nothing is missing")),
         ["firmware", options @ ..] => match firmware::Options::parse(options) {
+            Ok(options) => options.run(),
+            Err(wrong) => {
+                eprintln!("{wrong}");
+                return ExitCode::from(2);
+            }
+        },
+        ["python", options @ ..] => match python::Options::parse(options) {
             Ok(options) => options.run(),
             Err(wrong) => {
                 eprintln!("{wrong}");

@@ -18,7 +18,8 @@ Usage: cargo verify [--all]
 Checks formatting and lints, runs the host tests, and runs a policy and the motor controller on a Cortex-M4 in QEMU.
 
   --all  Everything that CI checks: also the tests on every board in QEMU, those that learn for long, lints for every board,
-         documentation, budgets, faults on the line, ONNX files against tract, 32-bit words, the oldest compiler
+         documentation, budgets, faults on the line, ONNX files against tract, the Python package,
+         32-bit words, the oldest compiler
 
 Tests on policies outside this repository run if ACTQ_SHARED names their folder.";
 
@@ -191,7 +192,7 @@ mod tests {
     fn the_short_run_is_part_of_all() {
         let names = |steps: Vec<Step>| steps.into_iter().map(|step| step.name).collect::<Vec<_>>();
         let short = names(steps::short());
-        let all = names(steps::all(Installed { oldest: Ok(()), narrow: Err("not here".to_owned()) }));
+        let all = names(steps::all(Installed { oldest: Ok(()), narrow: Err("not here".to_owned()), python: Ok(()) }));
         assert!(short.iter().all(|name| all.contains(name)), "{short:?}");
         assert!(all.len() > short.len());
     }

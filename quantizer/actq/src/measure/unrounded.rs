@@ -50,7 +50,8 @@ impl<'a> Unrounded<'a> {
     }
 }
 
-fn dequantized(matrix: &Matrix<'_>) -> Array2<f32> {
+/// Returns the weights of a matrix; rows that the image does not have are zero.
+pub fn dequantized(matrix: &Matrix<'_>) -> Array2<f32> {
     let mut weights = Array2::zeros((matrix.rows, matrix.cols));
     let mut row = vec![0.0; matrix.cols];
     for rows in matrix.blocks() {

@@ -98,6 +98,9 @@ pub struct Attribute {
     pub ints: Vec<i64>,
     #[prost(bytes = "bytes", repeated, tag = "9")]
     pub strings: Vec<Bytes>,
+    /// The number of the field that has the value, as onnx.proto numbers them.
+    #[prost(int32, optional, tag = "20")]
+    pub r#type: Option<i32>,
     /// In a function, the name of the caller's attribute that gives the value.
     #[prost(string, optional, tag = "21")]
     pub ref_attr_name: Option<String>,

@@ -11,6 +11,10 @@ its errors, `FakeQuant` is its network in torch, and `Link` talks to a motor con
 with the text of the command `actq`. The log `actq` has what the command calls notes.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from ._actq import Error, Head, Image, Link, Policy, __version__
 from ._evaluate import Errors, evaluate
 from ._import import import_policy
@@ -18,10 +22,14 @@ from ._quantize import quantize
 from ._rollout import Episode
 from ._tune import Round, Tuned, tune
 
+if TYPE_CHECKING:
+    from ._fake_quant import FakeQuant
+
 __all__ = [
     "Episode",
     "Error",
     "Errors",
+    "FakeQuant",
     "Head",
     "Image",
     "Link",
@@ -34,3 +42,12 @@ __all__ = [
     "quantize",
     "tune",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # Only what needs torch imports it.
+    if name == "FakeQuant":
+        from ._fake_quant import FakeQuant
+
+        return FakeQuant
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -96,6 +96,17 @@ class Image:
 
         golden: a recording; NAME_golden.c gets `steps` of its observations with the bits of this host's actions.
         """
+    def to_onnx(self, path: _Path) -> None:
+        """Writes the image's network as an ONNX file in f32, with dequantized weights.
+
+        Input "obs" [batch, obs_len], output "action" [batch, act_len] or [batch, chunk, act_len]: what the network gives,
+        with scale, offset and limits. A recurrent network also takes "state" and gives "next_state", a flow or diffusion
+        policy takes "noise". What depends on earlier actions (step limits, smoothing, switches, playback) is not part of
+        it, and activations are not rounded.
+
+        Raises `actq.Error` for an image with a description (docs/DEPLOY.md), and if the file cannot be written.
+        """
+    def network(self) -> Dict[str, Any]: ...
     @property
     def bytes(self) -> bytes:
         """The bytes of the image's file."""

@@ -5,7 +5,7 @@ use std::process::Command;
 use actq_boards::{Target, root};
 
 use crate::setup::cargo;
-use crate::{firmware, setup};
+use crate::{firmware, python, setup};
 
 /// The oldest supported compiler.
 const OLDEST: &str = concat!(env!("CARGO_PKG_RUST_VERSION"), ".0");
@@ -42,16 +42,18 @@ pub(super) struct Installed {
     pub(super) oldest: Result<(), String>,
     /// A host target with 32-bit words.
     pub(super) narrow: Result<(), String>,
+    /// Python, for its package.
+    pub(super) python: Result<(), String>,
 }
 
 impl Installed {
-    /// Installs both if possible.
+    /// Installs the compilers if possible.
     pub(super) fn ensure() -> Self {
         let narrow = match cfg!(all(target_arch = "x86_64", target_os = "linux")) {
             true => setup::rust_target(TARGET_32_BIT).map_err(|error| format!("{error:#}")),
             false => Err(format!("this machine does not run {TARGET_32_BIT}")),
         };
-        Self { oldest: setup::toolchain(OLDEST), narrow }
+        Self { oldest: setup::toolchain(OLDEST), narrow, python: python::interpreter().map(drop) }
     }
 }
 
@@ -78,6 +80,7 @@ pub(super) fn all(installed: Installed) -> Vec<Step> {
     steps.add("C header", &["test", "--release", "--package", C_HEADER]);
     let publish = ["publish", "--workspace", "--dry-run", "--no-verify", "--allow-dirty", "--locked"];
     steps.add("crates to publish", &publish);
+    steps.python(installed.python);
     steps.narrow(installed.narrow);
     steps.oldest(installed.oldest);
     steps.0
@@ -180,6 +183,15 @@ impl Steps {
         let firmware = FIRMWARE.map(|name| ["--package", name]).concat();
         let firmware = [&["doc", "--no-deps"], &build_for(Target::Fpu)[..], &firmware].concat();
         self.add_of_firmware("documentation of the firmware", &firmware, &deny);
+    }
+
+    fn python(&mut self, installed: Result<(), String>) {
+        let command = installed.map(|()| {
+            let mut command = cargo();
+            command.current_dir(root()).args(["run", "--release", "--package", "xtask", "--", "python"]);
+            command
+        });
+        self.0.push(Step { name: "Python package".to_owned(), command });
     }
 
     fn narrow(&mut self, installed: Result<(), String>) {

@@ -1,0 +1,9 @@
+//! Images as ONNX graphs in f32, with dequantized weights, for tools that do not read images.
+
+mod builder;
+mod file;
+mod operations;
+
+pub use builder::{Attribute, Data, Network, Node, Tensor};
+pub use file::file;
+pub use operations::network;
