@@ -12,6 +12,7 @@ use actq_cli::outputs::unfinished::Scratch;
 use actq_cli::report::deployment;
 use actq_deploy::{Answers, Bundle, DESCRIPTION, DeployFolder, read};
 use actq_onnx::{Choice, Onnx, import, import_bytes};
+use anyhow::anyhow;
 use pyo3::prelude::*;
 
 use crate::error::{OrRaise as _, error, raise};
@@ -140,7 +141,7 @@ fn import_bundle(path: &Path, accept_profile: bool, answers: &str) -> PyResult<P
     let bundle = Bundle::open(path).or_raise()?;
     let reading = read(&bundle, accept_profile, Answers::parse(answers).or_raise()?).or_raise()?;
     refuse_open_questions(&reading)
-        .map_err(|error| error.context(deployment::questions(&reading.questions)))
+        .map_err(|error| anyhow!("{}{error:#}", deployment::questions(&reading.questions)))
         .or_raise()?;
     let folder = Scratch::new().or_raise()?;
     for (name, content) in Gathered::of(&bundle, &reading).or_raise()?.files {

@@ -36,18 +36,17 @@ def envs(mode, n=3):
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_rollouts_record_what_the_policy_acted_on(mlp, mode):
-    from actq._rollout import rollout
-
     policy, env = actq.import_policy(mlp), envs(mode)
     image = actq.quantize(policy, bits=8, method="rtn", progress=False)
-    (observations, starts), outcome = rollout(actq.Head(image, 3), env, policy, 400, 5)
+    driven = actq.rollout(actq.Head(image, 3), env, frames=400, seed=5)
+    observations, starts = driven.recording
     assert observations.shape[1] == 12 and 400 <= len(observations) < 403
     # The last observation of an episode, here not a number, is not among them.
     assert np.isfinite(observations).all() and len(starts) == len(observations)
     lengths = np.diff(np.flatnonzero(np.append(starts, True)))
     assert set(lengths[lengths < 30]) <= {len(observations) // 3 % 30, -(-len(observations) // 3) % 30}
-    assert outcome["episodes"] == (lengths == 30).sum() == 12
-    assert outcome["mean_return"] < 0 and 0 <= outcome["success"] <= 1
+    assert len(driven.episodes) == (lengths == 30).sum() == 12
+    assert driven.mean_return < 0 and 0 <= driven.success <= 1
     # The first observation of the first robot is that of its seed.
     assert np.array_equal(observations[0], Reach().reset(seed=5)[0])
 
@@ -63,7 +62,7 @@ def test_rounds_learn_from_their_rollouts(mlp):
     assert first.image == first.rounds[-1].image and len(first.rounds) == 3
     assert [row.frames for row in first.rounds] == [300, 600, 900]
     assert first.image.bits_per_weight <= 2.5
-    assert all(row.own_nmse < 1 and row.outcome["episodes"] == 9 for row in first.rounds)
+    assert all(row.own_nmse < 1 and len(row.rollout.episodes) == 9 for row in first.rounds)
     assert "own path" in str(first)
 
 
@@ -88,7 +87,7 @@ def test_recordings_and_functions_of_the_caller(mlp, observations):
     )
     assert tuned.rounds[0].frames == 500 and tuned.rounds[1].frames >= 600
     assert told and all(episode.terminated and "is_success" in episode.info for episode in told)
-    assert tuned.rounds[0].outcome["success"] == 1.0
+    assert tuned.rounds[0].rollout.success == 1.0
 
 
 def test_discrete_actions_are_the_largest(mlp):
@@ -107,7 +106,7 @@ def test_exceptions_of_the_environment_end_the_rounds(mlp):
 
     with pytest.raises(RuntimeError, match="broken"):
         actq.tune(actq.import_policy(mlp), SyncVectorEnv([Broken]), bpw=3, steps=5, frames=10, progress=False)
-    with pytest.raises(actq.Error, match=r"the observations of the environment are \(1, 4\); \(1, 12\) is needed"):
+    with pytest.raises(actq.Error, match=r"the observations have the shape \[1, 4\]; use \[12\] for one"):
         env = gymnasium.make_vec("CartPole-v1", num_envs=1)
         actq.tune(actq.import_policy(mlp), env, bpw=3, steps=5, frames=10, progress=False)
     with pytest.raises(actq.Error, match="rounds is 0; use 1 to 100 rounds"):

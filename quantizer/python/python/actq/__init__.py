@@ -6,8 +6,8 @@
     head = actq.Head(image)
     action = head(observation)
 
-`import_policy` reads a policy, `quantize` and `tune` make an `Image` of it, `Head` runs the image, `evaluate` measures
-its errors, `FakeQuant` is its network in torch, and `Link` talks to a motor controller. Every failure is an `actq.Error`
+`import_policy` reads a policy, `quantize` and `tune` make an `Image` of it, `Head` runs the image, `rollout` drives
+Gymnasium's environments by it, `evaluate` measures its errors, `FakeQuant` is its network in torch, and `Link` talks to a motor controller. Every failure is an `actq.Error`
 with the text of the command `actq`. The log `actq` has what the command calls notes.
 """
 
@@ -19,7 +19,7 @@ from ._actq import Error, Head, Image, Link, Policy, __version__
 from ._evaluate import Errors, evaluate
 from ._import import import_policy
 from ._quantize import quantize
-from ._rollout import Episode
+from ._rollout import Episode, Rollout, rollout
 from ._tune import Round, Tuned, tune
 
 if TYPE_CHECKING:
@@ -34,12 +34,14 @@ __all__ = [
     "Image",
     "Link",
     "Policy",
+    "Rollout",
     "Round",
     "Tuned",
     "__version__",
     "evaluate",
     "import_policy",
     "quantize",
+    "rollout",
     "tune",
 ]
 

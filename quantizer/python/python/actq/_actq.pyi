@@ -1,5 +1,6 @@
 """Types of the compiled part. Shapes are in brackets; n is the number of robots."""
 
+import builtins
 import os
 import pathlib
 from typing import Any, Callable, Dict, List, Optional, Tuple, TypedDict, Union
@@ -108,7 +109,7 @@ class Image:
         """
     def network(self) -> Dict[str, Any]: ...
     @property
-    def bytes(self) -> bytes:
+    def bytes(self) -> builtins.bytes:
         """The bytes of the image's file."""
     @property
     def name(self) -> str:
@@ -139,7 +140,7 @@ class Image:
         """Raw inputs in the order of the observation, then targets in the order of the action: kind ("input",
         "position", "velocity", "torque"), name, names of the values, their number. Empty without a description."""
     def __len__(self) -> int: ...
-    def __bytes__(self) -> bytes: ...
+    def __bytes__(self) -> builtins.bytes: ...
 
 @final
 class Head:
@@ -220,7 +221,7 @@ class Link:
         If the controller is armed and its safety allows it, the outputs follow the action.
         """
     def push(
-        self, image: Image, *, version: int = 0, signature: Optional[bytes] = None, progress: _Report = None
+        self, image: Image, *, version: int = 0, signature: Optional[builtins.bytes] = None, progress: _Report = None
     ) -> None:
         """Sends an image to the slot that does not run; the controller checks it, tests it, and runs it.
 

@@ -62,8 +62,8 @@ class FakeQuant(nn.Module):
             if x_max is not None and self.activations:
                 x[0] = rounded(x[0], x_max)
             values[output] = OPERATORS[op](*x, **attributes)
-        found = tuple(values[name] for name in self.outputs)
-        return found if len(found) > 1 else found[0]
+        results: Tuple[torch.Tensor, ...] = tuple(values[name] for name in self.outputs)
+        return results if len(results) > 1 else results[0]
 
 
 def rounded(x: torch.Tensor, x_max: int) -> torch.Tensor:

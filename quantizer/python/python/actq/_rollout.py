@@ -1,13 +1,13 @@
-"""Rollouts of a head in a vector environment of Gymnasium."""
+"""Rollouts of a policy in a vector environment of Gymnasium."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Tuple
+from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ._actq import Error, Head, Policy
+from ._actq import Error
 from ._typing import Array, Floats
 
 if TYPE_CHECKING:
@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 
     VectorEnv = gymnasium.vector.VectorEnv[Any, Any, Any]
 
+Drive = Callable[[Floats, Array], Array]
 Observe = Callable[[Any], Array]
-Act = Callable[[Floats], Any]
+Act = Callable[[Array], Any]
 
 
 @dataclass(frozen=True)
@@ -36,38 +37,66 @@ class Episode:
 Success = Callable[[Episode], bool]
 
 
+@dataclass(frozen=True)
+class Rollout:
+    """A rollout of a policy."""
+
+    #: Observations [frame, value] on which the policy acted, one robot after the other, and bool [frame] that is true at
+    #: the first frame of each episode: a recording for `quantize`.
+    recording: Tuple[Floats, Array]
+    #: Episodes that have ended, in the order of their ends.
+    episodes: Sequence[Episode]
+    #: Share of them that succeeded; `None` if that is not known.
+    success: Optional[float]
+
+    @property
+    def mean_return(self) -> Optional[float]:
+        """Mean of the episodes' sums of rewards; `None` if none has ended."""
+        return float(np.mean([episode.total for episode in self.episodes])) if self.episodes else None
+
+
 def rollout(
-    head: Head,
+    policy: Drive,
     env: VectorEnv,
-    policy: Policy,
-    frames: int,
-    seed: int,
+    *,
+    frames: int = 10_000,
+    seed: int = 1,
     observe: Optional[Observe] = None,
     act: Optional[Act] = None,
     success: Optional[Success] = None,
-) -> Tuple[Tuple[Floats, Array], Dict[str, float]]:
-    """Steps all robots of `env` until `frames` are recorded.
+    every: int = 1,
+) -> Rollout:
+    """Steps all robots of `env` by a policy until `frames` frames are recorded.
 
-    Returns (observations [frame, value], starts [frame]), one robot after the other, and the numbers of the rollout.
+    policy: an `actq.Head`, or any function of (observations [n, n_obs], reset [n]) that returns actions [n, n_act].
+    env: a vector environment of Gymnasium. It stays open.
+    frames: frames of all robots together.
+    seed: seed of the environment's first episodes.
+    observe: makes the policy's observations [n, n_obs] of the environment's; the default flattens arrays.
+    act: makes the environment's actions of the policy's; the default clips to a Box, and takes the largest value for
+        Discrete.
+    success: is called with each `Episode` and says if it succeeded. The default reads "is_success" or "success" of the
+        environment's info.
+    every: of each episode, only every so many frames are recorded: those at which a policy with chunks plans.
+
+    Raises what policy and environment raise.
     """
     n, mode = env.num_envs, _autoreset(env)
     observe, act = observe or _flat(env), act or _actions(env)
     kept: List[Tuple[Floats, Array, Array]] = []
     episodes: List[Episode] = []
     totals, lengths = np.zeros(n), np.zeros(n, dtype=np.int64)
-    # A recurrent policy that plays chunks reads an observation only where it plans.
-    every = policy.execute if policy.state_len > 0 else 1
     # The first observation of an episode; the environment resets instead of acting.
     fresh, ignored = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
     observations, _ = env.reset(seed=seed)
     recorded = 0
     while recorded < frames:
         x = np.asarray(observe(observations), dtype=np.float32)
-        if x.shape != (n, head.image.obs_len):
-            raise Error(f"the observations of the environment are {x.shape}; ({n}, {head.image.obs_len}) is needed: pass observe")
+        if x.ndim != 2 or len(x) != n:
+            raise Error(f"the observations of the environment are {x.shape}; ({n}, values) is needed: pass observe")
         # The last observation of an episode may be anything.
         x = np.where(ignored[:, None], np.float32(0), x)
-        actions = head(x, fresh)
+        actions = policy(x, fresh)
         lengths[fresh] = 0
         used = ~ignored & (lengths % every == 0)
         kept.append((x, fresh.copy(), used))
@@ -86,7 +115,7 @@ def rollout(
             fresh = done
             if mode == "Disabled" and done.any():
                 observations, _ = env.reset(options={"reset_mask": done})
-    return _joined(kept), _outcome(episodes, success)
+    return Rollout(_joined(kept), episodes, _share(episodes, success or _succeeded))
 
 
 def _joined(kept: List[Tuple[Floats, Array, Array]]) -> Tuple[Floats, Array]:
@@ -97,22 +126,15 @@ def _joined(kept: List[Tuple[Floats, Array, Array]]) -> Tuple[Floats, Array]:
     return x[used], fresh[used]
 
 
-def _outcome(episodes: List[Episode], success: Optional[Success]) -> Dict[str, float]:
-    outcome = {"episodes": float(len(episodes))}
-    if not episodes:
-        return outcome
-    outcome["mean_return"] = float(np.mean([episode.total for episode in episodes]))
-    told = [_success(episode) if success is None else success(episode) for episode in episodes]
-    if all(found is not None for found in told):
-        outcome["success"] = float(np.mean([bool(found) for found in told]))
-    return outcome
+def _share(episodes: Sequence[Episode], success: Callable[[Episode], Optional[bool]]) -> Optional[float]:
+    """Returns the share of successful episodes; `None` if there are none, or one does not tell."""
+    told = [found for found in map(success, episodes) if found is not None]
+    return float(np.mean(told)) if told and len(told) == len(episodes) else None
 
 
-def _success(episode: Episode) -> Optional[bool]:
-    for key in ("is_success", "success"):
-        if key in episode.info:
-            return bool(episode.info[key])
-    return None
+def _succeeded(episode: Episode) -> Optional[bool]:
+    told = [episode.info[key] for key in ("is_success", "success") if key in episode.info]
+    return bool(told[0]) if told else None
 
 
 def _info(infos: Mapping[str, Any], i: int, mode: str) -> Dict[str, Any]:
@@ -141,5 +163,5 @@ def _actions(env: VectorEnv) -> Act:
     if isinstance(space, Box):
         shape, dtype = (env.num_envs, *space.shape), space.dtype
         low, high = space.low, space.high
-        return lambda actions: np.clip(actions.reshape(shape), low, high).astype(dtype)
+        return lambda actions: np.clip(np.reshape(actions, shape), low, high).astype(dtype)
     raise Error(f"the environment's actions are {space}; pass act, which makes them of the policy's")

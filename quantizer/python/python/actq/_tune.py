@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple
 
 from . import _actq
 from ._actq import Head, Image, Policy
 from ._progress import Progress, reporter
 from ._quantize import request
-from ._rollout import Act, Observe, Success, rollout
+from ._rollout import Act, Observe, Rollout, Success, rollout
 from ._typing import Recordings
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ class Round:
     nmse: float
     #: Error (NMSE) on its own rollout; `None` if the f32 policy's actions never vary there.
     own_nmse: Optional[float]
-    #: Numbers of its rollout: episodes, mean_return, and success, a share, if it is known.
-    outcome: Mapping[str, float]
+    #: Its rollout.
+    rollout: Rollout
 
 
 @dataclass(frozen=True)
@@ -90,28 +90,32 @@ def tune(
     the environment raises. Ctrl-C ends it at once.
     """
     options = request(bits=bits, bpw=bpw, steps=steps, minutes=minutes, relative=relative, seed=seed)
-    outcomes: List[Dict[str, float]] = []
+    rollouts: List[Rollout] = []
+    # A recurrent policy that plays chunks reads an observation only where it plans.
+    every = policy.execute if policy.state_len > 0 else 1
 
-    def drive(image: Image, number: int) -> Tuple[Tuple[Any, Any], Dict[str, float]]:
-        head = Head(image, env.num_envs)
+    def drive(image: Image, number: int) -> Rollout:
         # Other episodes in every rollout.
         first = (seed + number * env.num_envs) % 2**31
-        recording, outcome = rollout(head, env, policy, frames, first, observe, act, success)
-        return recording, outcome
+        head = Head(image, env.num_envs)
+        return rollout(
+            head, env, frames=frames, seed=first, observe=observe, act=act, success=success, every=every
+        )  # fmt: skip
 
-    def driven(number: int, image: Image) -> Tuple[Tuple[Any, Any], str]:
-        recording, outcome = drive(image, number + 1)
-        outcomes.append(outcome)
-        return recording, json.dumps(outcome)
+    def driven(number: int, image: Image) -> Tuple[Any, str]:
+        found = drive(image, number + 1)
+        rollouts.append(found)
+        numbers = {"episodes": len(found.episodes), "mean_return": found.mean_return, "success": found.success}
+        return found.recording, json.dumps({key: value for key, value in numbers.items() if value is not None})
 
     with reporter(progress) as report:
         if recordings is None:
             if report is not None:
                 report("rollout of the f32 policy", 0.0)
-            recordings = drive(_actq.stand_in(policy), 0)[0]
+            recordings = drive(_actq.stand_in(policy), 0).recording
         image, images, rows, table, better = _actq.tune(policy, recordings, heldout, options, rounds, driven, report)
     found = [
-        Round(image, row["episodes"], row["frames"], row["nmse"], row["own_nmse"], outcome)
-        for image, row, outcome in zip(images, json.loads(rows), outcomes)
+        Round(image, row["episodes"], row["frames"], row["nmse"], row["own_nmse"], driven_by_it)
+        for image, row, driven_by_it in zip(images, json.loads(rows), rollouts)
     ]
     return Tuned(image, found, table, better)

@@ -1,0 +1,52 @@
+"""The listings of docs/PYTHON.md run, in order."""
+
+import re
+import sys
+from importlib.util import find_spec
+
+import pytest
+
+import actq
+from conftest import ROOT
+
+gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
+
+
+def listings():
+    return re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/PYTHON.md").read_text(), re.M | re.S)
+
+
+def shorter(listing):
+    """Trains and learns for fewer steps."""
+    listing = listing.replace("learn(30_000)", "learn(16_000)")
+    return listing.replace("bpw=2)", "bpw=2, steps=500)").replace("bpw=1.5, ", "bpw=1.5, steps=200, ")
+
+
+def test_every_listing_runs(cart_pole, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names, skipped = {}, []
+    for i, listing in enumerate(listings()):
+        needed = re.findall(r"(torch|stable_baselines3)\b", listing)
+        missing = [name for name in set(needed) if find_spec(name) is None]
+        if missing and i == 0:
+            # Without them, the policy of an ONNX file stands in for the trained one.
+            names.update(actq=actq, gymnasium=gymnasium, **cart_pole)
+        elif missing:
+            skipped.append(i)
+        else:
+            exec(compile(shorter(listing), f"listing {i}", "exec"), names)
+    assert names["trained"].mean_return > 150
+    # Not worse than the f32 policy by more than a tenth.
+    assert names["driven"].mean_return > 0.9 * names["trained"].mean_return
+    assert names["tuned"].rounds[-1].rollout.mean_return > 100
+    assert (tmp_path / "firmware/policy.h").exists() and (tmp_path / "cart-pole.actq").exists()
+    if skipped:
+        pytest.skip(f"{len(skipped)} of its listings: torch is not installed (requirements-optional.txt)")
+
+
+def test_a_head_steps_with_flat_memory(cart_pole, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "quantizer/python/examples"))
+    import soak
+
+    image = actq.quantize(cart_pole["policy"], bits=8, method="rtn", progress=False)
+    soak.step(image, robots=512, steps=200_000, most_growth=2 << 20)
