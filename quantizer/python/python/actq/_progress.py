@@ -45,7 +45,7 @@ def _in_notebook() -> bool:
 
 def _bar() -> Union[_Bar, _Lines]:
     try:
-        from tqdm.auto import tqdm  # type: ignore[import-untyped]
+        from tqdm.auto import tqdm
     except ImportError:
         return _Lines()
     return _Bar(tqdm)
