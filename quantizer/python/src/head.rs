@@ -2,12 +2,12 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use actq_batch::Batch;
 use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _, TypeMustMatch};
 use numpy::{IntoPyArray as _, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 
-use crate::batch::Batch;
-use crate::error::{OrRaise as _, error};
+use crate::error::error;
 use crate::image::Image;
 
 /// The executor of an image, with n independent states.
@@ -18,22 +18,22 @@ pub(crate) struct Head {
     act_len: usize,
     seed: u32,
     /// `None` until the first observations decide how many states there are.
-    batch: Mutex<Option<States>>,
-}
-
-struct States {
-    batch: Batch,
-    heads: usize,
+    batch: Mutex<Option<Batch>>,
 }
 
 impl Head {
     /// Makes states in their beginning. State i has the seed of the head plus i.
-    fn states(&self, image: &Image, heads: usize) -> PyResult<States> {
-        let mut batch = Batch::new(image.buffer().bytes(), heads).or_raise()?;
+    fn states(&self, image: &Image, heads: usize) -> PyResult<Batch> {
+        let mut batch = Batch::new(image.buffer().bytes(), heads).map_err(raised)?;
         let seeds: Vec<u32> = (0..heads).map(|i| self.seed.wrapping_add(i as u32)).collect();
-        batch.seed(&seeds);
-        Ok(States { batch, heads })
+        batch.seed(&seeds).map_err(raised)?;
+        Ok(batch)
     }
+}
+
+/// Returns the exception; the text of a head's error has that of its cause.
+fn raised(error: actq_batch::Error) -> PyErr {
+    error!("{error}")
 }
 
 #[pymethods]
@@ -45,11 +45,8 @@ impl Head {
         let (obs_len, act_len) = (view.obs_len(), view.act_len());
         let head = Self { image: image.clone_ref(py), obs_len, act_len, seed, batch: Mutex::new(None) };
         if let Some(n) = n {
-            if n == 0 {
-                return Err(error!("n is 0; a head needs at least one state"));
-            }
-            let states = head.states(image.get(), n)?;
-            *head.batch.lock().unwrap_or_else(PoisonError::into_inner) = Some(states);
+            let batch = py.detach(|| head.states(image.get(), n))?;
+            *head.batch.lock().unwrap_or_else(PoisonError::into_inner) = Some(batch);
         }
         Ok(head)
     }
@@ -81,15 +78,15 @@ impl Head {
         let observations: Vec<f32> = observations.as_array().iter().copied().collect();
         let actions = py.detach(|| {
             let mut batch = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
-            let states = match &mut *batch {
-                Some(states) => states,
+            let batch = match &mut *batch {
+                Some(batch) => batch,
                 none => none.insert(self.states(self.image.get(), heads)?),
             };
-            if states.heads != heads {
-                return Err(error!("{heads} observations for a head of {} states; make another head", states.heads));
+            if batch.heads() != heads {
+                return Err(error!("{heads} observations for a head of {} states; make another head", batch.heads()));
             }
             let mut actions = vec![0.0; heads * self.act_len];
-            states.batch.step(&observations, reset.as_deref(), &mut actions).or_raise()?;
+            batch.step(&observations, reset.as_deref(), &mut actions).map_err(raised)?;
             Ok(actions)
         })?;
         actions.into_pyarray(py).reshape(shape)
@@ -98,8 +95,8 @@ impl Head {
     /// Resets every state: recurrent values, chunks, and the last action.
     fn reset(&self, py: Python<'_>) {
         py.detach(|| {
-            if let Some(states) = &mut *self.batch.lock().unwrap_or_else(PoisonError::into_inner) {
-                states.batch.reset();
+            if let Some(batch) = &mut *self.batch.lock().unwrap_or_else(PoisonError::into_inner) {
+                batch.reset();
             }
         });
     }
@@ -113,7 +110,7 @@ impl Head {
     /// Number of states; `None` before the first observations, unless n was given.
     #[getter]
     fn n(&self) -> Option<usize> {
-        self.batch.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(|states| states.heads)
+        self.batch.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(Batch::heads)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

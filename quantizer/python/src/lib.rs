@@ -2,7 +2,6 @@
 //! complete the arguments of those here.
 
 mod arrays;
-mod batch;
 mod error;
 mod head;
 mod image;

@@ -85,6 +85,13 @@ def cart_pole(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def flow():
+    """An image of a flow policy, whose import takes seconds."""
+    policy = actq.import_policy(FLOW)
+    return actq.quantize(policy, bits=8, activations=16, method="rtn", progress=False)
+
+
+@pytest.fixture(scope="session")
 def observations():
     return np.random.default_rng(2).normal(size=(500, 12)).astype(np.float32)
 

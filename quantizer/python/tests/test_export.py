@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import actq
-from conftest import FLOW, UR3
+from conftest import UR3
 
 runtime = pytest.importorskip("onnxruntime", reason="onnxruntime is not installed")
 
@@ -45,12 +45,11 @@ def test_an_onnx_file_of_an_image_can_be_imported_again(mlp, observations, tmp_p
     assert np.abs(first - second).max() < 0.02
 
 
-def test_a_flow_policy_is_unrolled(tmp_path):
-    image = quantized(FLOW)
-    row = np.random.default_rng(5).normal(size=(1, image.obs_len)).astype(np.float32)
-    noise = np.zeros((1, dict(image.network()["inputs"])["noise"]), np.float32)
-    (chunk,) = run(image, tmp_path, obs=row, noise=noise)
-    assert chunk.shape[0] == 1 and chunk.shape[2] == image.act_len and np.isfinite(chunk).all()
+def test_a_flow_policy_is_unrolled(flow, tmp_path):
+    row = np.random.default_rng(5).normal(size=(1, flow.obs_len)).astype(np.float32)
+    noise = np.zeros((1, dict(flow.network()["inputs"])["noise"]), np.float32)
+    (chunk,) = run(flow, tmp_path, obs=row, noise=noise)
+    assert chunk.shape[0] == 1 and chunk.shape[2] == flow.act_len and np.isfinite(chunk).all()
 
 
 def recurrent(folder):
@@ -142,13 +141,12 @@ def test_a_module_can_be_trained(mlp, observations):
         module(obs[:, :3])
 
 
-def test_a_flow_module_has_the_chunk_of_the_file(tmp_path):
+def test_a_flow_module_has_the_chunk_of_the_file(flow, tmp_path):
     torch = pytest.importorskip("torch", reason="torch is not installed (requirements-optional.txt)")
-    image = quantized(FLOW)
-    row = np.random.default_rng(5).normal(size=(2, image.obs_len)).astype(np.float32)
-    noise = np.random.default_rng(6).normal(size=(2, dict(image.network()["inputs"])["noise"])).astype(np.float32)
-    (chunk,) = run(image, tmp_path, obs=row, noise=noise)
-    module = actq.FakeQuant(image, activations=False)
+    row = np.random.default_rng(5).normal(size=(2, flow.obs_len)).astype(np.float32)
+    noise = np.random.default_rng(6).normal(size=(2, dict(flow.network()["inputs"])["noise"])).astype(np.float32)
+    (chunk,) = run(flow, tmp_path, obs=row, noise=noise)
+    module = actq.FakeQuant(flow, activations=False)
     with torch.no_grad():
         found = module(torch.from_numpy(row), noise=torch.from_numpy(noise)).numpy()
     assert found.shape == chunk.shape and np.abs(found - chunk).max() < 1e-4 * np.abs(chunk).max()

@@ -160,8 +160,9 @@ class Head:
 
         Returns [n_act], or [n, n_act]: the bits of `actq serve`. Other threads of Python run meanwhile.
 
-        Raises `actq.Error` for another shape, for an observation that is not finite, and if a value inside the network
-        exceeds float32. It names the first state that failed.
+        Raises `actq.Error` for another shape, and for an observation that is not finite: then nothing has changed. Also if a
+        value inside the network exceeds float32: then the failed states were reset, and all others have made their step.
+        It names the first state that failed.
         """
     def reset(self) -> None:
         """Resets every state: recurrent values, chunks, and the last action."""
