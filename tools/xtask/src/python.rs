@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use actq_boards::{root, target_dir};
+use actq_boards::{Clock, Target, root, target_dir, version};
 use anyhow::{Context as _, Result, ensure};
 
+use crate::firmware;
 use crate::setup::cargo;
 
 const USAGE: &str = "\
@@ -24,6 +25,10 @@ const OLDEST: [u32; 2] = [3, 9];
 const PACKAGE: &str = "quantizer/python";
 /// Requirements of the tests, and of those that only `--optional` runs.
 const REQUIREMENTS: [&str; 2] = ["requirements-test.txt", "requirements-optional.txt"];
+
+/// Board of the motor controller that the link's tests run in QEMU, and the range of its axes.
+const BOARD: &str = "mps2-an386";
+const LIMITS: &str = "-3:3";
 
 /// The request.
 #[derive(Debug, PartialEq, Eq)]
@@ -90,8 +95,25 @@ fn test(optional: bool, pytest: &[String]) -> Result<()> {
     let install = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps", "--no-index", "--find-links"];
     run(Command::new(&python).args(install).arg(&wheels).arg("actq"))?;
     let actq = target_dir().join("release").join(format!("actq{}", std::env::consts::EXE_SUFFIX));
-    run(Command::new(&python).current_dir(&package).env("ACTQ", actq).args(["-m", "pytest", "-q"]).args(pytest))?;
+    let mut tests = Command::new(&python);
+    tests.current_dir(&package).env("ACTQ", actq).args(["-m", "pytest", "-q"]).args(pytest);
+    run(tests.envs(controller()?.map(|command| ("ACTQ_CONTROLLER", command))))?;
     run(Command::new(&python).current_dir(&package).args(["-m", "mypy"]))
+}
+
+/// Builds the motor controller, and returns the words of a command that runs it in QEMU, one a line, with its serial port
+/// at the socket `{socket}`. Returns `None` if QEMU is not installed.
+fn controller() -> Result<Option<String>> {
+    let Some(board) = Target::on(BOARD).filter(|target| version(target.board().emulator).is_ok()) else {
+        return Ok(None);
+    };
+    let elf = target_dir().join("python/controller.elf");
+    let out = elf.display().to_string();
+    let words = ["--board", BOARD, "--limits", LIMITS, "--out", &out];
+    firmware::Options::parse(&words).map_err(anyhow::Error::msg)?.run()?;
+    let command = board.run_with_serial(&elf, "unix:{socket},server=on,wait=off", Clock::Host);
+    let words = [command.get_program()].into_iter().chain(command.get_args());
+    Ok(Some(words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join("\n")))
 }
 
 /// Makes the virtual environment, unless it has these requirements already; returns its interpreter.

@@ -1,0 +1,60 @@
+"""The link to the motor controller in QEMU."""
+
+import os
+import subprocess
+import time
+
+import numpy as np
+import pytest
+
+import actq
+from conftest import UR3
+
+
+@pytest.fixture
+def port(tmp_path):
+    """Runs the controller with its serial port at a socket."""
+    command = os.environ.get("ACTQ_CONTROLLER")
+    if command is None:
+        pytest.skip("ACTQ_CONTROLLER names no controller; `cargo xtask python` builds one if QEMU is installed")
+    socket = tmp_path / "serial"
+    words = [word.replace("{socket}", str(socket)) for word in command.split("\n")]
+    process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not socket.exists():
+        assert process.poll() is None, "QEMU has ended"
+        time.sleep(0.01)
+    yield f"unix:{socket}"
+    process.terminate()
+    process.wait()
+
+
+def test_a_controller_runs_an_image_with_its_bits(port):
+    image = actq.quantize(actq.import_policy(UR3), bits=2, method="rtn", progress=False)
+    rows = np.random.default_rng(1).normal(size=(5, image.obs_len)).astype(np.float32)
+    with actq.Link(port, timeout=60) as link:
+        before = link.status()
+        assert (before["obs_len"], before["act_len"], before["state"]) == (18, 6, "disarmed")
+        shares = []
+        link.push(image, version=7, progress=lambda work, share: shares.append(share))
+        assert shares and max(shares) <= 1.0
+        assert link.status()["image"] == image.crc32 != before["image"]
+        head = actq.Head(image)
+        for row in rows:
+            assert link.step(row).tobytes() == head(row).tobytes()
+        assert link.timing()["worst_head_us"] > 0
+        link.arm()
+        assert link.status()["state"] == "armed"
+        link.disarm()
+        with pytest.raises(actq.Error, match="version"):
+            link.push(image, version=6)
+    with pytest.raises(actq.Error, match="the link is closed; open another"):
+        link.status()
+
+
+def test_a_port_that_cannot_be_opened_is_named(tmp_path):
+    with pytest.raises(actq.Error, match=r"unix:.*none: the port cannot be opened: No such file"):
+        actq.Link(f"unix:{tmp_path}/none")
+    with pytest.raises(actq.Error, match="tcp:here: the form is tcp:HOST:PORT"):
+        actq.Link("tcp:here")
+    with pytest.raises(actq.Error, match="timeout is 0; use a number above 0"):
+        actq.Link("unix:x", timeout=0)
