@@ -3,6 +3,8 @@
 mod builder;
 mod file;
 mod operations;
+#[cfg(test)]
+mod tests;
 
 pub use builder::{Attribute, Data, Network, Node, Tensor};
 pub use file::file;

@@ -10,6 +10,7 @@ use super::*;
 use crate::calibrate::moments;
 use crate::calibrate::windows::Windows;
 use crate::graph::Graph;
+use crate::import::values::{Tensor, Values};
 use crate::testing::{dataset, lstm, mlp};
 
 const SIZES: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 0 };
@@ -466,4 +467,24 @@ fn dimensions_outside_the_range_are_named() {
     assert!(note.starts_with("observation dimensions 3, 7-9 never change in calib.npz, "), "{note}");
     let moving = recorded("calib.npz", Array3::from_shape_fn((1, 9, 2), |(_, s, _)| s as f32));
     assert_eq!(Range::of(&moving).constant_note(), None);
+}
+
+#[test]
+fn arrays_in_memory_are_checked_as_those_of_files() {
+    let tensor = |shape: &[usize], values| Tensor { shape: shape.to_vec(), values };
+    let floats = |shape: &[usize]| tensor(shape, Values::F32(count(shape).into_iter().collect()));
+    let named = |arrays: &[(&str, Tensor)]| arrays.iter().map(|(n, a)| ((*n).to_owned(), a.clone())).collect();
+    let of = |arrays: &[(&str, Tensor)]| Dataset::of_arrays(Path::new("given"), named(arrays), SIZES);
+    let dir = TempDir::new().expect("a folder");
+    let read = Dataset::load(&write(&dir, "a.npz", &[("obs", obs())]), SIZES).expect("a recording");
+    let given = of(&[("obs", floats(&[2, 5, 3])), ("other", floats(&[1]))]).expect("a recording");
+    assert_eq!((&given.obs, &given.length, &*given.name()), (&read.obs, &read.length, "given"));
+    for (arrays, expected) in [
+        (vec![("observation", floats(&[5, 3]))], "given: array \"obs\" is missing; the file holds observation"),
+        (vec![("obs", floats(&[5, 2]))], "given: array \"obs\" has 2 values per step, but the policy takes 3"),
+        (vec![("obs", tensor(&[5, 3], Values::Other("uint8".into())))], "given: array \"obs\" is of type uint8"),
+    ] {
+        let error = format!("{:#}", of(&arrays).expect_err(expected));
+        assert!(error.starts_with(expected), "{error}");
+    }
 }
