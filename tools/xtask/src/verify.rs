@@ -18,8 +18,8 @@ Usage: cargo verify [--all]
 Checks formatting and lints, runs the host tests, and runs a policy and the motor controller on a Cortex-M4 in QEMU.
 
   --all  Everything that CI checks: also the tests on every board in QEMU, those that learn for long, lints for every board,
-         documentation, budgets, faults on the line, ONNX files against tract, the Python package,
-         32-bit words, the oldest compiler
+         documentation, budgets, faults on the line, ONNX files against tract, the Python package, 32-bit words,
+         the oldest compiler
 
 Tests on policies outside this repository run if ACTQ_SHARED names their folder.";
 
