@@ -152,11 +152,11 @@ impl Linear {
     }
 }
 
-/// Converts values to integers, by the rule of [`actq_kernels::round`]. Zeros follow.
+/// Converts values to integers, by the rule of [`actq_kernels::round`]. One more integer keeps its value: its weights
+/// are 0.
 #[inline(always)]
 fn integers<S: Simd>(simd: S, inverse: f32, values: &[f32], to: &mut [i16]) {
-    let (to, zeros) = to.split_at_mut(values.len());
-    zeros.fill(0);
+    let to = &mut to[..values.len()];
     let (mut some, mut some_to) = (values.chunks_exact(S::i16s::LEN), to.chunks_exact_mut(S::i16s::LEN));
     for (values, to) in (&mut some).zip(&mut some_to) {
         let (low, high) = values.split_at(S::f32s::LEN);

@@ -8,7 +8,7 @@ use crate::linear::{Linear, Operands};
 use crate::product;
 use crate::program::Operation;
 
-/// Heads of a tile come in this number, for which a product is fastest.
+/// A tile has a multiple of this number of heads, except the last one: a product computes as many together.
 pub(crate) const LEAST: usize = product::HEADS;
 /// Most heads of a tile.
 pub(crate) const MOST: usize = 32;

@@ -131,3 +131,10 @@ fn errors_name_what_was_wrong() {
     let error = Error::Actions { expected: 4, given: 3 };
     assert!(error.to_string().contains('4') && error.source().is_none(), "{error}");
 }
+
+#[test]
+fn a_batch_moves_between_threads() {
+    fn check<T: Send + Sync>() {}
+    check::<Batch>();
+    check::<Error>();
+}
