@@ -1,6 +1,6 @@
 //! A batch of heads.
 
-use actq_kernels::{Head, Image, ImageError, ImageInfo, PortKind, StepError};
+use actq_kernels::{Head, Image, ImageError, PortKind, StepError};
 use fearless_simd::Level;
 use rayon::prelude::*;
 use self_cell::{MutBorrow, self_cell};
@@ -65,15 +65,15 @@ impl Batch {
         if heads == 0 {
             return Err(Error::NoHeads);
         }
-        let per_head = ImageInfo::read(bytes)?.scratch_words;
         let (words, rest) = bytes.as_chunks();
         if !rest.is_empty() {
             return Err(ImageError::Length.into());
         }
-        let image = words.iter().map(|word| u32::from_ne_bytes(*word)).collect();
+        let image: Vec<u32> = words.iter().map(|word| u32::from_ne_bytes(*word)).collect();
+        let per_head = checked(&image)?.scratch_words();
         let memory = Memory { image, scratch: MutBorrow::new(zeros(heads, per_head).ok_or(Error::Memory { heads })?) };
         let heads = OwnedHeads::try_new(memory, |memory| -> Result<Heads<'_>, Error> {
-            let image = Image::new_checked(bytemuck::must_cast_slice(&memory.image))?;
+            let image = checked(&memory.image)?;
             let scratch = memory.scratch.borrow_mut().chunks_exact_mut(per_head);
             // A chunk has the words that a head needs.
             let heads = scratch.filter_map(|scratch| Head::new(image, scratch).ok()).collect();
@@ -193,6 +193,10 @@ impl Batch {
             .position(|(value, [low, high])| !(low..=high).contains(&value))
             .map(|index| StepError::ObservationRange { index })
     }
+}
+
+fn checked(words: &[u32]) -> Result<Image<'_>, ImageError> {
+    Image::new_checked(bytemuck::must_cast_slice(words))
 }
 
 /// Returns zeros for all heads, if there is memory.

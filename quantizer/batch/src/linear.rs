@@ -27,8 +27,8 @@ pub(crate) struct Linear {
     weights: Vec<Weights>,
     /// Scales of the rows that have weights, in the order of their outputs.
     scales: Vec<f32>,
-    /// Outputs of these rows; empty if they are all outputs.
-    outputs: Vec<usize>,
+    /// Outputs of these rows, unless every output has a row.
+    outputs: Option<Vec<usize>>,
 }
 
 /// Vectors of several heads, and their sums.
@@ -62,10 +62,8 @@ impl Linear {
                 weights[col / 2][at % ROWS * 2 + col % 2] = weight as i16;
             }
         }
-        let mut outputs: Vec<usize> = rows.iter().map(|(output, ..)| *output).collect();
-        if outputs.iter().copied().eq(0..matrix.rows) {
-            outputs.clear();
-        }
+        let outputs: Vec<usize> = rows.iter().map(|(output, ..)| *output).collect();
+        let is_whole = outputs.iter().copied().eq(0..matrix.rows);
         let has_start = !accumulate || matrix.has_bias();
         Some(Self {
             src: op.src(),
@@ -76,7 +74,7 @@ impl Linear {
             pairs,
             weights,
             scales: rows.iter().map(|(_, rows, i)| rows.scale(*i)).collect(),
-            outputs,
+            outputs: (!is_whole).then_some(outputs),
         })
     }
 
@@ -127,7 +125,7 @@ impl Linear {
         let x_scale = operands.scales[vector];
         let y: &mut [f32] = bytemuck::must_cast_slice_mut(&mut arena[self.dst.range()]);
         let rows = sums.iter().zip(&self.scales);
-        if self.outputs.is_empty() && !self.accumulate {
+        if self.outputs.is_none() && !self.accumulate {
             for ((y, bias), (sum, scale)) in y.iter_mut().zip(&self.biases).zip(rows) {
                 *y = bias + *sum as f32 * (scale * x_scale);
             }
@@ -140,13 +138,13 @@ impl Linear {
         } else {
             y.copy_from_slice(&self.biases);
         }
-        if self.outputs.is_empty() {
-            for (y, (sum, scale)) in y.iter_mut().zip(rows) {
-                *y += *sum as f32 * (scale * x_scale);
+        if let Some(outputs) = &self.outputs {
+            for (output, (sum, scale)) in outputs.iter().zip(rows) {
+                y[*output] += *sum as f32 * (scale * x_scale);
             }
         } else {
-            for (output, (sum, scale)) in self.outputs.iter().zip(rows) {
-                y[*output] += *sum as f32 * (scale * x_scale);
+            for (y, (sum, scale)) in y.iter_mut().zip(rows) {
+                *y += *sum as f32 * (scale * x_scale);
             }
         }
     }

@@ -140,7 +140,13 @@ pub(super) fn products(seed: u64) -> Result<Vec<u8>> {
         last = draw.linear(&mut builder, rows, last, group)?;
         last = builder.node(Pointwise(Function::ALL[draw.below(Function::ALL.len())]), &[last])?;
     }
-    builder.image("products")
+    let (policy, mut outcomes) = builder.finish("products".to_owned(), false);
+    if draw.below(4) == 0 {
+        // No row of a matrix has weights.
+        let at = draw.below(outcomes.len());
+        outcomes[at].quantized.widths.fill(None);
+    }
+    Ok(emit::image(&policy, &outcomes)?)
 }
 
 /// An image with a recurrent state and a largest change of the action, which fails for an observation above 90.
