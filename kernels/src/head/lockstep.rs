@@ -1,5 +1,5 @@
-//! A step that its caller runs operation by operation: so many heads of one image run each operation together, and the
-//! caller may compute one of its own way.
+//! A step that its caller runs operation by operation. Many heads of one image can then run each operation together, and
+//! the caller can compute an operation itself.
 
 use super::step::to_next_op;
 use super::{Head, Phase};

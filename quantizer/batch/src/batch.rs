@@ -56,7 +56,7 @@ impl Batch {
     ///
     /// # Errors
     ///
-    /// [`Error::Image`], [`Error::NoHeads`], and [`Error::Memory`] if the memory of so many heads is not available.
+    /// [`Error::Image`], [`Error::NoHeads`], and [`Error::Memory`] if the memory for the heads is not available.
     pub fn new(image: &[u8], heads: usize) -> Result<Self, Error> {
         Self::at_level(Level::new(), image, heads)
     }
@@ -135,7 +135,7 @@ impl Batch {
     /// values for each head, `actions` gets a row of [`Self::act_len`] values. A head for which `reset` is `true` is
     /// reset before its step.
     ///
-    /// It runs on the threads of rayon's current pool.
+    /// It runs on the threads of rayon's current pool; `ThreadPool::install` selects another.
     ///
     /// # Errors
     ///

@@ -12,7 +12,7 @@ pub enum Error {
     Image(ImageError),
     /// A batch of no heads.
     NoHeads,
-    /// The memory of so many heads is not available.
+    /// The memory for the heads is not available.
     Memory {
         /// Heads of the batch.
         heads: usize,

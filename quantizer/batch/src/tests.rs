@@ -30,7 +30,7 @@ fn levels() -> Vec<Level> {
     levels.into_iter().flatten().collect()
 }
 
-/// Runs `work` with the image of these bytes and as many heads, each with its own memory.
+/// Runs `work` with the image of these bytes and `count` heads of it.
 fn with_heads<T>(
     bytes: &[u8],
     count: usize,

@@ -1,4 +1,4 @@
-//! A tile: heads that one thread runs together, so few that their values stay in its caches.
+//! A tile: heads that one thread runs together, few enough that their values stay in its caches.
 
 use actq_kernels::{Head, StepError};
 use fearless_simd::{Level, Simd, dispatch};
