@@ -57,6 +57,8 @@ fn node(node: &Node) -> Bytes {
     bytes(&proto::Node {
         input: node.inputs.clone(),
         output: vec![node.output.clone()],
+        // Names, by which tools tell nodes apart when they join them.
+        name: Some(node.output.clone()),
         op_type: Some(node.op.to_owned()),
         attribute: node.attributes.iter().map(|(name, value)| attribute(name, value)).collect(),
         ..Default::default()
