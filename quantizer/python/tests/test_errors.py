@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -126,3 +127,19 @@ def test_a_bar_shows_progress(mlp, observations, capsys):
     pytest.importorskip("tqdm", reason="tqdm is not installed")
     actq.quantize(actq.import_policy(mlp), observations, bpw=3, steps=2000, progress=True)
     assert "left" in capsys.readouterr().err
+
+
+def test_progress_is_shown_in_a_notebook_and_not_in_a_log(monkeypatch, capsys):
+    from actq import _progress
+
+    class ZMQInteractiveShell:
+        pass
+
+    with _progress.reporter(None) as report:
+        assert report is None, "standard error is no terminal here"
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=ZMQInteractiveShell))
+    monkeypatch.setitem(sys.modules, "tqdm.auto", None)
+    monkeypatch.setattr(_progress, "INTERVAL", 0.0)
+    with _progress.reporter(None) as report:
+        report("learning", 0.25)
+    assert capsys.readouterr().err == "progress: 0 s, 25%: learning\n"

@@ -50,6 +50,16 @@ def test_open_questions_are_listed(tmp_path):
     assert "says profile lerobot" in text and "\nthe bundle (family lerobot) leaves 1 questions open; " in text
 
 
+def test_engines_of_the_speed_comparison_agree():
+    pytest.importorskip("torch", reason="torch is not installed (requirements-optional.txt)")
+    import speed
+
+    ours, by_onnx, by_torch = (step() for step in speed.engines(robots=64, cores=1).values())
+    assert np.abs(by_onnx[0] - by_torch.numpy()).max() < 1e-5
+    # 2 bits, not learned: near enough to be the same network.
+    assert ours.shape == (64, 12) and np.corrcoef(ours.ravel(), by_onnx[0].ravel())[0, 1] > 0.5
+
+
 def test_stable_baselines3_in_mujoco():
     for name in ("stable_baselines3", "mujoco"):
         pytest.importorskip(name, reason=f"{name} is not installed (requirements-optional.txt)")

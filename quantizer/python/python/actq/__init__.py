@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ._actq import Error, Head, Image, Link, Policy, __version__
-from ._evaluate import Errors, evaluate
+from ._evaluate import ErrorReport, evaluate
 from ._import import import_policy
 from ._quantize import quantize
 from ._rollout import Episode, Rollout, rollout
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Episode",
     "Error",
-    "Errors",
+    "ErrorReport",
     "FakeQuant",
     "Head",
     "Image",

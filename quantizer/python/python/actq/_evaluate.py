@@ -1,4 +1,4 @@
-"""Errors of an image."""
+"""ErrorReport of an image."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ._typing import Recordings
 
 
 @dataclass(frozen=True)
-class Errors:
-    """Errors of an image's raw outputs against the f32 policy's, as `actq eval --json` prints them."""
+class ErrorReport:
+    """ErrorReport of an image's raw outputs against the f32 policy's, as `actq eval --json` prints them."""
 
     #: Mean squared error over variance, averaged over the output's dimensions.
     nmse: float
@@ -31,7 +31,7 @@ class Errors:
 
 def evaluate(
     image: Image, recordings: Recordings, policy: Optional[Policy] = None, *, progress: Progress = False
-) -> Errors:
+) -> ErrorReport:
     """Runs an image over recordings and compares it with the f32 policy.
 
     image: what `quantize` returned.
@@ -41,4 +41,4 @@ def evaluate(
     Raises `actq.Error` if a recording does not fit, or has no actions and no policy is given.
     """
     with reporter(progress) as report:
-        return Errors(**_actq.evaluate(image, recordings, policy, report))
+        return ErrorReport(**_actq.evaluate(image, recordings, policy, report))
