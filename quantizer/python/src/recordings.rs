@@ -30,7 +30,8 @@ impl Passed {
             Self::Arrays(name, arrays) => Dataset::of_arrays(&name, arrays, sizes),
             Self::Episodes(name, episodes) => {
                 let one = |obs| Dataset::of_arrays(&name, BTreeMap::from([("obs".to_owned(), obs)]), sizes);
-                joined(&episodes.into_iter().map(one).collect::<actq::error::Result<Vec<_>>>()?, sizes.state)
+                let episodes = episodes.into_iter().map(one).collect::<actq::error::Result<Vec<_>>>()?;
+                Ok(Dataset { path: name.clone(), ..joined(&episodes, sizes.state)? })
             }
         }
     }
