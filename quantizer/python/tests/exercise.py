@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import actq
-from conftest import UR3
+from conftest import UR3, write_mlp
 
 
 def refused(call, *arguments, **options):
@@ -27,8 +27,11 @@ def main():
     random = np.random.default_rng(0)
     rows = random.normal(size=(300, policy.obs_len)).astype(np.float32)
     image = actq.quantize(policy, bits=2, method="rtn", progress=False)
-    actq.quantize(policy, rows, bits=3, steps=1, progress=lambda work, share: None)
     actq.evaluate(image, rows[:20], policy)
+    with tempfile.TemporaryDirectory() as folder:
+        layers = [(random.normal(size=(6, 8)), np.zeros(8)), (random.normal(size=(8, 2)), np.zeros(2))]
+        small = actq.import_policy(write_mlp(Path(folder, "small.onnx"), layers))
+    actq.quantize(small, rows[:, :6], bpw=4, steps=20, progress=lambda work, share: None)
     refused(actq.quantize, policy, rows[:, :3], progress=False)
     refused(actq.quantize, policy, [rows, {"obs": rows, "length": np.array([400])}], progress=False)
     refused(actq.quantize, policy, (rows, np.zeros(7, dtype=bool)), progress=False)
@@ -54,7 +57,7 @@ def main():
     image.network(), image.inspect(), image.cost(), image.ports, repr(image), repr(head), repr(policy)
     refused(actq.Link, "unix:/none")
     try:
-        actq.quantize(policy, bpw=2, progress=lambda work, share: sys.exit(0))
+        actq.quantize(small, rows[:, :6], bpw=4, progress=lambda work, share: sys.exit(0))
     except SystemExit:
         print("done")
 
