@@ -31,7 +31,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         layers = [(random.normal(size=(6, 8)), np.zeros(8)), (random.normal(size=(8, 2)), np.zeros(2))]
         small = actq.import_policy(write_mlp(Path(folder, "small.onnx"), layers))
-    actq.quantize(small, rows[:, :6], bpw=4, steps=20, progress=lambda work, share: None)
+    actq.quantize(small, rows[:, :6], bits=4, steps=20, progress=lambda work, share: None)
     refused(actq.quantize, policy, rows[:, :3], progress=False)
     refused(actq.quantize, policy, [rows, {"obs": rows, "length": np.array([400])}], progress=False)
     refused(actq.quantize, policy, (rows, np.zeros(7, dtype=bool)), progress=False)
@@ -57,7 +57,7 @@ def main():
     image.network(), image.inspect(), image.cost(), image.ports, repr(image), repr(head), repr(policy)
     refused(actq.Link, "unix:/none")
     try:
-        actq.quantize(small, rows[:, :6], bpw=4, progress=lambda work, share: sys.exit(0))
+        actq.quantize(small, rows[:, :6], bits=4, progress=lambda work, share: sys.exit(0))
     except SystemExit:
         print("done")
 
