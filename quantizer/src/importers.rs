@@ -1,4 +1,4 @@
-//! The policy formats that the command reads. To add one, append it to [`IMPORTERS`].
+//! The policy formats that the command reads. To add one, append it to `IMPORTERS`.
 
 use std::path::{Path, PathBuf};
 
