@@ -7,7 +7,10 @@ use pyo3::prelude::*;
 /// Copies an array, or what numpy makes one of. Types that no recording has are passed on by their names only.
 pub(crate) fn tensor(object: &Bound<'_, PyAny>) -> PyResult<Tensor> {
     let asarray = object.py().import("numpy")?.getattr("asarray")?;
-    let array = asarray.call1((object,))?.cast_into::<PyUntypedArray>()?;
+    let array = asarray.call1((object,))?;
+    // In the machine's order of bytes.
+    let own = array.getattr("dtype")?.call_method1("newbyteorder", ("=",))?;
+    let array = asarray.call1((array, own))?.cast_into::<PyUntypedArray>()?;
     let values = None
         .or_else(|| copied(&array).map(Values::F32))
         .or_else(|| copied(&array).map(Values::F64))

@@ -63,6 +63,9 @@ fn append(object: &Bound<'_, PyAny>, name: &Path, to: &mut Vec<Passed>) -> PyRes
     } else if let Ok(pair) = object.cast::<PyTuple>() {
         to.push(Passed::Episodes(name.to_owned(), episodes(pair, name)?));
     } else if let Ok(list) = object.cast::<PyList>() {
+        if list.is_empty() {
+            return Err(error!("{} is an empty list; pass a recording", name.display()));
+        }
         for (i, item) in list.iter().enumerate() {
             append(&item, &PathBuf::from(format!("{}[{i}]", name.display())), to)?;
         }

@@ -50,6 +50,8 @@ def test_arguments_are_named(mlp, observations):
         ({"method": "best"}, 'method is "best"; use "rtn", "gptq" or "distill"'),
         ({"activations": 4}, "activations is 4; use 8 or 16 bits"),
         ({"group": 5}, "group is 5; it must be 0 or one of [32, 64, 128]"),
+        ({"steps": -1}, "steps is -1; use a whole number from 0 on"),
+        ({"seed": np.int64(-3)}, "seed is -3; use a whole number from 0 on"),
     ]
     for options, text in wrong:
         with pytest.raises(actq.Error) as raised:
@@ -57,6 +59,7 @@ def test_arguments_are_named(mlp, observations):
         assert str(raised.value) == text
     recordings = [
         (3, "recordings is a int; pass a path, an array"),
+        ([], "recordings is an empty list; pass a recording"),
         ((observations,), "recordings is a tuple of 1 items; pass (observations, starts)"),
         ((observations, np.zeros(3, dtype=bool)), "recordings[1] has 3 values for 500 frames; pass one for each frame"),
         ((observations, np.zeros(500)), "recordings[1] is no array of bool [frame]"),

@@ -41,6 +41,7 @@ def test_every_form_of_a_recording_gives_one_image(mlp, observations, tmp_path):
     forms = [
         observations,
         observations.astype(np.float64),
+        observations.astype(">f4"),
         np.asfortranarray(observations),
         observations[None],
         {"obs": observations},

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
+from operator import index
 from typing import Any, Dict, Mapping, Optional
 
 from . import _actq
-from ._actq import Image, Policy
+from ._actq import Error, Image, Policy
 from ._progress import Progress, reporter
 from ._typing import Recordings
 
@@ -24,6 +25,11 @@ def request(**given: Any) -> Dict[str, Any]:
     )
     options: Dict[str, Any] = {**unset, "clock": CLOCK, "widths": [], "relative": False, "seed": 1, **given}
     options["widths"] = list(dict(options["widths"] or {}).items())
+    for name in ("flash", "group", "seed", "steps"):
+        if options[name] is not None:
+            options[name] = index(options[name])
+            if options[name] < 0:
+                raise Error(f"{name} is {options[name]}; use a whole number from 0 on")
     return options
 
 
