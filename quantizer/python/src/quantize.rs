@@ -22,7 +22,7 @@ use crate::policy::Policy;
 use crate::recordings::{Passed, passed};
 use crate::work;
 
-/// What Python passed, with the names of the arguments.
+/// The options that Python passed, with the names of the arguments.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Request {

@@ -25,7 +25,7 @@ enum Event<T> {
     Done(thread::Result<anyhow::Result<T>>),
 }
 
-/// What the two threads share.
+/// The state that the two threads share.
 #[derive(Default)]
 struct Shared {
     is_abandoned: AtomicBool,

@@ -33,11 +33,11 @@ fn listings(document: &str) -> Vec<&str> {
     document.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next()).collect()
 }
 
-/// What the library in the package runs.
+/// The images that the library in the package runs.
 #[derive(Clone, Copy, PartialEq)]
 enum Runs {
     AnyImage,
-    /// What needs no more than the built-in image.
+    /// Those that need no more than the built-in image.
     BuiltIn,
 }
 
