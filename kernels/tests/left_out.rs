@@ -1,4 +1,4 @@
-//! A build without some of the features refuses an image that needs them, and runs the same image with them.
+//! A build without some of the features refuses an image that needs them, and takes the same image with them.
 
 use actq_kernels::{Image, ImageError};
 

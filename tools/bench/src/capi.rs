@@ -5,13 +5,13 @@ use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 
 use actq_boards::{Target, root, target_dir, version};
+use actq_cli::outputs;
 use actq_cli::report::export::sha256;
+use actq_kernels::Image;
 use anyhow::{Context as _, Result, ensure};
 use serde_json::{Value, json};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
-
-use actq_kernels::Image;
 
 use crate::firmware::cargo;
 
@@ -81,7 +81,7 @@ impl Core {
         let is_archive = out.extension().is_some_and(|extension| extension == "zip");
         let is_free =
             if is_archive { !out.exists() } else { fs::read_dir(out).map_or(true, |mut files| files.next().is_none()) };
-        ensure!(is_free, "{}: is not empty; remove it, or name another file or folder", out.display());
+        ensure!(is_free, "{}: exists already; remove it, or name another file or folder", out.display());
         let mut files = Files::default();
         let features =
             image.map_or_else(|| "default".to_owned(), |image| image.features().collect::<Vec<_>>().join(" "));
@@ -151,7 +151,7 @@ impl Files {
             archive.start_file(format!("actq-{core}/{name}"), stored)?;
             archive.write_all(bytes)?;
         }
-        Ok(fs::write(out, archive.finish()?.into_inner())?)
+        outputs::files::write(out, &archive.finish()?.into_inner())
     }
 }
 

@@ -75,7 +75,7 @@ def tune(
     policy: what `import_policy` returned.
     env: a vector environment of Gymnasium. All of its robots step together; it stays open.
     recordings: observations of the f32 policy, as for `quantize`. Without them, an image of 8 bits of the policy is
-        rolled out in `env` and stands in for it.
+        rolled out in `env` in its place.
     bits, bpw: bits of every weight, or bits per weight of all weights; the default is 3 bits.
     rounds: on-policy rounds after the first image, 1 to 100. N rounds make N + 1 rollouts.
     frames: frames of a rollout, of all robots together.
