@@ -25,4 +25,4 @@ pub use nodes::{Graph, Node};
 pub use ops::NodeKind;
 pub use run::{Network, Pass};
 pub use values::{ValueId, WeightMatrix};
-pub use weights::{State, Weights, start_state, zero_state};
+pub use weights::{Derivatives, Factors, State, Vectors, Weights, start_state, zero_state};

@@ -19,6 +19,7 @@ pub mod contract;
 pub mod data;
 pub mod emit;
 pub mod error;
+mod gemm;
 pub mod graph;
 pub mod import;
 pub mod measure;
@@ -28,6 +29,7 @@ pub mod pipeline;
 pub mod policy;
 pub mod random;
 pub mod runtime;
+mod simd;
 mod strict_json;
 #[cfg(test)]
 mod testing;

@@ -98,7 +98,7 @@ impl Compute for OnnxNetwork {
 impl Output {
     fn step(&mut self, inputs: &[Vec<f32>]) -> Vec<f32> {
         let obs: Vec<f32> = self.reads.iter().flat_map(|i| inputs[*i].iter().copied()).collect();
-        let pass = Network::in_order(&self.policy.graph).forward_one(&self.weights, &obs, &mut self.state);
+        let pass = Network::new(&self.policy.graph).forward_one(&self.weights, &obs, &mut self.state);
         let (len, contract) = (self.policy.act_len, &self.policy.contract);
         pass.iter().enumerate().map(|(i, value)| action(contract, i % len, *value)).collect()
     }

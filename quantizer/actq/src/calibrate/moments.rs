@@ -1,8 +1,10 @@
 //! Second moments of the matrices' inputs over the recorded observations.
 
 use nalgebra::DMatrix;
+use ndarray::Array2;
 
 use crate::data::Dataset;
+use crate::gemm::{Panels, add_product_parallel};
 use crate::graph::{Evaluator, Graph, WeightMatrix};
 
 /// Second moment `E[x x']` of a matrix's input, with mean and count.
@@ -30,47 +32,64 @@ const BATCH: usize = 256;
 /// Runs the f32 network over `dataset` and returns the moments of every matrix's input. `progress` is called after each
 /// episode with the number of frames done.
 pub fn collect(graph: &Graph, dataset: &Dataset, progress: &mut dyn FnMut(usize)) -> Vec<Moments> {
-    let mut sums: Vec<_> = graph
-        .matrices
-        .iter()
-        .map(|m| {
-            (Moments { second: DMatrix::zeros(m.cols, m.cols), mean: vec![0.0; m.cols], count: 0 }, Vec::<f64>::new())
-        })
-        .collect();
+    let mut sums: Vec<_> = graph.matrices.iter().map(|m| Sum::new(m.cols)).collect();
     let mut evaluator = Evaluator::new(graph);
     let mut frames = 0;
     for episode in 0..dataset.length.len() {
         evaluator.start(dataset.start(episode).as_deref());
         for obs in dataset.episode(episode) {
             evaluator.step(&obs, &mut |m, x| {
-                let (moments, batch) = &mut sums[m];
-                batch.extend(x.iter().map(|&v| f64::from(v)));
-                if batch.len() >= BATCH * x.len() {
-                    flush(moments, batch);
-                }
+                sums[m].add(x);
             });
             frames += 1;
         }
         progress(frames);
     }
-    sums.into_iter()
-        .map(|(mut moments, mut batch)| {
-            flush(&mut moments, &mut batch);
-            let count = moments.count.max(1) as f64;
-            moments.second /= count;
-            moments.mean.iter_mut().for_each(|m| *m /= count);
-            moments
-        })
-        .collect()
+    sums.into_iter().map(Sum::moments).collect()
 }
 
-fn flush(moments: &mut Moments, batch: &mut Vec<f64>) {
-    let cols = moments.second.nrows();
-    let x = DMatrix::from_column_slice(cols, batch.len() / cols, batch);
-    moments.second.gemm(1.0, &x, &x.transpose(), 1.0);
-    moments.mean.iter_mut().zip(x.row_iter()).for_each(|(m, x)| *m += x.sum());
-    moments.count += x.ncols();
-    batch.clear();
+/// Sums over the inputs of a matrix.
+struct Sum {
+    second: Array2<f64>,
+    first: Vec<f64>,
+    count: usize,
+    /// Inputs that are not counted yet, one after the other.
+    batch: Vec<f64>,
+}
+
+impl Sum {
+    fn new(cols: usize) -> Self {
+        Self { second: Array2::zeros((cols, cols)), first: vec![0.0; cols], count: 0, batch: Vec::new() }
+    }
+
+    fn add(&mut self, x: &[f32]) {
+        self.batch.extend(x.iter().map(|&v| f64::from(v)));
+        if self.batch.len() >= BATCH * x.len() {
+            self.flush();
+        }
+    }
+
+    fn flush(&mut self) {
+        let cols = self.first.len();
+        let batch = std::mem::take(&mut self.batch);
+        self.count += batch.len() / cols;
+        let Ok(x) = Array2::from_shape_vec((batch.len() / cols, cols), batch) else { return };
+        add_product_parallel(x.t(), &Panels::of(x.view()), self.second.view_mut());
+        for row in x.rows() {
+            self.first.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
+        }
+    }
+
+    fn moments(mut self) -> Moments {
+        self.flush();
+        let count = self.count.max(1) as f64;
+        let cols = self.first.len();
+        Moments {
+            second: DMatrix::from_fn(cols, cols, |i, j| self.second[[i, j]] / count),
+            mean: self.first.iter().map(|sum| sum / count).collect(),
+            count: self.count,
+        }
+    }
 }
 
 /// Returns `E |(W' - W) x|^2 / E |W x|^2`, for white inputs without moments; 0 for a matrix whose output is always 0.

@@ -6,14 +6,13 @@
 //! the expectation of `g g'` is the sum over the outputs.
 
 use nalgebra::DMatrix;
-use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, Axis};
 
 use super::allowance::Allowance;
 use super::moments::Moments;
 use super::windows::Windows;
-use crate::graph::operation::See;
-use crate::graph::{Network, Weights, zero_state};
+use crate::gemm::{Panels, add_product_parallel};
+use crate::graph::{Factors, Network, zero_state};
 use crate::random::Random;
 
 /// Batches that `G` is averaged over, and samples in each.
@@ -35,13 +34,12 @@ pub fn output_moments(windows: &Windows, allowance: Option<Allowance>, seed: u64
     let mut random = Random::new(seed);
     let mut sums: Vec<Array2<f32>> = graph.matrices.iter().map(|m| Array2::zeros((m.rows, m.rows))).collect();
     let mut counts = vec![0usize; sums.len()];
-    let mut grads = windows.weights.zeros_like();
     let samples = (SAMPLES / windows.window.min(16)).max(4);
     let mut one = || {
-        probe(windows, samples, &mut random, &mut grads, &mut |m, _, dy| {
-            general_mat_mul(1.0, &dy.t(), dy, 1.0, &mut sums[m]);
-            counts[m] += dy.nrows();
-        });
+        for Factors { matrix, dy, .. } in probe(windows, samples, &mut random) {
+            add_moment(&dy, &mut sums[matrix]);
+            counts[matrix] += dy.nrows();
+        }
     };
     let batches = match allowance {
         Some(allowance) => allowance.fits(1, &mut one, LEAST_BATCHES, BATCHES),
@@ -55,9 +53,14 @@ pub fn output_moments(windows: &Windows, allowance: Option<Allowance>, seed: u64
     (sums.into_iter().zip(counts).map(mean).collect(), batches * samples)
 }
 
-/// Draws `samples` samples, and runs a random sign over the deviation of every output back through the network; `see`
-/// receives the products.
-fn probe(windows: &Windows, samples: usize, random: &mut Random, grads: &mut Weights, see: &mut See<'_>) {
+/// Adds `x' x`.
+fn add_moment(x: &Array2<f32>, sum: &mut Array2<f32>) {
+    add_product_parallel(x.t(), &Panels::of(x.view()), sum.view_mut());
+}
+
+/// Draws `samples` samples, and runs a random sign over the deviation of every output back through the network. Returns
+/// the factors at every matrix.
+fn probe(windows: &Windows, samples: usize, random: &mut Random) -> Vec<Factors> {
     let network = Network::new(&windows.graph);
     let batch = windows.batch(samples, None, random);
     let mut state = batch.state;
@@ -67,7 +70,7 @@ fn probe(windows: &Windows, samples: usize, random: &mut Random, grads: &mut Wei
         if variance > 0.0 { random.sign() / variance.sqrt() } else { 0.0 }
     });
     let mut d_state = zero_state(&windows.graph, samples);
-    network.backward(&windows.weights, &pass, signs, &mut d_state, grads, see);
+    network.backward(&windows.weights, pass, signs, &mut d_state).products
 }
 
 /// Returns the moments on both sides of every matrix over drawn batches: `E[x x']` with its mean, and `G`. The frames
@@ -76,10 +79,11 @@ pub fn drawn_moments(windows: &Windows, seed: u64) -> Vec<(Moments, DMatrix<f64>
     let graph = &windows.graph;
     let mut random = Random::new(seed);
     let mut sums: Vec<Drawn> = graph.matrices.iter().map(|m| Drawn::zeros(m.rows, m.cols)).collect();
-    let mut grads = windows.weights.zeros_like();
     let samples = (SAMPLES / windows.window).max(4);
     for _ in 0..(DRAWN / (samples * windows.window)).max(BATCHES) {
-        probe(windows, samples, &mut random, &mut grads, &mut |m, x, dy| sums[m].add(x, dy));
+        for Factors { matrix, x, dy } in probe(windows, samples, &mut random) {
+            sums[matrix].add(&x, &dy);
+        }
     }
     sums.into_iter().map(Drawn::mean).collect()
 }
@@ -103,8 +107,8 @@ impl Drawn {
     }
 
     fn add(&mut self, x: &Array2<f32>, dy: &Array2<f32>) {
-        general_mat_mul(1.0, &x.t(), x, 1.0, &mut self.input);
-        general_mat_mul(1.0, &dy.t(), dy, 1.0, &mut self.output);
+        add_moment(x, &mut self.input);
+        add_moment(dy, &mut self.output);
         self.inputs += &x.sum_axis(Axis(0));
         self.count += x.nrows();
     }

@@ -7,7 +7,7 @@ use super::nodes::Graph;
 use super::run::Network;
 use super::weights::{State, Weights, start_state};
 
-/// Evaluates a graph in f32, step by step, with its recurrent state. Sums run in order: the same bits on every machine.
+/// Evaluates a graph in f32, step by step, with its recurrent state.
 #[derive(Debug)]
 pub struct Evaluator<'g> {
     network: Network<'g>,
@@ -19,7 +19,7 @@ impl<'g> Evaluator<'g> {
     /// Makes an evaluator with the zero state.
     pub fn new(graph: &'g Graph) -> Self {
         let state = start_state(graph, &[None]);
-        Self { network: Network::in_order(graph), weights: Weights::of(graph), state }
+        Self { network: Network::new(graph), weights: Weights::of(graph), state }
     }
 
     /// Zeroes the recurrent state.

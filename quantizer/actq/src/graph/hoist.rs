@@ -50,7 +50,7 @@ pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denois
     let rows = Array2::from_shape_fn((times.len(), flat.obs_len), |(k, i)| {
         times[k].get(i.wrapping_sub(obs_len)).copied().unwrap_or(0.0)
     });
-    let pass = Network::in_order(flat).forward(&Weights::of(flat), rows, &mut zero_state(flat, times.len()));
+    let pass = Network::new(flat).forward(&Weights::of(flat), rows, &mut zero_state(flat, times.len()));
     let needs = needs(flat, obs_len, time_len)?;
     ensure!(needs[flat.output()] == Needs::Step, "the output does not depend on the iterate");
     let mut hoist = Hoist {

@@ -1,12 +1,14 @@
 //! The interface of an operation. Each operation implements it in its own file in [`super::ops`].
 
-use ndarray::{Array2, ArrayBase, ArrayView2, Data, Ix2, linalg::general_mat_mul};
+use ndarray::{Array2, ArrayView1, ArrayView2};
 
-use super::arrays::{Repeated, Sums, round_rows};
+use super::arrays::round_rows;
 use super::lowering::{BufferId, Lowering};
 use super::syntax::Syntax;
 use super::values::{ValueId, WeightMatrix};
+use super::weights::{Factors, Matrix};
 use crate::error::{Result, ensure};
+use crate::gemm::Panels;
 
 /// A matrix product inside an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +92,7 @@ pub trait Operation {
 
     /// Goes from the derivative `dy` of the loss by the output to those by the inputs and weights, which `run`
     /// receives. `d_state`, the derivative by the state after the step, becomes that by the state before it.
-    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, d_state: &mut NodeState);
+    fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, d_state: &mut NodeState);
 
     /// Appends its operations over the values `inputs`, and returns the buffer that then holds its output of `len`
     /// values.
@@ -140,7 +142,7 @@ pub struct Forward<'a> {
     /// Indices of the node's inputs.
     pub(super) inputs: &'a [ValueId],
     /// The graph's matrices.
-    pub(super) matrices: &'a [Array2<f32>],
+    pub(super) matrices: &'a [Matrix],
     /// As [`Operation::vectors`].
     pub vectors: &'a [Vec<f32>],
     /// Value that the network reads of the iterate; `None` outside of denoising steps.
@@ -149,8 +151,6 @@ pub struct Forward<'a> {
     pub step: usize,
     /// Activation magnitude of every matrix; empty: activations are not rounded.
     pub(super) x_max: &'a [u16],
-    /// Order of sums.
-    pub sums: Sums,
 }
 
 impl<'a> Forward<'a> {
@@ -182,17 +182,17 @@ impl<'a> Forward<'a> {
 
     /// Computes `W x` plus a vector.
     pub fn affine(&self, matrix: usize, x: &Array2<f32>, vector: usize) -> Array2<f32> {
-        self.sums.affine(x, &self.matrices[matrix], &self.vectors[vector])
+        let mut y = Array2::zeros((x.nrows(), self.vectors[vector].len()));
+        y += &ArrayView1::from(&self.vectors[vector]);
+        self.matrices[matrix].add_product(x, y.view_mut());
+        y
     }
 
-    /// Prepares a matrix for many products with few rows each.
-    pub fn repeated(&self, matrix: usize) -> Repeated<'a> {
-        self.sums.repeated(&self.matrices[matrix])
+    /// Returns a matrix, for products with a state.
+    pub fn matrix(&self, matrix: usize) -> &'a Matrix {
+        &self.matrices[matrix]
     }
 }
-
-/// Callback for a matrix product: matrix, operand, derivative by the output.
-pub type See<'a> = dyn FnMut(usize, &Array2<f32>, &Array2<f32>) + 'a;
 
 /// Context of a node in a backward pass, and the destination of derivatives.
 pub struct Backward<'a> {
@@ -203,7 +203,7 @@ pub struct Backward<'a> {
     /// Indices of the node's inputs.
     pub(super) inputs: &'a [ValueId],
     /// The graph's matrices.
-    pub(super) matrices: &'a [Array2<f32>],
+    pub(super) matrices: &'a [Matrix],
     /// As [`Operation::vectors`].
     pub vectors: &'a [Vec<f32>],
     /// Number of the denoising step.
@@ -212,12 +212,10 @@ pub struct Backward<'a> {
     pub(super) d_iterate: &'a mut Option<Array2<f32>>,
     /// Derivatives by all values, as far as they are known.
     pub(super) d_values: &'a mut [Option<Array2<f32>>],
-    /// Derivatives by the matrices.
-    pub(super) d_matrices: &'a mut [Array2<f32>],
     /// Derivatives by [`Operation::vectors`]; nodes add to them.
     pub d_vectors: &'a mut [Vec<f32>],
-    /// Callback that receives every matrix product.
-    pub(super) see: &'a mut See<'a>,
+    /// Factors of the derivatives by the matrices.
+    pub(super) products: &'a mut Vec<Factors>,
 }
 
 impl<'a> Backward<'a> {
@@ -247,21 +245,20 @@ impl<'a> Backward<'a> {
         }
     }
 
-    /// Receives the derivative `dy` by the output of a product, and adds that by its matrix, whose operand was `x`.
-    pub fn product(&mut self, matrix: usize, x: &Array2<f32>, dy: &Array2<f32>) {
-        (self.see)(matrix, x, dy);
-        general_mat_mul(1.0, &dy.t(), x, 1.0, &mut self.d_matrices[matrix]);
+    /// Receives the derivative `dy` by the output of a product, whose operand was `x`.
+    pub fn product(&mut self, matrix: usize, x: Array2<f32>, dy: Array2<f32>) {
+        self.products.push(Factors { matrix, x, dy });
     }
 
-    /// Returns the derivative by the operand of a matrix, from that by its output.
-    pub fn through<S: Data<Elem = f32>>(&self, matrix: usize, dy: &ArrayBase<S, Ix2>) -> Array2<f32> {
-        dy.dot(&self.matrices[matrix])
+    /// Prepares a matrix for products with derivatives by its output, which give those by its operand.
+    pub(super) fn back(&self, matrix: usize) -> Panels {
+        self.matrices[matrix].back()
     }
 
-    /// Gives [`Self::through`] to an input. The observation's derivative is never needed.
+    /// Gives the derivative by a matrix's operand to an input. The observation's derivative is never needed.
     pub fn give_through(&mut self, i: usize, matrix: usize, dy: &Array2<f32>) {
         if self.inputs[i] != 0 {
-            self.give(i, self.through(matrix, dy));
+            self.give(i, self.back(matrix).product(dy.view()));
         }
     }
 }

@@ -8,11 +8,10 @@ use std::ops::Range;
 
 use ndarray::{Array2, s};
 
-use super::arrays::Sums;
 use super::denoising::Iterates;
 use super::nodes::Graph;
-use super::operation::{Backward, Forward, Saved, See, Values};
-use super::weights::{State, Weights};
+use super::operation::{Backward, Forward, Saved, Values};
+use super::weights::{Derivatives, State, Weights};
 
 /// Values of a forward pass.
 #[derive(Debug)]
@@ -64,23 +63,17 @@ pub struct Network<'a> {
     pub graph: &'a Graph,
     /// Activation magnitude that each matrix's input is rounded to (0 = no rounding), or empty.
     x_max: &'a [u16],
-    sums: Sums,
 }
 
 impl<'a> Network<'a> {
-    /// Computes with sums in blocks and no rounding: for batches.
+    /// Computes without rounding.
     pub fn new(graph: &'a Graph) -> Self {
-        Self { graph, x_max: &[], sums: Sums::Blocked }
+        Self { graph, x_max: &[] }
     }
 
     /// As [`Self::new`], but rounds each matrix's input to this activation magnitude.
     pub fn rounded(graph: &'a Graph, x_max: &'a [u16]) -> Self {
-        Self { x_max, ..Self::new(graph) }
-    }
-
-    /// As [`Self::new`], but with sums in order.
-    pub fn in_order(graph: &'a Graph) -> Self {
-        Self { sums: Sums::InOrder, ..Self::new(graph) }
+        Self { graph, x_max }
     }
 
     /// Runs one or more steps for a batch of observations, whose size is that of `state`, which advances. For an
@@ -143,7 +136,6 @@ impl<'a> Network<'a> {
                 iterate: step.map(|of| of.iterate),
                 step: step.map_or(0, |of| of.step),
                 x_max: self.x_max,
-                sums: self.sums,
             };
             let (y, keep) = node.kind.forward(&run, &mut state[i]);
             values.push(y);
@@ -163,58 +155,52 @@ impl<'a> Network<'a> {
     }
 
     /// Goes back through a pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state
-    /// after the pass, becomes that by the state before it. The derivatives by the weights are added to `grads`. `see`
-    /// receives every matrix product.
-    pub fn backward(
-        &self,
-        weights: &Weights,
-        pass: &Pass,
-        d_output: Array2<f32>,
-        d_state: &mut State,
-        grads: &mut Weights,
-        see: &mut See<'_>,
-    ) {
+    /// after the pass, becomes that by the state before it. Returns the derivatives by the weights.
+    pub fn backward(&self, weights: &Weights, pass: Pass, d_output: Array2<f32>, d_state: &mut State) -> Derivatives {
         let nodes = self.graph.nodes.len();
+        let mut derivatives = Derivatives { products: Vec::new(), vectors: weights.zero_vectors() };
         let mut d_values: Vec<Option<Array2<f32>>> = vec![None; nodes + 1];
+        let Pass { values, saved, steps, .. } = pass;
+        let mut back = Back { network: self, weights, d_values: &mut d_values, d_state, to: &mut derivatives };
+        let once = Values { once: &values, of_step: &[] };
         let Some(denoising) = &self.graph.denoising else {
-            d_values[nodes] = Some(d_output);
-            self.back(weights, pass, None, &mut d_values, d_state, grads, see);
-            return;
+            back.d_values[nodes] = Some(d_output);
+            back.through(0, once, saved, 0);
+            return derivatives;
         };
         let mut d = Iterates { y: Array2::zeros(d_output.raw_dim()), x: d_output };
-        for (step, of_step) in pass.steps.iter().enumerate().rev() {
+        for (step, of_step) in steps.into_iter().enumerate().rev() {
             let v = &of_step.values[of_step.values.len() - 1];
             let (dx, dv) = denoising.back(step, &of_step.at, v, d);
-            d_values[nodes] = Some(dv);
-            let dy = self.back(weights, pass, Some(step), &mut d_values, d_state, grads, see);
+            back.d_values[nodes] = Some(dv);
+            let values = Values { once: &values, of_step: &of_step.values };
+            let dy = back.through(denoising.first, values, of_step.saved, step);
             d = Iterates { y: dy.unwrap_or_else(|| Array2::zeros(dx.raw_dim())), x: dx };
         }
-        self.back(weights, pass, None, &mut d_values, d_state, grads, see);
+        back.through(0, once, saved, 0);
+        derivatives
     }
+}
 
-    /// Goes back through the nodes of a denoising step, or through those that run one time; returns the derivative by
-    /// the value that the network reads of the iterate.
-    #[expect(clippy::too_many_arguments, reason = "those of `backward`")]
-    fn back(
-        &self,
-        weights: &Weights,
-        pass: &Pass,
-        step: Option<usize>,
-        d_values: &mut [Option<Array2<f32>>],
-        d_state: &mut State,
-        grads: &mut Weights,
-        see: &mut See<'_>,
-    ) -> Option<Array2<f32>> {
-        let first = self.graph.denoising.as_ref().map_or(self.graph.nodes.len(), |denoising| denoising.first);
-        let (nodes, of_step, saved) = match step.map(|step| &pass.steps[step]) {
-            Some(of_step) => (first..self.graph.nodes.len(), &of_step.values[..], &of_step.saved),
-            None => (0..first, &[][..], &pass.saved),
-        };
-        let values = Values { once: &pass.values, of_step };
+/// A backward pass.
+struct Back<'a, 'n> {
+    network: &'a Network<'n>,
+    weights: &'a Weights,
+    /// Derivatives by all values, as far as they are known.
+    d_values: &'a mut [Option<Array2<f32>>],
+    d_state: &'a mut State,
+    to: &'a mut Derivatives,
+}
+
+impl Back<'_, '_> {
+    /// Goes back through the nodes from `first` on: those of a denoising step, or those that run one time. Returns the
+    /// derivative by the value that the network reads of the iterate.
+    fn through(&mut self, first: usize, values: Values<'_>, saved: Vec<Saved>, step: usize) -> Option<Array2<f32>> {
         let mut d_iterate = None;
-        for (i, saved) in nodes.zip(saved).rev() {
-            let node = &self.graph.nodes[i];
-            let dy = match d_values[i + 1].take() {
+        let Derivatives { products, vectors } = &mut *self.to;
+        for (i, saved) in saved.into_iter().enumerate().rev().map(|(i, saved)| (first + i, saved)) {
+            let node = &self.network.graph.nodes[i];
+            let dy = match self.d_values[i + 1].take() {
                 Some(dy) => dy,
                 // A later step's use of the state still counts.
                 None if node.kind.state_lens() != [0, 0] => Array2::zeros(values.of(i + 1).raw_dim()),
@@ -224,16 +210,15 @@ impl<'a> Network<'a> {
                 node: i,
                 values,
                 inputs: &node.inputs,
-                matrices: &weights.matrices,
-                vectors: &weights.vectors[i],
-                step: step.unwrap_or(0),
+                matrices: &self.weights.matrices,
+                vectors: &self.weights.vectors[i],
+                step,
                 d_iterate: &mut d_iterate,
-                d_values,
-                d_matrices: &mut grads.matrices,
-                d_vectors: &mut grads.vectors[i],
-                see,
+                d_values: self.d_values,
+                products,
+                d_vectors: &mut vectors[i],
             };
-            node.kind.backward(&mut run, saved, dy, &mut d_state[i]);
+            node.kind.backward(&mut run, saved, dy, &mut self.d_state[i]);
         }
         d_iterate
     }
@@ -251,7 +236,7 @@ pub(super) mod tests {
     };
     use crate::graph::ops::{Iterate, Table};
     use crate::graph::values::{ValueId, WeightMatrix};
-    use crate::graph::weights::zero_state;
+    use crate::graph::weights::{Vectors, zero_state};
     use crate::random::Random;
 
     fn random(len: usize, seed: &mut Random) -> Vec<f32> {
@@ -339,19 +324,18 @@ pub(super) mod tests {
         sum
     }
 
-    fn gradient(graph: &Graph, weights: &Weights) -> Weights {
+    fn gradient(graph: &Graph, weights: &Weights) -> (Vec<Array2<f32>>, Vectors) {
         let network = Network::new(graph);
         let mut state = zero_state(graph, 2);
         let passes: Vec<Pass> =
             observations().into_iter().map(|obs| network.forward(weights, obs, &mut state)).collect();
-        let mut grads = weights.zeros_like();
         let mut d_state = zero_state(graph, 2);
-        for (t, pass) in passes.iter().enumerate().rev() {
+        let back = |(t, pass): (usize, Pass)| {
             let cols = pass.output().ncols();
             let d = Array2::from_shape_fn(pass.output().raw_dim(), |(r, c)| (1 + r * cols + c + t) as f32);
-            network.backward(weights, pass, d, &mut d_state, &mut grads, &mut |_, _, _| {});
-        }
-        grads
+            network.backward(weights, pass, d, &mut d_state)
+        };
+        Derivatives::sum(graph, passes.into_iter().enumerate().rev().map(back).collect())
     }
 
     #[test]
@@ -366,7 +350,7 @@ pub(super) mod tests {
 
     fn derivatives_are_right(graph: &Graph) {
         let weights = Weights::of(graph);
-        let grads = gradient(graph, &weights);
+        let (matrices, vectors) = gradient(graph, &weights);
         let step = 2e-3;
         let compare = |exact: f32, change: &dyn Fn(&mut Weights, f32)| {
             let at = |d: f32| {
@@ -378,16 +362,15 @@ pub(super) mod tests {
             let error = (numeric - f64::from(exact)).abs();
             assert!(error < 0.02 + 0.02 * numeric.abs(), "{numeric} against {exact}");
         };
-        for m in 0..weights.matrices.len() {
-            for i in 0..weights.matrices[m].len() {
-                let at = (i / weights.matrices[m].ncols(), i % weights.matrices[m].ncols());
-                compare(grads.matrices[m][at], &|w, d| w.matrices[m][at] += d);
+        for (m, derivatives) in matrices.iter().enumerate() {
+            for (i, exact) in derivatives.iter().enumerate() {
+                compare(*exact, &|w, d| w.matrices[m].set(|values| values[i] += d));
             }
         }
         for v in 0..weights.vectors.len() {
             for k in 0..weights.vectors[v].len() {
                 for i in 0..weights.vectors[v][k].len() {
-                    compare(grads.vectors[v][k][i], &|w, d| w.vectors[v][k][i] += d);
+                    compare(vectors[v][k][i], &|w, d| w.vectors[v][k][i] += d);
                 }
             }
         }

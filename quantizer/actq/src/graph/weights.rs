@@ -1,48 +1,73 @@
 //! The parts of a network that change while it learns or runs: weights and recurrent state.
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayViewMut2};
 use rayon::prelude::*;
 
 use super::nodes::Graph;
 use super::operation::NodeState;
 use super::values::WeightMatrix;
+use crate::gemm::{Panels, add_product, add_product_parallel};
 
-/// All learnable values: the matrices of a graph and the vectors of its nodes. Gradients have the same form.
+/// A matrix of weights, `[row, column]`, with its panels for products.
+#[derive(Clone, Debug)]
+pub struct Matrix {
+    values: Array2<f32>,
+    panels: Panels,
+}
+
+impl Matrix {
+    fn of(matrix: &WeightMatrix) -> Self {
+        let values = Array2::from_shape_fn((matrix.rows, matrix.cols), |(r, c)| matrix.data[r * matrix.cols + c]);
+        Self { panels: Panels::transposed(values.view()), values }
+    }
+
+    /// Returns the weights.
+    pub fn values(&self) -> &Array2<f32> {
+        &self.values
+    }
+
+    /// Changes the weights, row by row.
+    pub fn set(&mut self, change: impl FnOnce(&mut [f32])) {
+        change(self.values.as_slice_mut().unwrap_or_default());
+        self.panels.refill(self.values.view());
+    }
+
+    /// Adds `x W'` to `y`.
+    pub(super) fn add_product(&self, x: &Array2<f32>, y: ArrayViewMut2<'_, f32>) {
+        add_product(x.view(), &self.panels, y);
+    }
+
+    /// Packs the weights for products `dy W`.
+    pub(super) fn back(&self) -> Panels {
+        Panels::of(self.values.view())
+    }
+}
+
+/// Vectors of every node, as [`super::operation::Operation::vectors`], or derivatives by them.
+pub type Vectors = Vec<Vec<Vec<f32>>>;
+
+/// All learnable values: the matrices of a graph and the vectors of its nodes.
 #[derive(Clone, Debug)]
 pub struct Weights {
-    /// Matrices as in [`Graph::matrices`], `[rows, cols]`.
-    pub matrices: Vec<Array2<f32>>,
-    /// [`super::operation::Operation::vectors`] of each node.
-    pub vectors: Vec<Vec<Vec<f32>>>,
+    /// Matrices as in [`Graph::matrices`].
+    pub matrices: Vec<Matrix>,
+    /// Vectors of the nodes.
+    pub vectors: Vectors,
 }
 
 impl Weights {
     /// Copies the weights of a graph.
     pub fn of(graph: &Graph) -> Self {
-        let array = |m: &WeightMatrix| Array2::from_shape_fn((m.rows, m.cols), |(r, c)| m.data[r * m.cols + c]);
         Self {
-            matrices: graph.matrices.iter().map(array).collect(),
+            matrices: graph.matrices.iter().map(Matrix::of).collect(),
             vectors: graph.nodes.iter().map(|n| n.kind.vectors().into_iter().cloned().collect()).collect(),
         }
     }
 
-    /// Returns zeros of the same form.
-    pub fn zeros_like(&self) -> Self {
+    /// Returns zeros in the form of the vectors.
+    pub(super) fn zero_vectors(&self) -> Vectors {
         let zeros = |vectors: &Vec<Vec<f32>>| vectors.iter().map(|v| vec![0.0; v.len()]).collect();
-        Self {
-            matrices: self.matrices.iter().map(|m| Array2::zeros(m.raw_dim())).collect(),
-            vectors: self.vectors.iter().map(zeros).collect(),
-        }
-    }
-
-    /// Adds another set, element by element.
-    pub fn sum(mut self, other: Self) -> Self {
-        for (a, b) in self.matrices.iter_mut().zip(&other.matrices) {
-            let (a, b) = (a.as_slice_mut().unwrap_or_default(), b.as_slice().unwrap_or_default());
-            a.par_chunks_mut(CHUNK).zip(b.par_chunks(CHUNK)).for_each(|(a, b)| add(a, b));
-        }
-        self.vectors.iter_mut().flatten().zip(other.vectors.iter().flatten()).for_each(|(a, b)| add(a, b));
-        self
+        self.vectors.iter().map(zeros).collect()
     }
 
     /// Stores the vectors in a graph's nodes.
@@ -53,11 +78,46 @@ impl Weights {
     }
 }
 
-/// Elements that a thread adds at one time.
-const CHUNK: usize = 1 << 14;
+/// The derivative of a loss by a matrix, as the product of its factors: `dy' x`.
+#[derive(Debug)]
+pub struct Factors {
+    /// Index of the matrix.
+    pub matrix: usize,
+    /// Operand of the product, `[sample, column]`.
+    pub x: Array2<f32>,
+    /// Derivative by the product, `[sample, row]`.
+    pub dy: Array2<f32>,
+}
 
-fn add(to: &mut [f32], from: &[f32]) {
-    to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
+/// Derivatives of a loss by all weights.
+#[derive(Debug)]
+pub struct Derivatives {
+    /// Factors of those by the matrices, one for every product.
+    pub products: Vec<Factors>,
+    /// Derivatives by the vectors.
+    pub vectors: Vectors,
+}
+
+impl Derivatives {
+    /// Returns the sums of several derivatives: those by the matrices `[row, column]`, and those by the vectors.
+    pub fn sum(graph: &Graph, all: Vec<Self>) -> (Vec<Array2<f32>>, Vectors) {
+        let of_matrix = |(m, matrix): (usize, &WeightMatrix)| {
+            let factors: Vec<&Factors> = all.iter().flat_map(|d| &d.products).filter(|f| f.matrix == m).collect();
+            let panels: Vec<Panels> = factors.par_iter().map(|factors| Panels::of(factors.x.view())).collect();
+            let mut sum = Array2::zeros((matrix.rows, matrix.cols));
+            for (factors, panels) in factors.iter().zip(&panels) {
+                add_product_parallel(factors.dy.t(), panels, sum.view_mut());
+            }
+            sum
+        };
+        let matrices = graph.matrices.iter().enumerate().map(of_matrix).collect();
+        let vectors = all.into_iter().map(|d| d.vectors).reduce(|mut sum, vectors| {
+            let pairs = sum.iter_mut().flatten().zip(vectors.iter().flatten());
+            pairs.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to += from));
+            sum
+        });
+        (matrices, vectors.unwrap_or_default())
+    }
 }
 
 /// Recurrent state of every node.

@@ -10,6 +10,7 @@ pub mod compact;
 pub mod dimension;
 pub mod feedback;
 mod latent;
+mod lessons;
 mod objective;
 pub mod schedule;
 pub mod size;

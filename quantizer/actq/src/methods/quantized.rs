@@ -87,7 +87,7 @@ impl Quantized {
 pub(super) fn dequantized(graph: &Graph, quantized: &[Quantized]) -> Weights {
     let mut weights = Weights::of(graph);
     for (weights, quantized) in weights.matrices.iter_mut().zip(quantized) {
-        weights.iter_mut().zip(quantized.dequantized()).for_each(|(w, q)| *w = q);
+        weights.set(|values| values.copy_from_slice(&quantized.dequantized()));
     }
     weights
 }

@@ -27,7 +27,7 @@ impl Operation for Add {
         (run.input(0) + run.input(1), Saved::default())
     }
 
-    fn backward(&self, run: &mut Backward<'_>, _: &Saved, dy: Array2<f32>, _: &mut NodeState) {
+    fn backward(&self, run: &mut Backward<'_>, _: Saved, dy: Array2<f32>, _: &mut NodeState) {
         run.give(1, dy.clone());
         run.give(0, dy);
     }

@@ -38,7 +38,7 @@ impl Operation for Concat {
         (joined.as_standard_layout().into_owned(), Saved::default())
     }
 
-    fn backward(&self, run: &mut Backward<'_>, _: &Saved, dy: Array2<f32>, _: &mut NodeState) {
+    fn backward(&self, run: &mut Backward<'_>, _: Saved, dy: Array2<f32>, _: &mut NodeState) {
         let mut from = 0;
         for (i, span) in self.0.iter().enumerate() {
             let mut d = Array2::zeros(run.input(i).raw_dim());

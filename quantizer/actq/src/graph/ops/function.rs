@@ -1,13 +1,14 @@
 use actq_kernels::image::OpKind;
 use actq_kernels::math::{self, Function};
-use ndarray::{Array2, Zip};
+use ndarray::Array2;
 
 use crate::error::{Context, Result, bail};
-use crate::graph::arrays::contiguous_mut;
+use crate::graph::arrays::{contiguous, contiguous_mut};
 use crate::graph::lowering::{BufferId, Lowering, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved, only};
 use crate::graph::syntax::{Keys, Syntax};
 use crate::graph::values::{ValueId, WeightMatrix};
+use crate::simd::wide;
 
 /// A function of every element.
 #[derive(Clone, Copy, Debug)]
@@ -34,14 +35,23 @@ impl Operation for Pointwise {
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
         let mut y = run.input(0).clone();
         for mut row in y.rows_mut() {
-            self.0.apply(contiguous_mut(&mut row));
+            let row = contiguous_mut(&mut row);
+            wide(
+                #[inline(always)]
+                || apply(self.0, row),
+            );
         }
         (y, Saved::default())
     }
 
-    fn backward(&self, run: &mut Backward<'_>, _: &Saved, mut dy: Array2<f32>, _: &mut NodeState) {
-        let derivative = derivative(self.0);
-        Zip::from(&mut dy).and(run.input(0)).and(run.output()).for_each(|d, &x, &y| *d *= derivative(x, y));
+    fn backward(&self, run: &mut Backward<'_>, _: Saved, mut dy: Array2<f32>, _: &mut NodeState) {
+        for ((mut dy, x), y) in dy.rows_mut().into_iter().zip(run.input(0).rows()).zip(run.output().rows()) {
+            let (dy, x, y) = (contiguous_mut(&mut dy), contiguous(&x), contiguous(&y));
+            wide(
+                #[inline(always)]
+                || back(self.0, dy, x, y),
+            );
+        }
         run.give(0, dy);
     }
 
@@ -50,34 +60,67 @@ impl Operation for Pointwise {
     }
 }
 
-/// Returns the derivative of a function at `x` with the value `y`.
-fn derivative(function: Function) -> fn(f32, f32) -> f32 {
+/// Applies a function to every element, as [`Function::apply`] does, with a loop of its own for each, which the compiler
+/// can compile for wide vectors.
+#[inline(always)]
+fn apply(function: Function, x: &mut [f32]) {
     match function {
-        Function::Relu => |x, _| if x > 0.0 { 1.0 } else { 0.0 },
-        Function::Elu => |x, y| if x > 0.0 { 1.0 } else { y + 1.0 },
-        Function::Silu => |x, y| {
+        Function::Relu => each(x, math::relu),
+        Function::Elu => each(x, math::elu),
+        Function::Silu => each(x, math::silu),
+        Function::Gelu => each(x, math::gelu),
+        Function::GeluTanh => each(x, math::gelu_tanh),
+        Function::Tanh => each(x, math::tanh),
+        Function::Sigmoid => each(x, math::sigmoid),
+        Function::Exp => each(x, math::exp),
+        Function::Sin => each(x, math::sin),
+        Function::Cos => each(x, math::cos),
+        Function::Softplus => each(x, math::softplus),
+        Function::Mish => each(x, math::mish),
+    }
+}
+
+#[inline(always)]
+fn each(x: &mut [f32], function: impl Fn(f32) -> f32) {
+    x.iter_mut().for_each(|x| *x = function(*x));
+}
+
+/// Multiplies `d` by the derivative of a function at `x` with the values `y`.
+#[inline(always)]
+fn back(function: Function, d: &mut [f32], x: &[f32], y: &[f32]) {
+    match function {
+        Function::Relu => times(d, x, y, |x, _| if x > 0.0 { 1.0 } else { 0.0 }),
+        Function::Elu => times(d, x, y, |x, y| if x > 0.0 { 1.0 } else { y + 1.0 }),
+        Function::Silu => times(d, x, y, |x, y| {
             let s = math::sigmoid(x);
             s + y * (1.0 - s)
-        },
-        Function::Gelu => |x, y| {
+        }),
+        Function::Gelu => times(d, x, y, |x, y| {
             // Phi(x) + x phi(x); Phi is y / x away from zero.
             let phi = 0.398_942_3 * math::exp(-0.5 * x * x);
             let cumulative = if x.abs() > 1e-2 { y / x } else { 0.5 + 0.398_942_3 * x };
             cumulative + x * phi
-        },
-        Function::GeluTanh => |x, y| {
+        }),
+        Function::GeluTanh => times(d, x, y, |x, y| {
             let s = math::sigmoid(1.595_769 * (x + 0.044_715 * x * x * x));
             s + y * (1.0 - s) * 1.595_769 * (1.0 + 0.134_145 * x * x)
-        },
-        Function::Tanh => |_, y| 1.0 - y * y,
-        Function::Sigmoid => |_, y| y * (1.0 - y),
-        Function::Exp => |_, y| y,
-        Function::Sin => |x, _| math::cos(x),
-        Function::Cos => |x, _| -math::sin(x),
-        Function::Softplus => |x, _| math::sigmoid(x),
-        Function::Mish => |x, _| {
+        }),
+        Function::Tanh => times(d, x, y, |_, y| 1.0 - y * y),
+        Function::Sigmoid => times(d, x, y, |_, y| y * (1.0 - y)),
+        Function::Exp => times(d, x, y, |_, y| y),
+        Function::Sin => times(d, x, y, |x, _| math::cos(x)),
+        Function::Cos => times(d, x, y, |x, _| -math::sin(x)),
+        Function::Softplus => times(d, x, y, |x, _| math::sigmoid(x)),
+        Function::Mish => times(d, x, y, |x, _| {
             let t = math::tanh(math::softplus(x));
             t + x * (1.0 - t * t) * math::sigmoid(x)
-        },
+        }),
+    }
+}
+
+#[inline(always)]
+fn times(d: &mut [f32], x: &[f32], y: &[f32], derivative: impl Fn(f32, f32) -> f32) {
+    for (d, (x, y)) in d.iter_mut().zip(x.iter().zip(y)) {
+        *d *= derivative(*x, *y);
     }
 }

@@ -67,7 +67,7 @@ impl Operation for Gru {
         let batch = h.nrows();
         let x = run.operand(self.input, run.input(0).view());
         let a = run.affine(self.input, &x, 0);
-        let state = run.repeated(self.state);
+        let state = run.matrix(self.state);
         let mut b = Array2::from_shape_fn(a.raw_dim(), |(_, row)| run.vectors[1][row]);
         let before = Array2::zeros((x.nrows(), self.hidden));
         let [mut before, mut h_before, mut y] = [before.clone(), before.clone(), before];
@@ -86,8 +86,9 @@ impl Operation for Gru {
         (y, Saved { operands: vec![x, before], inner: vec![h_before, a, b] })
     }
 
-    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, [d_h, _]: &mut NodeState) {
-        let [h_before, a, b] = &saved.inner[..] else { return };
+    fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, [d_h, _]: &mut NodeState) {
+        let (Ok([x, before]), [h_before, a, b]) = (<[_; 2]>::try_from(saved.operands), &saved.inner[..]) else { return };
+        let back = run.back(self.state);
         let batch = d_h.nrows();
         let (mut d_a, mut d_b) = (Array2::zeros(a.raw_dim()), Array2::zeros(b.raw_dim()));
         for step in (0..dy.nrows() / batch).rev() {
@@ -108,13 +109,13 @@ impl Operation for Gru {
                     d_h[[sample, k]] = dh * z;
                 }
             }
-            *d_h += &run.through(self.state, &rows(&d_b, step_rows(step, batch)));
+            *d_h += &back.product(rows(&d_b, step_rows(step, batch)));
         }
-        run.product(self.input, &saved.operands[0], &d_a);
-        run.product(self.state, &saved.operands[1], &d_b);
         sum_rows(&d_a, &mut run.d_vectors[0]);
         sum_rows(&d_b, &mut run.d_vectors[1]);
         run.give_through(0, self.input, &d_a);
+        run.product(self.input, x, d_a);
+        run.product(self.state, before, d_b);
     }
 
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], _: usize) -> BufferId {

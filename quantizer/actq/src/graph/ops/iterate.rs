@@ -22,7 +22,7 @@ impl Operation for Iterate {
         (run.iterate().clone(), Saved::default())
     }
 
-    fn backward(&self, run: &mut Backward<'_>, _: &Saved, dy: Array2<f32>, _: &mut NodeState) {
+    fn backward(&self, run: &mut Backward<'_>, _: Saved, dy: Array2<f32>, _: &mut NodeState) {
         run.give_iterate(dy);
     }
 

@@ -49,10 +49,11 @@ impl Operation for Linear {
         (y, Saved { operands: vec![x], ..Saved::default() })
     }
 
-    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, _: &mut NodeState) {
-        run.product(self.matrix, &saved.operands[0], &dy);
+    fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, _: &mut NodeState) {
+        let Ok([x]) = <[_; 1]>::try_from(saved.operands) else { return };
         sum_rows(&dy, &mut run.d_vectors[0]);
         run.give_through(0, self.matrix, &dy);
+        run.product(self.matrix, x, dy);
     }
 
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {

@@ -12,6 +12,7 @@ use crate::graph::operation::{
 };
 use crate::graph::syntax::{Keys, Syntax};
 use crate::graph::values::{ValueId, WeightMatrix};
+use crate::simd::wide;
 
 /// torch's LSTM of one layer, one step; gates `[i f g o]`.
 #[derive(Clone, Debug)]
@@ -71,7 +72,7 @@ impl Operation for Lstm {
         let batch = h.nrows();
         let x = run.operand(self.input, run.input(0).view());
         let mut gates = run.affine(self.input, &x, 0);
-        let state = run.repeated(self.state);
+        let state = run.matrix(self.state);
         let before = Array2::zeros((x.nrows(), self.hidden));
         let [mut before, mut c_before, mut y] = [before.clone(), before.clone(), before];
         for step in 0..x.nrows() / batch {
@@ -89,8 +90,9 @@ impl Operation for Lstm {
         (y, Saved { operands: vec![x, before], inner: vec![c_before, gates] })
     }
 
-    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, [d_h, d_c]: &mut NodeState) {
-        let [c_before, gates] = &saved.inner[..] else { return };
+    fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, [d_h, d_c]: &mut NodeState) {
+        let (Ok([x, before]), [c_before, gates]) = (<[_; 2]>::try_from(saved.operands), &saved.inner[..]) else { return };
+        let back = run.back(self.state);
         let batch = d_h.nrows();
         let mut d_gates = Array2::zeros(gates.raw_dim());
         for step in (0..dy.nrows() / batch).rev() {
@@ -100,20 +102,19 @@ impl Operation for Lstm {
                 let d_h = d_h.row(sample);
                 let dh: Vec<f32> = contiguous(&dy).iter().zip(contiguous(&d_h)).map(|(a, b)| a + b).collect();
                 let (gates, c_before) = (gates.row(row), c_before.row(row));
-                derivative(
-                    contiguous(&gates),
-                    contiguous(&c_before),
-                    &dh,
-                    contiguous_mut(&mut d_gates),
-                    contiguous_mut(&mut d_c),
+                let (gates, c_before) = (contiguous(&gates), contiguous(&c_before));
+                let (d_gates, d_c) = (contiguous_mut(&mut d_gates), contiguous_mut(&mut d_c));
+                wide(
+                    #[inline(always)]
+                    || derivative(gates, c_before, &dh, d_gates, d_c),
                 );
             }
-            *d_h = run.through(self.state, &rows(&d_gates, step_rows(step, batch)));
+            *d_h = back.product(rows(&d_gates, step_rows(step, batch)));
         }
-        run.product(self.input, &saved.operands[0], &d_gates);
-        run.product(self.state, &saved.operands[1], &d_gates);
         sum_rows(&d_gates, &mut run.d_vectors[0]);
         run.give_through(0, self.input, &d_gates);
+        run.product(self.input, x, d_gates.clone());
+        run.product(self.state, before, d_gates);
     }
 
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], _: usize) -> BufferId {
@@ -129,6 +130,7 @@ impl Operation for Lstm {
 
 /// Computes the derivatives of one cell from those by its hidden state `d_h` and by its new cell state `d_c`; `d_c`
 /// becomes the derivative by the previous cell state.
+#[inline(always)]
 fn derivative(gates: &[f32], c_before: &[f32], d_h: &[f32], d_gates: &mut [f32], d_c: &mut [f32]) {
     let n = d_h.len();
     let ([i, f, g, o], [d_i, d_f, d_g, d_o]) = (quarters(gates, n), quarters_mut(d_gates, n));

@@ -27,7 +27,7 @@ impl Operation for Mul {
         (run.input(0) * run.input(1), Saved::default())
     }
 
-    fn backward(&self, run: &mut Backward<'_>, _: &Saved, dy: Array2<f32>, _: &mut NodeState) {
+    fn backward(&self, run: &mut Backward<'_>, _: Saved, dy: Array2<f32>, _: &mut NodeState) {
         let (x, y) = (run.input(0), run.input(1));
         run.give(1, &dy * x);
         run.give(0, dy * y);

@@ -55,9 +55,9 @@ impl Operation for LayerNorm {
         normalized(run, self.eps, true)
     }
 
-    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, _: &mut NodeState) {
+    fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, _: &mut NodeState) {
         sum_rows(&dy, &mut run.d_vectors[1]);
-        back(run, saved, dy, true);
+        back(run, &saved, dy, true);
     }
 
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], _: usize) -> BufferId {
@@ -89,8 +89,8 @@ impl Operation for RmsNorm {
         normalized(run, self.eps, false)
     }
 
-    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, _: &mut NodeState) {
-        back(run, saved, dy, false);
+    fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, _: &mut NodeState) {
+        back(run, &saved, dy, false);
     }
 
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], _: usize) -> BufferId {
@@ -108,7 +108,7 @@ fn normalized(run: &Forward<'_>, eps: f32, centred: bool) -> (Array2<f32>, Saved
     let rows = hat.rows_mut().into_iter().zip(y.rows_mut()).zip(&mut inverses);
     for ((mut hat, mut y), inverse) in rows {
         let n = hat.len() as f32;
-        let mean = if centred { run.sums.sum(&hat.view()) / n } else { 0.0 };
+        let mean = if centred { hat.sum() / n } else { 0.0 };
         let square = hat.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / n;
         *inverse = 1.0 / (square + eps).sqrt();
         for (k, (hat, y)) in hat.iter_mut().zip(y.iter_mut()).enumerate() {

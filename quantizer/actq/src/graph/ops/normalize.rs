@@ -55,7 +55,7 @@ impl Operation for Normalize {
         (y, Saved::default())
     }
 
-    fn backward(&self, run: &mut Backward<'_>, _: &Saved, mut dy: Array2<f32>, _: &mut NodeState) {
+    fn backward(&self, run: &mut Backward<'_>, _: Saved, mut dy: Array2<f32>, _: &mut NodeState) {
         let Self { mean, scale, pre_clip, clip } = self;
         for (mut d, x) in dy.rows_mut().into_iter().zip(run.input(0).rows()) {
             for ((d, x), (m, s)) in d.iter_mut().zip(x).zip(mean.iter().zip(scale)) {
@@ -155,7 +155,7 @@ impl Operation for Balance {
         self.normalize.forward(run, state)
     }
 
-    fn backward(&self, run: &mut Backward<'_>, saved: &Saved, dy: Array2<f32>, d_state: &mut NodeState) {
+    fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, d_state: &mut NodeState) {
         self.normalize.backward(run, saved, dy, d_state);
     }
 

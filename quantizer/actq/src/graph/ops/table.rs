@@ -34,7 +34,7 @@ impl Operation for Table {
         (Array2::from_shape_fn((run.samples(), self.len), |(_, i)| row[i]), Saved::default())
     }
 
-    fn backward(&self, run: &mut Backward<'_>, _: &Saved, dy: Array2<f32>, _: &mut NodeState) {
+    fn backward(&self, run: &mut Backward<'_>, _: Saved, dy: Array2<f32>, _: &mut NodeState) {
         let sums = &mut run.d_vectors[0][run.step * self.len..][..self.len];
         for row in dy.rows() {
             sums.iter_mut().zip(row).for_each(|(sum, d)| *sum += d);

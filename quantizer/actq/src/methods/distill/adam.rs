@@ -41,6 +41,7 @@ impl Adam {
 }
 
 /// Does [`Adam::step`] on a part of the parameters and their moments.
+#[inline(always)]
 pub(super) fn step(parameters: &mut [f32], grads: &[f32], first: &mut [f32], second: &mut [f32], stride: Stride) {
     for ((p, g), (m, v)) in parameters.iter_mut().zip(grads).zip(first.iter_mut().zip(second)) {
         *m = FIRST * *m + (1.0 - FIRST) * g;

@@ -1,6 +1,7 @@
 //! A matrix during learning: codes before rounding, in units of the step, and logarithms of the scales.
 
 use actq_kernels::Width;
+use actq_kernels::math;
 use actq_kernels::round::ROUND;
 use half::bf16;
 use rayon::prelude::*;
@@ -9,11 +10,14 @@ use super::adam::{Adam, Stride, step};
 use crate::graph::WeightMatrix;
 use crate::methods::quantized::Quantized;
 use crate::methods::scale::Scales;
+use crate::simd::wide;
 
-/// Least scale, so that its logarithm is finite.
+/// Least scale, so that learning can change it.
 const SMALLEST: f32 = 1e-12;
 /// Rows that a thread takes together.
 const ROWS: usize = 16;
+/// Partial sums of a derivative by a scale.
+const LANES: usize = 16;
 
 /// A matrix during learning.
 pub(super) struct Latent {
@@ -22,7 +26,7 @@ pub(super) struct Latent {
     widths: Vec<Option<Width>>,
     /// Codes before rounding, row by row.
     codes: Vec<f32>,
-    /// Natural logarithm of each row's scale.
+    /// Natural logarithm of each row's scale over the one that learning started from.
     log_scales: Vec<f32>,
     /// Scales that learning started from; group scales stay fixed.
     fitted: Scales,
@@ -50,13 +54,32 @@ impl Grid {
 
     /// Rounds to the nearest code, ties to even; the trick is exact in the range of codes. (The standard library's
     /// function is a call on processors without an instruction for it.)
+    #[inline(always)]
     fn round(self, code: f32) -> f32 {
         ((code + ROUND) - ROUND).clamp(self.low, self.high)
     }
 
     /// Returns the level of the nearest code.
+    #[inline(always)]
     fn level(self, code: f32) -> f32 {
         self.round(code) * self.step + self.base
+    }
+
+    /// Turns the derivatives by weights of one scale into those by their codes; returns that by the logarithm of the
+    /// scale.
+    #[inline(always)]
+    fn through(self, grads: &mut [f32], codes: &[f32], scale: f32) -> f32 {
+        // Several sums, which the compiler can keep in one vector.
+        let mut sums = [0.0; LANES];
+        for (grads, codes) in grads.chunks_mut(LANES).zip(codes.chunks(LANES)) {
+            for ((g, c), sum) in grads.iter_mut().zip(codes).zip(&mut sums) {
+                *sum += *g * self.level(*c);
+                // Beyond the grid, only a gradient towards the inside counts.
+                let outside = (*c < self.low - 0.5 && *g > 0.0) || (*c > self.high + 0.5 && *g < 0.0);
+                *g = if outside { 0.0 } else { *g * self.step * scale };
+            }
+        }
+        sums.iter().sum::<f32>() * scale
     }
 }
 
@@ -70,7 +93,7 @@ impl Latent {
             cols,
             widths: widths.to_vec(),
             codes: vec![0.0; rows * cols],
-            log_scales: fitted.rows.iter().map(|s| s.to_f32().max(SMALLEST).ln()).collect(),
+            log_scales: vec![0.0; rows],
             fitted,
             adam_codes: Adam::new(rows * cols),
             adam_scales: Adam::new(rows),
@@ -90,15 +113,15 @@ impl Latent {
     }
 
     fn scale(&self, row: usize) -> f32 {
-        bf16::from_f32(self.log_scales[row].exp()).to_f32()
+        bf16::from_f32(self.fitted.rows[row].to_f32().max(SMALLEST) * math::exp(self.log_scales[row])).to_f32()
     }
 
     /// Returns the columns of a group, and the factors of a row's levels, group by group.
-    fn scales(&self, row: usize) -> (usize, impl Iterator<Item = f32>) {
+    fn scales(&self, row: usize) -> (usize, Vec<f32>) {
         let group = if self.fitted.group == 0 { self.cols } else { self.fitted.group };
         let scale = self.scale(row);
         let of = move |start| scale * f32::from(self.fitted.group_scale(row, start));
-        (group, (0..self.cols).step_by(group).map(of))
+        (group, (0..self.cols).step_by(group).map(of).collect())
     }
 
     /// Writes the weights of the rounded codes, row by row.
@@ -111,7 +134,10 @@ impl Latent {
             };
             let (group, scales) = self.scales(r);
             for ((out, codes), scale) in out.chunks_mut(group).zip(codes.chunks(group)).zip(scales) {
-                out.iter_mut().zip(codes).for_each(|(w, c)| *w = grid.level(*c) * scale);
+                wide(
+                    #[inline(always)]
+                    || out.iter_mut().zip(codes).for_each(|(w, c)| *w = grid.level(*c) * scale),
+                );
             }
         });
     }
@@ -119,34 +145,25 @@ impl Latent {
     /// Moves codes and scales along `grads`, the derivative by the weights, which becomes that by the codes.
     pub(super) fn learn(&mut self, grads: &mut [f32], by_code: Stride, by_scale: Stride) {
         let cols = self.cols;
-        let by_scales: Vec<f32> = grads
-            .par_chunks_mut(cols)
-            .enumerate()
-            .with_min_len(ROWS)
-            .map(|(r, grads)| {
-                let Some(grid) = self.grid(r) else {
-                    grads.fill(0.0);
-                    return 0.0;
-                };
-                let mut by_scale = 0.0;
-                let (group, scales) = self.scales(r);
-                let codes = self.codes[r * cols..][..cols].chunks(group);
-                for ((grads, codes), scale) in grads.chunks_mut(group).zip(codes).zip(scales) {
-                    for (g, c) in grads.iter_mut().zip(codes) {
-                        by_scale += *g * grid.level(*c) * scale;
-                        // Beyond the grid, only a gradient towards the inside counts.
-                        let outside = (*c < grid.low - 0.5 && *g > 0.0) || (*c > grid.high + 0.5 && *g < 0.0);
-                        *g = if outside { 0.0 } else { *g * grid.step * scale };
-                    }
-                }
-                by_scale
-            })
-            .collect();
+        let steps: Vec<_> = (0..self.rows).map(|r| self.grid(r).map(|grid| (grid, self.scales(r)))).collect();
         let Adam { first, second } = &mut self.adam_codes;
         let moments = first.par_chunks_mut(cols).zip(second.par_chunks_mut(cols));
-        let rows = self.codes.par_chunks_mut(cols).zip(grads.par_chunks(cols)).zip(moments);
-        rows.with_min_len(ROWS)
-            .for_each(|((codes, grads), (first, second))| step(codes, grads, first, second, by_code));
+        let rows = self.codes.par_chunks_mut(cols).zip(grads.par_chunks_mut(cols)).zip(moments).zip(&steps);
+        let by_scales: Vec<f32> = rows
+            .with_min_len(ROWS)
+            .map(|(((codes, grads), (first, second)), of_row)| {
+                let Some((grid, (group, scales))) = of_row else { return 0.0 };
+                wide(
+                    #[inline(always)]
+                    || {
+                        let groups = grads.chunks_mut(*group).zip(codes.chunks(*group)).zip(scales);
+                        let by_scale = groups.map(|((grads, codes), scale)| grid.through(grads, codes, *scale)).sum();
+                        step(codes, grads, first, second, by_code);
+                        by_scale
+                    },
+                )
+            })
+            .collect();
         self.adam_scales.step(&mut self.log_scales, &by_scales, by_scale);
     }
 

@@ -6,6 +6,8 @@
 
 use std::time::{Duration, Instant};
 
+use actq_kernels::math;
+
 use crate::graph::Graph;
 
 /// Share of the steps at the full rate.
@@ -107,7 +109,7 @@ impl Schedule {
         if fallen >= falls || self.step >= most {
             return None;
         }
-        Some(0.5 * (1.0 + (std::f32::consts::PI * fallen as f32 / falls as f32).cos()))
+        Some(0.5 * (1.0 + math::cos(std::f32::consts::PI * fallen as f32 / falls as f32)))
     }
 
     /// Records a step with its error.

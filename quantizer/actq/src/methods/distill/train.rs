@@ -11,12 +11,12 @@ use rayon::prelude::*;
 
 use super::adam::{Adam, Stride};
 use super::latent::Latent;
+use super::lessons::{Lesson, Lessons, Source};
 use super::objective::{Frames, Objective};
 use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
-use crate::graph::operation::NodeState;
-use crate::graph::{Graph, Network, Pass, State, Weights};
+use crate::graph::{Derivatives, Graph, Network, Vectors, Weights};
 use crate::methods::quantized::Quantized;
 use crate::random::Random;
 
@@ -88,7 +88,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
     let mut latents: Vec<Latent> =
         matrices.map(|((matrix, widths), importance)| Latent::new(matrix, widths, task.group, importance)).collect();
     let mut adam_vectors: Vec<Adam> = weights.vectors.iter().flatten().map(|v| Adam::new(v.len())).collect();
-    let mut random = Random::new(task.seed);
+    let mut lessons = Lessons::new(task.seed);
     let (size, shards, rates) = match windows.recurrent() {
         true => (WINDOWS, WINDOW_SHARDS, OF_WINDOWS),
         // A frame of an iterative head is one frame per denoising step.
@@ -98,28 +98,41 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
     let mut schedule = Schedule::new(task.bounds, most_steps(task.graph));
     while let Some(rate) = schedule.rate() {
         for (latent, weights) in latents.iter().zip(&mut weights.matrices) {
-            latent.weights(values(weights));
+            weights.set(|values| latent.weights(values));
         }
-        let seeds: Vec<u64> = (0..shards).map(|_| random.bits()).collect();
-        let of_shards: Vec<(f32, Weights)> = seeds
+        let learned: Vec<(f32, Derivatives, Option<Lesson>)> = lessons
+            .next(shards)
             .into_par_iter()
-            .map(|seed| {
-                let batch = windows.batch(size / shards, Some(task.widening), &mut Random::new(seed));
-                gradient(&network, &weights, windows, &objective, batch)
+            .map(|source| match source {
+                Source::New(seed) => {
+                    let widening = Some(task.widening);
+                    let lesson = Lesson::draw(windows, size / shards, widening, &mut Random::new(seed));
+                    let (loss, derivatives) = gradient(&network, &weights, &objective, &lesson);
+                    (loss, derivatives, Some(lesson))
+                }
+                Source::Kept(index) => {
+                    let (loss, derivatives) = gradient(&network, &weights, &objective, lessons.kept(index));
+                    (loss, derivatives, None)
+                }
             })
             .collect();
-        let loss = of_shards.iter().map(|(loss, _)| loss / shards as f32).sum();
-        let Some(mut grads) = of_shards.into_iter().map(|(_, grads)| grads).reduce(Weights::sum) else { break };
+        let loss = learned.iter().map(|(loss, ..)| loss / shards as f32).sum();
+        let mut of_shards = Vec::with_capacity(shards);
+        for (_, derivatives, lesson) in learned {
+            of_shards.push(derivatives);
+            lesson.into_iter().for_each(|lesson| lessons.keep(lesson));
+        }
+        let (mut of_matrices, mut of_vectors) = Derivatives::sum(task.graph, of_shards);
         if windows.recurrent() {
-            clip(&mut grads);
+            clip(&mut of_matrices, &mut of_vectors);
         }
         schedule.took(loss);
         let stride = |of: f32| Stride::new(of * rate, schedule.steps() as i32);
         let (by_code, by_scale, by_vector) = (stride(rates.latent), stride(rates.scale), stride(rates.vector));
-        for (latent, grads) in latents.iter_mut().zip(&mut grads.matrices) {
-            latent.learn(values(grads), by_code, by_scale);
+        for (latent, grads) in latents.iter_mut().zip(&mut of_matrices) {
+            latent.learn(grads.as_slice_mut().unwrap_or_default(), by_code, by_scale);
         }
-        let vectors = weights.vectors.iter_mut().flatten().zip(grads.vectors.iter().flatten());
+        let vectors = weights.vectors.iter_mut().flatten().zip(of_vectors.iter().flatten());
         for (adam, (vector, grads)) in adam_vectors.iter_mut().zip(vectors) {
             adam.step(vector, grads, by_vector);
         }
@@ -130,44 +143,30 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
     Learned { quantized: latents.iter().map(Latent::quantized).collect(), graph, steps: schedule.steps() }
 }
 
-/// Returns the elements of a matrix, row by row.
-fn values(matrix: &mut Array2<f32>) -> &mut [f32] {
-    matrix.as_slice_mut().unwrap_or_default()
-}
-
-/// Computes the loss on a batch, and its derivative by the (rounded) weights.
+/// Computes the loss on a lesson, and its derivatives by the (rounded) weights.
 fn gradient(
     network: &Network<'_>,
     weights: &Weights,
-    windows: &Windows,
     objective: &Objective<'_>,
-    batch: Batch,
-) -> (f32, Weights) {
-    let zeros = |state: &NodeState| state.each_ref().map(|array| Array2::zeros(array.raw_dim()));
-    let mut d_state: State = batch.state.iter().map(zeros).collect();
-    let target = windows.teach(&batch);
-    let pass = forward(network, weights, batch);
-    let (error, loss) = objective.measure(pass.output(), &target);
-    let mut grads = weights.zeros_like();
-    network.backward(weights, &pass, error, &mut d_state, &mut grads, &mut |_, _, _| {});
-    (loss, grads)
+    lesson: &Lesson,
+) -> (f32, Derivatives) {
+    let pass = lesson.pass(network, weights);
+    let (error, loss) = objective.measure(pass.output(), &lesson.target);
+    (loss, network.backward(weights, pass, error, &mut lesson.zero_state()))
 }
 
 /// Returns the mean over samples and outputs of squared error over variance, against the f32 network.
 pub fn loss(network: &Network<'_>, weights: &Weights, windows: &Windows, batch: Batch) -> f32 {
-    let target = windows.teach(&batch);
-    Objective::new(&windows.output_variance, Frames::Even).measure(forward(network, weights, batch).output(), &target).1
+    let lesson = Lesson::of(windows, batch);
+    let pass = lesson.pass(network, weights);
+    Objective::new(&windows.output_variance, Frames::Even).measure(pass.output(), &lesson.target).1
 }
 
-fn forward(network: &Network<'_>, weights: &Weights, batch: Batch) -> Pass {
-    let mut state = batch.state;
-    network.forward(weights, batch.frames, &mut state)
-}
-
-fn clip(grads: &mut Weights) {
-    let square: f32 = grads.matrices.iter().map(|m| m.iter().map(|g| g * g).sum::<f32>()).sum::<f32>()
-        + grads.vectors.iter().flatten().flatten().map(|g| g * g).sum::<f32>();
+/// Scales the derivatives so that their norm is at most [`CLIP`].
+fn clip(matrices: &mut [Array2<f32>], vectors: &mut Vectors) {
+    let square: f32 = matrices.iter().map(|m| m.iter().map(|g| g * g).sum::<f32>()).sum::<f32>()
+        + vectors.iter().flatten().flatten().map(|g| g * g).sum::<f32>();
     let factor = CLIP / square.sqrt().max(CLIP);
-    grads.matrices.iter_mut().for_each(|m| m.mapv_inplace(|g| g * factor));
-    grads.vectors.iter_mut().flatten().flatten().for_each(|g| *g *= factor);
+    matrices.iter_mut().for_each(|m| m.mapv_inplace(|g| g * factor));
+    vectors.iter_mut().flatten().flatten().for_each(|g| *g *= factor);
 }

@@ -1,0 +1,107 @@
+//! Batches with the f32 network's answers. The f32 network is often larger than the one that learns, so each of its
+//! answers is learned from several times, in different company.
+
+use ndarray::Array2;
+
+use crate::calibrate::widening::Widening;
+use crate::calibrate::windows::{Batch, Windows};
+use crate::graph::{Network, State, Weights};
+use crate::random::Random;
+
+/// Times that an answer is learned from, on average.
+const USES: usize = 4;
+/// Most lessons that are kept, and most values in all of them.
+const KEPT: usize = 256;
+const VALUES: usize = 1 << 23;
+/// Least lessons that are kept.
+const LEAST_KEPT: usize = 16;
+
+/// Observations, the state before the first, and the f32 network's outputs.
+#[derive(Debug)]
+pub(super) struct Lesson {
+    frames: Array2<f32>,
+    state: State,
+    pub(super) target: Array2<f32>,
+}
+
+impl Lesson {
+    /// Draws a lesson of `size` windows.
+    pub(super) fn draw(windows: &Windows, size: usize, widening: Option<Widening>, random: &mut Random) -> Self {
+        Self::of(windows, windows.batch(size, widening, random))
+    }
+
+    /// Asks the f32 network about a batch.
+    pub(super) fn of(windows: &Windows, batch: Batch) -> Self {
+        let target = windows.teach(&batch);
+        Self { frames: batch.frames, state: batch.state, target }
+    }
+
+    /// Runs a network over the observations.
+    pub(super) fn pass(&self, network: &Network<'_>, weights: &Weights) -> crate::graph::Pass {
+        network.forward(weights, self.frames.clone(), &mut self.state.clone())
+    }
+
+    /// Returns a state of zeros in the form of this one.
+    pub(super) fn zero_state(&self) -> State {
+        self.state.iter().map(|state| state.each_ref().map(|array| Array2::zeros(array.raw_dim()))).collect()
+    }
+
+    fn values(&self) -> usize {
+        self.frames.len() + self.target.len()
+    }
+}
+
+/// What a part of a batch learns from.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Source {
+    /// A new lesson, drawn with this seed.
+    New(u64),
+    /// A kept one.
+    Kept(usize),
+}
+
+/// The lessons of late.
+#[derive(Debug)]
+pub(super) struct Lessons {
+    kept: Vec<Lesson>,
+    /// Parts of batches so far, and new lessons.
+    parts: usize,
+    drawn: usize,
+    random: Random,
+}
+
+impl Lessons {
+    /// Begins without lessons.
+    pub(super) fn new(seed: u64) -> Self {
+        Self { kept: Vec::new(), parts: 0, drawn: 0, random: Random::new(seed) }
+    }
+
+    /// Returns the sources of the next batch, one for each part.
+    pub(super) fn next(&mut self, parts: usize) -> Vec<Source> {
+        let mut next = || {
+            self.parts += 1;
+            // The first batches are new, so that no lesson counts much more often than others.
+            if self.kept.len() < LEAST_KEPT || self.parts.is_multiple_of(USES) {
+                Source::New(self.random.bits())
+            } else {
+                Source::Kept(self.random.below(self.kept.len()))
+            }
+        };
+        (0..parts).map(|_| next()).collect()
+    }
+
+    /// Returns a kept lesson.
+    pub(super) fn kept(&self, index: usize) -> &Lesson {
+        &self.kept[index]
+    }
+
+    /// Keeps a lesson, in place of the oldest one if there are enough.
+    pub(super) fn keep(&mut self, lesson: Lesson) {
+        let room = (VALUES / lesson.values().max(1)).clamp(LEAST_KEPT, KEPT);
+        match self.kept.len() < room {
+            true => self.kept.push(lesson),
+            false => self.kept[self.drawn % room] = lesson,
+        }
+        self.drawn += 1;
+    }
+}
