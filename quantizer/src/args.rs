@@ -5,13 +5,13 @@ mod values;
 
 use std::path::PathBuf;
 
-use actq::methods::Method;
+use actq::methods::{Effort, Method};
 use actq_kernels::Width;
 use anyhow::{Result, bail};
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
 use link::{KeygenArgs, LinkArgs, SignArgs};
-use values::{clock, forced, group, minutes, npz, pair, positive, rounds, size, two_files, width};
+use values::{clock, effort, forced, group, minutes, npz, pair, positive, rounds, size, two_files, width};
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
 ///
@@ -284,8 +284,8 @@ pub(crate) struct BudgetArgs {
     /// The most bytes of the image, as 98304, 96K or 1M (K is 1024 bytes, M is 1024 K)
     #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
     pub(crate) flash: Option<usize>,
-    /// The most milliseconds of a step on a Cortex-M4, as predicted: takes the most bits that keep them
-    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash"], value_parser = positive)]
+    /// The most milliseconds of a step on a Cortex-M4, as predicted; with --flash, both are kept
+    #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw"], value_parser = positive)]
     pub(crate) ms: Option<f64>,
     /// The processor's clock for --ms, in Hz or as 168M
     // Without the conflicts, clap accepts a missing --ms if a given option conflicts with --ms.
@@ -293,7 +293,7 @@ pub(crate) struct BudgetArgs {
         long,
         value_name = "HZ",
         requires = "ms",
-        conflicts_with_all = ["bits", "bpw", "flash"],
+        conflicts_with_all = ["bits", "bpw"],
         default_value = "168M",
         value_parser = clock
     )]
@@ -479,9 +479,12 @@ pub struct SweepArgs {
 /// Options of distillation, which also ends when the error no longer falls.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct LearnArgs {
+    /// How long to learn: quick (an eighth of the steps), default, or thorough (2.5 times the steps)
+    #[arg(long, value_name = "E", default_value = "default", value_parser = effort, conflicts_with_all = ["steps", "minutes"])]
+    pub(crate) effort: Effort,
     /// The most steps of distillation; 0 = two-sided error feedback instead, which takes seconds and gives a larger
-    /// error at few bits [default: by the number of weights, 20000 for 200 thousand, recurrent policies 7800, heads
-    /// with denoising steps 10000]
+    /// error at few bits [default: by the number of weights, 8000 for 200 thousand, recurrent policies 4000, heads
+    /// with denoising steps 5000]
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<usize>,
     /// The most minutes of distillation, instead of the default steps; the image then depends on the machine's speed

@@ -109,7 +109,7 @@ impl CustomStatistics for ActionStatistics {
     fn quantize(&self, graph: &Graph, rate: Rate, options: &Options) -> Result<Vec<Outcome>> {
         let widths = match rate {
             Rate::Width(width) => vec![width; graph.matrices.len()],
-            Rate::BitsPerWeight(_) | Rate::Bytes(_) => {
+            Rate::BitsPerWeight(_) | Rate::Bytes(_) | Rate::Within { .. } => {
                 let (scores, limit) = (self.effective_scores().0, rate.bytes(graph.weights()));
                 allocation::allocate(graph, &scores, &self.choices, options.packing(), limit)?
             }
@@ -155,7 +155,7 @@ fn floored(importance: &Array2<f32>) -> Vec<f64> {
 mod tests {
     use actq::budget::Budget;
     use actq::data::Recordings;
-    use actq::methods::{Method, scale};
+    use actq::methods::{Effort, Method, scale};
     use actq::pipeline::sweep::{SweepPlan, run};
     use actq::policy::Policy;
 
@@ -180,6 +180,7 @@ mod tests {
                 recordings: Recordings { calib: Some(calib), heldout: Some(heldout) },
                 methods: &[Method::custom(ActQuant(Choices::default()))],
                 budgets: &[50.0, 100.0],
+                effort: Effort::Default,
                 steps: None,
                 minutes: None,
                 relative: false,

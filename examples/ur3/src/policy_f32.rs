@@ -88,7 +88,7 @@ impl PolicyF32 {
         let graph = &self.policy.graph;
         let noise = (0..graph.noise_len()).map(|_| self.noise.normal() as f32);
         let input = Array1::from_iter(obs.iter().copied().chain(noise)).insert_axis(Axis(0));
-        let pass = Network::in_order(graph).forward(&self.weights, input, &mut zero_state(graph, 1));
+        let pass = Network::new(graph).forward(&self.weights, input, &mut zero_state(graph, 1));
         pass.into_output().into_iter().collect()
     }
 }

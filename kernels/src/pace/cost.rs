@@ -13,7 +13,7 @@ pub use super::feature::Feature;
 use super::feature::{Gemv, Prepare, Strips};
 use super::rates::RATES;
 use crate::image::op;
-use crate::image::{Image, Matrix, Op, OpKind, RowBlock};
+use crate::image::{Image, Matrix, Op, OpKind};
 use crate::layout::{BlockShape, QUAD, STRIP};
 use crate::meter::{OutputStart, RUN};
 use crate::x::{Extent, Plan};
@@ -101,6 +101,22 @@ pub(super) fn most(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> u32 {
 /// Computes the cost of an operation in a step.
 pub fn of_op(op: &Op<'_>) -> Cost {
     total(|add| features(op, add))
+}
+
+/// Computes the cost of rows of one width in a linear operation, with the preparation of their input; `in_order` is
+/// `false` if they have output steps.
+#[cfg(any(test, feature = "writer"))]
+pub fn of_rows(shape: BlockShape, in_order: bool) -> Cost {
+    total(|add| {
+        prepare(shape, add);
+        block(shape, in_order, in_order, add);
+    })
+}
+
+/// Computes the cost of the values of a function.
+#[cfg(any(test, feature = "writer"))]
+pub fn of_values(function: crate::math::Function, values: usize) -> Cost {
+    total(|add| add(Feature::function(function), values))
 }
 
 /// Computes the cost of a step that evaluates the network. A step that continues a chunk costs the same without the
@@ -252,7 +268,7 @@ fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, us
             prepare(shape, add);
             last = Some(shape.width);
         }
-        block(&rows, in_place, add);
+        block(shape, rows.steps.is_empty(), in_place, add);
     }
 }
 
@@ -303,9 +319,7 @@ pub(super) fn prepare(shape: BlockShape, add: &mut dyn FnMut(Feature, usize)) {
 }
 
 /// Counts the features of a block's products and their scaling. With `start`, the output starts from the biases.
-fn block(rows: &RowBlock<'_>, start: bool, add: &mut dyn FnMut(Feature, usize)) {
-    let shape = rows.block.shape();
-    let in_order = rows.steps.is_empty();
+fn block(shape: BlockShape, in_order: bool, start: bool, add: &mut dyn FnMut(Feature, usize)) {
     let whole = match (in_order && start, shape.rows.is_multiple_of(QUAD)) {
         (false, _) => 0,
         (true, true) => shape.rows,

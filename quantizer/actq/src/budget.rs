@@ -17,7 +17,7 @@ pub enum Budget {
     ImageBytes(usize),
     /// The largest error (NMSE); the fewest bits that keep it are used.
     MaxNmse(f64),
-    /// The longest predicted step; the most bits that keep it are used.
+    /// The longest predicted step, and with it the most bytes of the image.
     Time(TimeLimit),
 }
 
@@ -28,6 +28,9 @@ pub struct TimeLimit {
     pub milliseconds: f64,
     /// The processor's clock in Hz.
     pub clock_hz: f64,
+    /// The most bytes of the whole image; `None`: no limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image_bytes: Option<usize>,
 }
 
 /// The least used share of a budget, if more bits fit and reduce the error.
@@ -43,15 +46,23 @@ pub enum Rate {
     /// The most bytes of all that a method decides on: the weights, everything counted, and the vectors that it changes
     /// ([`crate::graph::Graph::changed_vectors`]).
     Bytes(usize),
+    /// The most bytes, as [`Self::Bytes`], or `None`, and the most modelled cycles of what a method decides on.
+    Within {
+        /// Bytes.
+        bytes: Option<usize>,
+        /// Cycles.
+        cycles: f64,
+    },
 }
 
 impl Rate {
-    /// Returns the bytes that `weights` weights may take; infinite if the width is given.
+    /// Returns the bytes that `weights` weights may take; infinite if they have no limit.
     pub fn bytes(self, weights: usize) -> f64 {
         match self {
             Self::Width(_) => f64::INFINITY,
             Self::BitsPerWeight(bits) => bits * weights as f64 / 8.0,
             Self::Bytes(bytes) => bytes as f64,
+            Self::Within { bytes, .. } => bytes.map_or(f64::INFINITY, |bytes| bytes as f64),
         }
     }
 }
@@ -127,7 +138,7 @@ mod tests {
 
     #[test]
     fn budgets_survive_serialization() {
-        let time = Budget::Time(TimeLimit { milliseconds: 1.5, clock_hz: 168e6 });
+        let time = Budget::Time(TimeLimit { milliseconds: 1.5, clock_hz: 168e6, image_bytes: None });
         for (budget, json) in [
             (Budget::Width(Width::W3), r#"{"width":3}"#),
             (Budget::BitsPerWeight(2.5), r#"{"bits_per_weight":2.5}"#),

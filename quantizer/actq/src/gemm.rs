@@ -165,12 +165,7 @@ impl Element for f64 {
 
 /// Computes `C += A B` with tiles of `M` rows.
 #[inline(always)]
-fn add<S: Simd, T: Element, const M: usize>(
-    simd: S,
-    a: ArrayView2<'_, T>,
-    b: &Panels<T>,
-    mut c: ArrayViewMut2<'_, T>,
-) {
+fn add<S: Simd, T: Element, const M: usize>(simd: S, a: ArrayView2<'_, T>, b: &Panels<T>, mut c: ArrayViewMut2<'_, T>) {
     let (rows, cols) = c.dim();
     let mut tiles: Vec<[T; M]> = Vec::new();
     for from in (0..b.depth).step_by(DEPTH) {

@@ -51,7 +51,7 @@ impl Request {
             self.flash.map(|bytes| Ok(Budget::ImageBytes(bytes))),
             self.ms.map(|milliseconds| {
                 let (milliseconds, clock_hz) = (positive("ms", milliseconds)?, positive("clock", self.clock)?);
-                Ok(Budget::Time(TimeLimit { milliseconds, clock_hz }))
+                Ok(Budget::Time(TimeLimit { milliseconds, clock_hz, image_bytes: None }))
             }),
             self.max_nmse.map(|limit| Ok(Budget::MaxNmse(positive("max_nmse", limit)?))),
         ];

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use actq::methods::Effort;
 use actq_kernels::Width;
 use actq_kernels::layout::is_group;
 
@@ -56,6 +57,12 @@ pub(super) fn group(text: &str) -> Result<usize, String> {
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
     number.ok_or_else(|| "use a number above 0".to_owned())
+}
+
+/// Reads an effort by its name.
+pub(super) fn effort(text: &str) -> Result<Effort, String> {
+    let found = Effort::ALL.into_iter().find(|(name, _)| *name == text);
+    found.map(|(_, effort)| effort).ok_or_else(|| "use quick, default or thorough".to_owned())
 }
 
 pub(super) fn minutes(text: &str) -> Result<f64, String> {

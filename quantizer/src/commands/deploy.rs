@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use actq::methods::Method;
+use actq::methods::{Effort, Method};
 use actq::runtime::ImageBuffer;
 use actq_deploy::DESCRIPTION;
 use actq_deploy::description::Description;
@@ -92,7 +92,7 @@ fn step(number: usize, what: &str) -> Result<()> {
 }
 
 fn quantization(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs {
-    let own = args.learn.steps.is_some() || args.learn.minutes.is_some();
+    let own = args.learn.steps.is_some() || args.learn.minutes.is_some() || args.learn.effort != Effort::Default;
     QuantizeArgs {
         policy_dir: policy.to_owned(),
         out: image.to_owned(),

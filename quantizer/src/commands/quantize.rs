@@ -108,9 +108,9 @@ fn options(args: &QuantizeArgs, method: Method) -> Options {
     let BudgetArgs { bits, bpw, flash, ms, clock } = args.budget;
     let limits = [
         bpw.map(Budget::BitsPerWeight),
-        flash.map(Budget::ImageBytes),
         args.max_nmse.map(Budget::MaxNmse),
-        ms.map(|milliseconds| Budget::Time(TimeLimit { milliseconds, clock_hz: clock })),
+        ms.map(|milliseconds| Budget::Time(TimeLimit { milliseconds, clock_hz: clock, image_bytes: flash })),
+        flash.map(Budget::ImageBytes),
     ];
     let width = bits.unwrap_or(Width::W3);
     let protected = args.protect.iter().map(|name| (name.clone(), Width::W8));
@@ -122,6 +122,7 @@ fn options(args: &QuantizeArgs, method: Method) -> Options {
             None => Activations::Auto,
         },
         steps: args.learn.steps,
+        effort: args.learn.effort,
         minutes: args.learn.minutes,
         relative: args.learn.relative,
         seed: args.run.seed,

@@ -39,6 +39,7 @@ pub fn run(args: &SweepArgs, methods: &[Method]) -> Result<()> {
             methods,
             budgets: &args.bpw,
             steps: args.learn.steps,
+            effort: args.learn.effort,
             minutes: args.learn.minutes,
             relative: args.learn.relative,
             seed: args.run.seed,

@@ -46,8 +46,9 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
         Some(bits) => Budget::BitsPerWeight(bits),
         None => Budget::Width(args.bits.unwrap_or(Width::W3)),
     };
-    let LearnArgs { steps, minutes, relative } = args.learn;
-    let options = Options { steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Distill, budget) };
+    let LearnArgs { effort, steps, minutes, relative } = args.learn;
+    let options =
+        Options { effort, steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Distill, budget) };
     let plan = TunePlan { policy: &policy, calib, heldout, options: &options, rounds: args.rounds };
     let tuned = tune::run(
         plan,

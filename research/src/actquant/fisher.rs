@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use actq::data::Dataset;
 use actq::error::{Context, Result};
-use actq::graph::{Graph, Network, Pass, Weights, start_state, zero_state};
+use actq::graph::{Factors, Graph, Network, Pass, Weights, start_state, zero_state};
 use actq::random::Random;
 use ndarray::{Array2, Array3, Axis, Zip, linalg::general_mat_mul, s};
 
@@ -70,9 +70,7 @@ pub fn importance(
     let mut alive: Vec<usize> = (0..dataset.length.len()).collect();
     let starts: Vec<_> = alive.iter().map(|&episode| dataset.start(episode)).collect();
     let mut state = start_state(graph, &starts);
-    let mut fisher = weights.zeros_like().matrices;
-    // The gradients are not used, but the backward pass adds to them.
-    let mut unused = weights.zeros_like();
+    let mut fisher: Vec<Array2<f32>> = graph.matrices.iter().map(|m| Array2::zeros((m.rows, m.cols))).collect();
     let mut random = Random::new(0);
     let mut batches = 0;
     for (index, start) in (0..longest).step_by(window.max(1)).enumerate() {
@@ -99,7 +97,7 @@ pub fn importance(
                     _ => difference.signum(),
                 }
             });
-            add_squares(&network, &weights, &passes, (sign, sampling.batch), &mut unused, &mut fisher);
+            add_squares(&network, &weights, passes, (sign, sampling.batch), &mut fisher);
             batches += alive.len().div_ceil(sampling.batch);
         }
         progress((start + window) as f64 / longest as f64);
@@ -140,9 +138,8 @@ fn side_by_side(dataset: &Dataset, count: usize) -> Dataset {
 fn add_squares(
     network: &Network<'_>,
     weights: &Weights,
-    passes: &[Pass],
+    passes: Vec<Pass>,
     (d_output, batch): (Array2<f32>, usize),
-    unused: &mut Weights,
     fisher: &mut [Array2<f32>],
 ) {
     let samples = d_output.nrows();
@@ -151,13 +148,13 @@ fn add_squares(
     let mut uses: Vec<Vec<(Array2<f32>, Array2<f32>)>> = vec![Vec::new(); fisher.len()];
     let silent = Array2::zeros(d_output.raw_dim());
     let mut d_output = Some(d_output);
-    for pass in passes.iter().rev() {
+    for pass in passes.into_iter().rev() {
         let d_output = d_output.take().unwrap_or_else(|| silent.clone());
-        network.backward(weights, pass, d_output, &mut d_state, unused, &mut |matrix, x, dy| {
+        for Factors { matrix, x, dy } in network.backward(weights, pass, d_output, &mut d_state).products {
             if dy.iter().any(|d| *d != 0.0) {
-                uses[matrix].push((dy.clone(), x.clone()));
+                uses[matrix].push((dy, x));
             }
-        });
+        }
     }
     for (uses, fisher) in uses.iter().zip(fisher) {
         match &uses[..] {
@@ -206,6 +203,7 @@ fn deviations(dataset: &Dataset) -> Option<ndarray::Array1<f32>> {
 mod tests {
     use super::*;
     use crate::testing::{dataset, lstm, mlp};
+    use actq::graph::Derivatives;
 
     const PLAIN: Sampling = Sampling { samples: 4096, batch: 1, signs: Signs::Random };
 
@@ -247,7 +245,7 @@ mod tests {
                 let gradient = |&(episode, start): &(usize, usize)| {
                     let moved = |d: f32| {
                         let mut moved = weights.clone();
-                        moved.matrices[m][at] += d;
+                        moved.matrices[m].set(|values| values[at.0 * found.ncols() + at.1] += d);
                         loss(graph, &moved, &dataset, episode, start..start + window)
                     };
                     (moved(step) - moved(-step)) / (2.0 * f64::from(step))
@@ -310,13 +308,17 @@ mod tests {
         }
         dataset.length = vec![4000];
         let found = importance(&graph, &dataset, PLAIN, &mut |_| {}).expect("importance");
+        let gradient = |d_output: Array2<f32>| {
+            let pass = network.forward(&weights, rows(&dataset.obs, &[0], 0), &mut zero_state(&graph, 1));
+            let derivatives = network.backward(&weights, pass, d_output, &mut zero_state(&graph, 1));
+            Derivatives::sum(&graph, vec![derivatives]).0.swap_remove(0)
+        };
         let mut expected = Array2::<f32>::zeros(found[0].raw_dim());
         for d in 0..2 {
-            let mut grads = weights.zeros_like();
             let unit = Array2::from_shape_fn((1, 2), |(_, k)| if k == d { 1.0 } else { 0.0 });
-            network.backward(&weights, &pass, unit, &mut zero_state(&graph, 1), &mut grads, &mut |_, _, _| {});
-            expected += &grads.matrices[0].mapv(|g| g * g);
+            expected += &gradient(unit).mapv(|g| g * g);
         }
+        let of_both = gradient(Array2::ones((1, 2)));
         let largest = expected.iter().copied().fold(0.0, f32::max);
         for (found, expected) in found[0].iter().zip(&expected) {
             assert!((found - expected).abs() < 0.05 * largest, "{found} against {expected}");
@@ -328,10 +330,7 @@ mod tests {
         assert!(found.iter().all(|matrix| matrix.iter().all(|i| *i == 0.0)), "{found:?}");
         dataset.action.as_mut().expect("actions").mapv_inplace(|a| a + 1e-6);
         let found = importance(&graph, &dataset, loss, &mut |_| {}).expect("importance");
-        let mut grads = weights.zeros_like();
-        let both = Array2::ones((1, 2));
-        network.backward(&weights, &pass, both, &mut zero_state(&graph, 1), &mut grads, &mut |_, _, _| {});
-        for (found, gradient) in found[0].iter().zip(&grads.matrices[0]) {
+        for (found, gradient) in found[0].iter().zip(&of_both) {
             assert!((found - gradient * gradient).abs() < 1e-3 * largest, "{found} against {gradient} squared");
         }
     }

@@ -200,7 +200,7 @@ fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     let recordings = Recordings::load(&policy)?;
     let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     let within = |milliseconds| {
-        let budget = Budget::Time(TimeLimit { milliseconds, clock_hz: CLOCK });
+        let budget = Budget::Time(TimeLimit { milliseconds, clock_hz: CLOCK, image_bytes: None });
         quantizer.quantize(&Options { budget, ..distill(1.0) }, ())
     };
     for milliseconds in [1.6, 2.4] {

@@ -103,6 +103,16 @@ impl Graph {
         self.nodes.iter().map(of_node).sum()
     }
 
+    /// Returns how often a matrix is used in a step.
+    pub fn runs(&self, matrix: usize) -> usize {
+        let uses = |(node, of): (usize, &Node)| {
+            let uses = of.kind.products().iter().filter(|product| product.matrix == matrix).count();
+            let steps = |denoising: &Denoising| if node >= denoising.first { denoising.steps.len() } else { 1 };
+            uses * self.denoising.as_ref().map_or(1, steps)
+        };
+        self.nodes.iter().enumerate().map(uses).sum()
+    }
+
     /// Returns the number of elements of all weight matrices.
     pub fn weights(&self) -> usize {
         self.matrices.iter().map(|m| m.data.len()).sum()

@@ -367,10 +367,10 @@ pub(super) mod tests {
                 compare(*exact, &|w, d| w.matrices[m].set(|values| values[i] += d));
             }
         }
-        for v in 0..weights.vectors.len() {
-            for k in 0..weights.vectors[v].len() {
-                for i in 0..weights.vectors[v][k].len() {
-                    compare(vectors[v][k][i], &|w, d| w.vectors[v][k][i] += d);
+        for (v, of_node) in vectors.iter().enumerate() {
+            for (k, derivatives) in of_node.iter().enumerate() {
+                for (i, exact) in derivatives.iter().enumerate() {
+                    compare(*exact, &|w, d| w.vectors[v][k][i] += d);
                 }
             }
         }

@@ -12,6 +12,7 @@ pub mod feedback;
 mod latent;
 mod lessons;
 mod objective;
+pub mod removal;
 pub mod schedule;
 pub mod size;
 pub mod train;
@@ -37,13 +38,14 @@ use crate::data::Dataset;
 use crate::error::{Result, ensure};
 use crate::graph::{Graph, WeightMatrix};
 use activations::{allocated, choose_activations};
-use allocate::{Rows, energies, removals};
+use allocate::{Rows, energies};
 use balance::{MixedUnits, balance, mixed_units};
 use choose::{Chosen, choose, choosing};
 use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
 use feedback::feedback;
 use objective::Frames;
+use removal::removals;
 use schedule::{Bounds, most_steps};
 use size::Size;
 use train::{Learned, Task, distill};
@@ -58,10 +60,11 @@ const SEED: u64 = 1;
 pub struct RowStatistics {
     /// The network with balanced columns, and the recorded observations.
     windows: Windows,
-    /// Importance of every matrix's columns; of its columns about their means; of its rows.
+    /// Importance of every matrix's columns; of its rows.
     inputs: Vec<Vec<f64>>,
-    centred: Vec<Vec<f64>>,
     outputs: Vec<Vec<f64>>,
+    /// Error of removing each row of a matrix; `None` if its rows cannot be removed.
+    removals: Vec<Option<Vec<f64>>>,
     /// Moments of every matrix's input, and `G`.
     moments: Vec<(Moments, DMatrix<f64>)>,
     /// Frames or windows that `G` was taken over.
@@ -90,12 +93,17 @@ impl RowStatistics {
         let (output_moments, outputs_of) = output_moments(&windows, allowance, SEED);
         let outputs: Vec<Vec<f64>> = output_moments.iter().map(|g| importance(g, Side::Output)).collect();
         let balanced = balance(graph, &mut moments, &outputs)?;
+        let of_inputs: Vec<&Moments> = moments.iter().collect();
+        let dimensions = dimensions(&balanced);
+        let removals = (0..balanced.matrices.len())
+            .map(|m| Dimension::made_by(&dimensions, m).map(|d| removals(&balanced, d, &of_inputs, &outputs)))
+            .collect();
         Ok(Self {
             mixed: mixed_units(&balanced, &moments),
             windows: windows.with(balanced),
             inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
-            centred: moments.iter().map(|m| importance(&m.centred(), Side::Input)).collect(),
             outputs,
+            removals,
             moments: moments.into_iter().zip(output_moments).collect(),
             outputs_of,
         })
@@ -108,7 +116,7 @@ impl RowStatistics {
 
     /// Returns the most steps of distillation with these options.
     pub fn most_steps(&self, options: &Options) -> usize {
-        options.steps.unwrap_or_else(|| most_steps(&self.windows.graph))
+        options.steps.unwrap_or_else(|| most_steps(&self.windows.graph, options.effort))
     }
 
     /// Returns the limits of learning.
@@ -126,7 +134,7 @@ pub fn quantize(
     options: &Options,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<QuantizedNetwork> {
-    let RowStatistics { windows, inputs, centred, outputs, moments, .. } = statistics;
+    let RowStatistics { windows, inputs, outputs, removals, moments, .. } = statistics;
     let graph = &windows.graph;
     for (name, _) in &options.forced {
         let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -145,12 +153,15 @@ pub fn quantize(
         .enumerate()
         .map(|(m, matrix)| {
             let energy = energies(matrix, &inputs[m], &outputs[m]);
-            let made = Dimension::made_by(&dimensions, m);
-            let removal = made.map_or_else(|| energy.clone(), |d| removals(graph, d, centred, outputs));
+            let removal = removals[m].clone().unwrap_or_else(|| energy.clone());
             Rows { energy, removal, forced: forced[m] }
         })
         .collect();
-    let size = Size { graph, dimensions: &dimensions, packings: Vec::new(), values: values(graph, rate, options) };
+    let cycles = match rate {
+        Rate::Within { cycles, .. } => Some(cycles),
+        Rate::Width(_) | Rate::BitsPerWeight(_) | Rate::Bytes(_) => None,
+    };
+    let size = Size { cycles, ..Size::new(graph, &dimensions, values(graph, rate, options)) };
     let (widths, learned_with) = allocated(size.clone(), &rows, options, allowed)?;
     let input_moments: Vec<&Moments> = moments.iter().map(|(input, _)| input).collect();
     let compacted = compact(graph, &dimensions, &widths, &input_moments);
@@ -230,7 +241,7 @@ fn forced(graph: &Graph, rate: Rate, options: &Options) -> Vec<Option<Width>> {
     let named = |matrix: &WeightMatrix| options.forced.iter().find(|(name, _)| *name == matrix.name).map(|(_, w)| *w);
     let of_matrix = |matrix: &WeightMatrix| match rate {
         Rate::Width(width) => Some(width),
-        Rate::BitsPerWeight(_) | Rate::Bytes(_) => named(matrix),
+        Rate::BitsPerWeight(_) | Rate::Bytes(_) | Rate::Within { .. } => named(matrix),
     };
     graph.matrices.iter().map(of_matrix).collect()
 }
@@ -238,15 +249,15 @@ fn forced(graph: &Graph, rate: Rate, options: &Options) -> Vec<Option<Width>> {
 /// Returns the number of values of the vectors that a rate counts.
 fn values(graph: &Graph, rate: Rate, options: &Options) -> usize {
     match rate {
-        Rate::Bytes(_) => graph.changed_values(options.learns()),
-        Rate::Width(_) | Rate::BitsPerWeight(_) => 0,
+        Rate::Bytes(_) | Rate::Within { bytes: Some(_), .. } => graph.changed_values(options.learns()),
+        Rate::Width(_) | Rate::BitsPerWeight(_) | Rate::Within { bytes: None, .. } => 0,
     }
 }
 
 /// Returns the fewest bytes that meet a rate. A balance does not count, since only the recording can require it.
 pub(super) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
     let dimensions = dimensions(graph);
-    let size = Size { graph, dimensions: &dimensions, packings: Vec::new(), values: values(graph, rate, options) };
+    let size = Size::new(graph, &dimensions, values(graph, rate, options));
     activations::least_bytes(&size, options, &forced(graph, rate, options))
 }
 

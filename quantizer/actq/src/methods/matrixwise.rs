@@ -27,7 +27,7 @@ pub fn quantize(graph: &Graph, moments: Option<&[Moments]>, rate: Rate, options:
     let indexes = 0..graph.matrices.len();
     match rate {
         Rate::Width(width) => indexes.map(|m| one(m, width)).collect(),
-        Rate::BitsPerWeight(_) | Rate::Bytes(_) => {
+        Rate::BitsPerWeight(_) | Rate::Bytes(_) | Rate::Within { .. } => {
             let tries: Vec<Vec<Outcome>> =
                 indexes.map(|m| Width::ALL.into_iter().map(|width| one(m, width)).collect()).collect::<Result<_>>()?;
             let chosen = allocate(&tries, rate.bytes(graph.weights()), graph.weights())?;

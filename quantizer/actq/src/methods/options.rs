@@ -112,6 +112,33 @@ impl PartialEq for dyn CustomMethod {
     }
 }
 
+/// How long to learn, in units of the steps that a network of its size gets by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Effort {
+    /// An eighth.
+    Quick,
+    /// All.
+    #[default]
+    Default,
+    /// Two and a half times as many.
+    Thorough,
+}
+
+impl Effort {
+    /// All efforts with their names.
+    pub const ALL: [(&str, Self); 3] =
+        [("quick", Self::Quick), ("default", Self::Default), ("thorough", Self::Thorough)];
+
+    /// Returns the factor of the steps.
+    pub fn factor(self) -> f64 {
+        match self {
+            Self::Quick => 0.125,
+            Self::Default => 1.0,
+            Self::Thorough => 2.5,
+        }
+    }
+}
+
 /// Options of a quantization.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -123,8 +150,10 @@ pub struct Options {
     pub group: usize,
     /// Bits of the activations.
     pub activations: Activations,
-    /// Most steps of distillation; `None`: chosen for the network.
+    /// Most steps of distillation; `None`: chosen for the network, times the effort.
     pub steps: Option<usize>,
+    /// Effort, if the steps are not given.
+    pub effort: Effort,
     /// Most minutes of distillation; `None`: no limit but the steps.
     pub minutes: Option<f64>,
     /// `true` if learning weighs errors relative to the action's size, more than by default (method distill).
@@ -164,6 +193,7 @@ impl Options {
             group: 0,
             activations: Activations::Auto,
             steps: None,
+            effort: Effort::Default,
             minutes: None,
             relative: false,
             seed: 1,

@@ -37,7 +37,7 @@ impl Quantizer<'_> {
             Budget::BitsPerWeight(bits) => Rate::BitsPerWeight(bits),
             Budget::ImageBytes(bytes) => return flash::within(self, options, bytes, &mut shown(watch)),
             Budget::MaxNmse(limit) => return search::smallest(self, options, limit, &mut watch),
-            Budget::Time(limit) => return time::most_bits(self, options, limit, &mut shown(watch)),
+            Budget::Time(limit) => return time::within(self, options, limit, &mut shown(watch)),
         };
         self.at(rate, options, &mut shown(watch))
     }

@@ -36,9 +36,7 @@ pub(super) fn within(
     bytes: usize,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<QuantizedPolicy> {
-    // A balanced graph has more operations than the policy's.
-    let policy = Policy { graph: quantizer.method.graph().clone(), ..quantizer.policy.clone() };
-    let fixed = fixed_bytes(policy, options)?;
+    let fixed = fixed_with_balance(quantizer, options)?;
     let in_image = |error: Error| match error.budget() {
         Some(small) => small.in_image(fixed, bytes).into(),
         None => error,
@@ -48,6 +46,17 @@ pub(super) fn within(
     // Equal constants share storage, and learned ones may be equal or different by chance.
     ensure!(len <= bytes, "the image takes {len} bytes, but {bytes} are allowed; allow {len} bytes or more");
     Ok(found)
+}
+
+/// Returns the bytes that a rate may count for an image of at most `bytes` bytes.
+pub(super) fn room(quantizer: &Quantizer<'_>, options: &Options, bytes: usize) -> Result<usize> {
+    Ok(bytes.saturating_sub(fixed_with_balance(quantizer, options)?))
+}
+
+/// As [`fixed_bytes`], of a graph that balances columns and so may have more operations than the policy's.
+fn fixed_with_balance(quantizer: &Quantizer<'_>, options: &Options) -> Result<usize> {
+    let policy = Policy { graph: quantizer.method.graph().clone(), ..quantizer.policy.clone() };
+    fixed_bytes(policy, options)
 }
 
 /// Returns the bytes of an image beside those that a rate in bytes counts.

@@ -12,7 +12,7 @@ use crate::budget::Budget;
 use crate::data::{Dataset, Recording, Recordings};
 use crate::error::{Context as _, Result};
 use crate::measure::eval;
-use crate::methods::{Method, Options, Outcome};
+use crate::methods::{Effort, Method, Options, Outcome};
 use crate::policy::Policy;
 
 /// One image of a sweep.
@@ -79,6 +79,8 @@ pub struct SweepPlan<'a> {
     pub budgets: &'a [f64],
     /// Most steps of distillation; `None`: chosen for the network.
     pub steps: Option<usize>,
+    /// Effort, if the steps are not given.
+    pub effort: Effort,
     /// Most minutes of distillation; `None`: no limit but the steps.
     pub minutes: Option<f64>,
     /// `true` if method distill weighs errors relative to the action's size.
@@ -90,7 +92,7 @@ pub struct SweepPlan<'a> {
 /// Quantizes the policy by every method for every budget, and runs each image over the held-out recording. `watch`
 /// receives the present work and the share of the whole that is done.
 pub fn run(plan: SweepPlan<'_>, mut watch: impl Watch) -> Result<Sweep> {
-    let SweepPlan { policy, mut recordings, methods, budgets, steps, minutes, relative, seed } = plan;
+    let SweepPlan { policy, mut recordings, methods, budgets, steps, effort, minutes, relative, seed } = plan;
     recordings.fill_actions(&policy.graph);
     let heldout = recordings.heldout.as_ref().with_context(|| Recording::Heldout.missing("a sweep"))?;
     let mut curves = Vec::new();
@@ -105,7 +107,7 @@ pub fn run(plan: SweepPlan<'_>, mut watch: impl Watch) -> Result<Sweep> {
             let work = format!("{method}, {budget} bits per weight");
             let plain = Options::new(method.clone(), Budget::BitsPerWeight(budget));
             let relative = relative && *method == Method::Distill;
-            let options = Options { group: method.default_group(), steps, minutes, relative, seed, ..plain };
+            let options = Options { group: method.default_group(), steps, effort, minutes, relative, seed, ..plain };
             let share = |_: &str, share: f64| watch.progress(&work, done(1.0 + b as f64 + share));
             points.push(match quantizer.quantize(&options, share) {
                 Ok(quantized) => Some(point(heldout, budget, &quantized)?),

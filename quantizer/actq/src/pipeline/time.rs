@@ -1,69 +1,139 @@
-//! Finds the most bits whose step keeps a time limit.
+//! Images whose step keeps a time limit.
 
 use std::path::Path;
 
+use super::flash;
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use crate::budget::{Rate, TimeLimit};
 use crate::emit;
 use crate::error::{Context, Error, Result, ensure};
 use crate::measure::time::StepTime;
-use crate::methods::{Activations, Options, Progress};
+use crate::methods::{Activations, Method, Options, Progress};
 
 /// Bits per weight above those of any image.
 const MOST_BITS: f64 = 10.0;
 /// Tries between the least and the most bits; the last two differ by a hundredth of a bit.
 const TRIES: usize = 10;
+/// Most tries to find the cycles, and the share of the limit that is close enough.
+const CYCLE_TRIES: usize = 8;
+const CLOSE: f64 = 0.985;
 
 /// Predicts the step of an image.
 fn predict(quantized: &QuantizedPolicy, limit: TimeLimit) -> Result<StepTime> {
     Ok(StepTime::new(&quantized.buffer().image(Path::new("the new image"))?, limit.clock_hz))
 }
 
-/// Makes the image of the most bits per weight whose step keeps the limit; `options.budget` is ignored.
+/// Makes the image with the lowest expected error whose step keeps the limit; `options.budget` is ignored. Of methods
+/// that do not allocate by time, it is the image of the most bits per weight.
 ///
-/// The bits are found with the activations before measurement and without learning, which does not affect time; then
+/// The rate is found with the activations before measurement and without learning, which does not affect time; then
 /// the policy is quantized one time. Activations that the method prefers in int16 get it as far as the time allows.
 /// `progress` receives the share done.
-pub(super) fn most_bits(
+pub(super) fn within(
     quantizer: &Quantizer<'_>,
     options: &Options,
     limit: TimeLimit,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<QuantizedPolicy> {
-    let allowed = limit.milliseconds;
     let activations = match options.activations {
         Activations::Auto => Activations::Unmeasured,
         given => given,
     };
     let draft = Options { activations, steps: Some(1), ..options.clone() };
-    let with = |bits: f64| quantizer.at(Rate::BitsPerWeight(bits), &draft, &mut |_| {});
-    let time = |bits: f64| Ok::<_, Error>(predict(&with(bits)?, limit)?.milliseconds);
-    let (mut low, mut high) = (least_bits(with(f64::MIN_POSITIVE))?, MOST_BITS);
-    let fastest = time(low)?;
-    ensure!(
-        fastest <= allowed,
-        "{allowed} ms are allowed, but the fastest step takes {fastest:.3} ms at {} MHz, with {low:.3} bits per weight",
-        limit.clock_hz / 1e6
-    );
-    if time(high)? <= allowed {
-        low = high;
+    let draft = Draft { quantizer, options: &draft, limit };
+    let rate = match options.method {
+        Method::Distill => draft.cycles()?,
+        _ => draft.most_bits()?,
+    };
+    let quantized = quantizer.at(rate, options, progress)?;
+    kept(quantized, limit, activations)
+}
+
+/// Images without learning, to find a rate.
+struct Draft<'a> {
+    quantizer: &'a Quantizer<'a>,
+    options: &'a Options,
+    limit: TimeLimit,
+}
+
+impl Draft<'_> {
+    fn at(&self, rate: Rate) -> Result<QuantizedPolicy> {
+        self.quantizer.at(rate, self.options, &mut |_| {})
     }
-    for _ in 0..TRIES {
-        let middle = 0.5 * (low + high);
-        if time(middle)? <= allowed {
-            low = middle;
-        } else {
-            high = middle;
+
+    /// Finds the most cycles that the method may decide on. The rest of a step takes nearly the same time, whatever the
+    /// rows.
+    fn cycles(&self) -> Result<Rate> {
+        let allowed = self.limit.milliseconds * self.limit.clock_hz / 1e3;
+        let bytes = self.limit.image_bytes.map(|bytes| flash::room(self.quantizer, self.options, bytes)).transpose()?;
+        let rate = |cycles: f64| Rate::Within { bytes, cycles };
+        let taken = |cycles: f64| Ok::<_, Error>(predict(&self.at(rate(cycles))?, self.limit)?.cycles as f64);
+        let fastest = taken(0.0)?;
+        self.check(1e3 * fastest / self.limit.clock_hz)?;
+        let (mut best, mut next) = (0.0, allowed - fastest);
+        for _ in 0..CYCLE_TRIES {
+            let taken = taken(next)?;
+            if taken <= allowed && next > best {
+                best = next;
+            }
+            if (CLOSE * allowed..=allowed).contains(&taken) {
+                break;
+            }
+            // Aim into the middle of what counts as close.
+            next += 0.5 * (1.0 + CLOSE) * allowed - taken;
+            if next <= best {
+                break;
+            }
         }
+        Ok(rate(best))
     }
-    let mut quantized = quantizer.at(Rate::BitsPerWeight(low), options, progress)?;
-    // Return matrices to int8, the largest first.
+
+    /// Finds the most bits per weight.
+    fn most_bits(&self) -> Result<Rate> {
+        let keeps = |quantized: &QuantizedPolicy| -> Result<bool> {
+            let small = self.limit.image_bytes.is_none_or(|bytes| quantized.image.len() <= bytes);
+            Ok(small && predict(quantized, self.limit)?.milliseconds <= self.limit.milliseconds)
+        };
+        let (mut low, mut high) = (least_bits(self.at(Rate::BitsPerWeight(f64::MIN_POSITIVE)))?, MOST_BITS);
+        let fastest = self.at(Rate::BitsPerWeight(low))?;
+        self.check(predict(&fastest, self.limit)?.milliseconds)?;
+        if let Some(bytes) = self.limit.image_bytes {
+            let least = fastest.image.len();
+            ensure!(least <= bytes, "the smallest image takes {least} bytes, but {bytes} are allowed");
+        }
+        if keeps(&self.at(Rate::BitsPerWeight(high))?)? {
+            low = high;
+        }
+        for _ in 0..TRIES {
+            let middle = 0.5 * (low + high);
+            if keeps(&self.at(Rate::BitsPerWeight(middle))?)? {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Ok(Rate::BitsPerWeight(low))
+    }
+
+    fn check(&self, fastest: f64) -> Result<()> {
+        let TimeLimit { milliseconds, clock_hz, .. } = self.limit;
+        ensure!(
+            fastest <= milliseconds,
+            "{milliseconds} ms are allowed, but the fastest step takes {fastest:.3} ms at {} MHz",
+            clock_hz / 1e6
+        );
+        Ok(())
+    }
+}
+
+/// Returns matrices to the activations before measurement until the time is kept, the largest first.
+fn kept(mut quantized: QuantizedPolicy, limit: TimeLimit, activations: Activations) -> Result<QuantizedPolicy> {
     let outcomes = &quantized.outcomes;
     let mut wide: Vec<usize> = (0..outcomes.len()).filter(|&m| outcomes[m].x_max > activations.limit()).collect();
     wide.sort_by_key(|&m| outcomes[m].quantized.codes.len());
     loop {
         let time = predict(&quantized, limit)?;
-        if time.milliseconds <= allowed {
+        if time.milliseconds <= limit.milliseconds {
             return Ok(QuantizedPolicy { time: Some(time), ..quantized });
         }
         let m = wide.pop().context("the step takes longer than was predicted before learning")?;

@@ -87,7 +87,9 @@ impl Operation for Gru {
     }
 
     fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, [d_h, _]: &mut NodeState) {
-        let (Ok([x, before]), [h_before, a, b]) = (<[_; 2]>::try_from(saved.operands), &saved.inner[..]) else { return };
+        let (Ok([x, before]), [h_before, a, b]) = (<[_; 2]>::try_from(saved.operands), &saved.inner[..]) else {
+            return;
+        };
         let back = run.back(self.state);
         let batch = d_h.nrows();
         let (mut d_a, mut d_b) = (Array2::zeros(a.raw_dim()), Array2::zeros(b.raw_dim()));

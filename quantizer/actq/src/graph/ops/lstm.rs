@@ -91,7 +91,9 @@ impl Operation for Lstm {
     }
 
     fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, [d_h, d_c]: &mut NodeState) {
-        let (Ok([x, before]), [c_before, gates]) = (<[_; 2]>::try_from(saved.operands), &saved.inner[..]) else { return };
+        let (Ok([x, before]), [c_before, gates]) = (<[_; 2]>::try_from(saved.operands), &saved.inner[..]) else {
+            return;
+        };
         let back = run.back(self.state);
         let batch = d_h.nrows();
         let mut d_gates = Array2::zeros(gates.raw_dim());

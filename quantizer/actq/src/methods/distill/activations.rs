@@ -150,7 +150,7 @@ mod tests {
         for cols in [18, 320] {
             graph.matrices.push(WeightMatrix { name: "m".into(), rows: 64, cols, data: vec![0.0; 64 * cols] });
         }
-        let size = Size { graph: &graph, dimensions: &[], packings: Vec::new(), values: 0 };
+        let size = Size::new(&graph, &[], 0);
         let rows = |energy: f64| Rows { energy: vec![energy; 64], removal: vec![1e9; 64], forced: None };
         let limits = |of_first: f64, activations: Activations| {
             let plain = Options::new(Method::Distill, Budget::BitsPerWeight(4.0));

@@ -28,6 +28,14 @@ impl Stride {
     }
 }
 
+impl Stride {
+    /// Returns the stride with another rate.
+    #[inline(always)]
+    pub(super) fn times(self, factor: f32) -> Self {
+        Self { rate: self.rate * factor, ..self }
+    }
+}
+
 impl Adam {
     /// Makes moments of `len` parameters.
     pub(super) fn new(len: usize) -> Self {

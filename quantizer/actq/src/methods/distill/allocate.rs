@@ -9,10 +9,10 @@
 use actq_kernels::Width;
 
 use super::dimension::{Dimension, Widths};
-use super::size::Size;
+use super::size::{Price, Size};
 use crate::budget::{BudgetTooSmall, USED};
 use crate::error::Result;
-use crate::graph::{Graph, WeightMatrix};
+use crate::graph::WeightMatrix;
 
 /// Returns the predicted squared error of a row in units of its own energy: that of the mid-rise grid with error
 /// feedback. The value at 8 bits is higher than the cost of rounding (0.00005), so that 8 bits go only to rows for
@@ -58,46 +58,56 @@ pub fn energies(matrix: &WeightMatrix, h: &[f64], g: &[f64]) -> Vec<f64> {
     rows.map(|(row, g)| g * row.iter().zip(h).map(|(w, h)| f64::from(*w).powi(2) * h).sum::<f64>()).collect()
 }
 
-/// Returns the error of removing each element of `dimension`: the energies of the columns that it feeds. `h` is the
-/// importance of those columns about their means (which go into the biases), `g` that of the rows that they reach, by
-/// matrix.
-pub fn removals(graph: &Graph, dimension: &Dimension, h: &[Vec<f64>], g: &[Vec<f64>]) -> Vec<f64> {
-    let mut removals = vec![0.0; graph.matrices[dimension.maker].rows];
-    for &consumer in &dimension.consumers {
-        let matrix = &graph.matrices[consumer];
-        for (row, g) in matrix.data.chunks_exact(matrix.cols).zip(&g[consumer]) {
-            for (c, (removal, w)) in removals.iter_mut().zip(row).enumerate() {
-                *removal += g * f64::from(*w).powi(2) * h[consumer][c];
-            }
-        }
-    }
-    removals
-}
+/// Shares of time in the price, where both bytes and cycles are limited.
+const SHARES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// Chooses the widths so that [`Size::bytes`] stays within `limit`.
+/// Chooses the widths so that [`Size::bytes`] stays within `limit`, and the cycles within their own limit: of several
+/// prices for bytes and cycles, the one with the lowest expected error. If even the fewest rows take too many cycles,
+/// those are chosen.
 ///
 /// # Errors
 ///
-/// [`BudgetTooSmall`] if [`Size::smallest`] takes more.
+/// [`BudgetTooSmall`] if [`Size::smallest`] takes more bytes.
 pub fn allocate(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
+    let Some(cycles) = size.cycles else { return at_price(size, rows, limit) };
+    let of = |share: f64| {
+        // Both limits are one.
+        let bit = if limit.is_finite() { (1.0 - share) / (8.0 * limit) } else { 0.0 };
+        at_price(&Size { price: Price { bit, cycle: share / cycles.max(1.0) }, ..size.clone() }, rows, limit)
+    };
+    let shares = if limit.is_finite() { &SHARES[..] } else { &[1.0] };
+    let tried = shares.iter().map(|share| of(*share)).collect::<Result<Vec<Widths>>>()?;
+    let error = |widths: &Widths| -> f64 {
+        let of_matrix = |(rows, widths): (&Rows, &Vec<Option<Width>>)| -> f64 {
+            widths.iter().enumerate().map(|(r, width)| rows.expected(r, *width)).sum()
+        };
+        rows.iter().zip(widths).map(of_matrix).sum()
+    };
+    let best = tried.into_iter().min_by(|a, b| error(a).total_cmp(&error(b)));
+    best.map_or_else(|| smallest(size, rows, limit), Ok)
+}
+
+fn at_price(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
     let (mut widths, multiplier) = match lowest_multiplier(size, rows, limit) {
         Some(multiplier) => (choose(size, rows, multiplier), multiplier),
         None => (smallest(size, rows, limit)?, 0.0),
     };
     fill(&mut widths, size, rows, limit, WORTH * multiplier);
-    if (size.bytes(&widths) as f64) < USED * limit {
+    // Rows without effect on the actions may take bytes that are left, but no time.
+    if size.cycles.is_none() && (size.bytes(&widths) as f64) < USED * limit {
         fill(&mut widths, size, rows, limit, 0.0);
     }
     Ok(widths)
 }
 
-/// Returns the lowest multiplier, in units of error per bit, whose widths fit. `None` if even the highest does not fit:
-/// it keeps the most important rows, and others may take fewer bytes.
+/// Returns the lowest multiplier, in units of error per price, whose widths fit. `None` if even the highest does not
+/// fit: it keeps the most important rows, and others may take fewer bytes.
 fn lowest_multiplier(size: &Size<'_>, rows: &[Rows], limit: f64) -> Option<f64> {
-    let fits = |multiplier: f64| size.bytes(&choose(size, rows, multiplier)) as f64 <= limit;
+    let fits = |multiplier: f64| size.fits(&choose(size, rows, multiplier), limit);
     // The range covers everything from 8 bits to none for any scale of energies.
-    let largest = rows.iter().flat_map(|r| &r.energy).fold(1e-300f64, |m, e| m.max(*e));
-    let (mut low, mut high) = ((largest * 1e-18).ln(), (largest * 10.0).ln());
+    let largest = rows.iter().flat_map(|r| r.energy.iter().chain(&r.removal)).fold(1e-300f64, |m, e| m.max(*e));
+    let unit = if size.price.bit > 0.0 { size.price.bit } else { size.price.cycle };
+    let (mut low, mut high) = ((largest * 1e-18 / unit).ln(), (largest * 10.0 / unit).ln());
     if !fits(high.exp()) {
         return None;
     }
@@ -125,14 +135,19 @@ fn smallest(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
 /// of one matrix and one width, at most as many as a block is padded to. Rows that gain less than `least` per bit keep
 /// their width, since rows without effect on the actions should not take time.
 fn fill(widths: &mut Widths, size: &Size<'_>, rows: &[Rows], limit: f64, least: f64) {
-    let mut taken = size.bytes(widths);
+    if !size.fits(widths, limit) {
+        return;
+    }
+    let mut taken = size.price(widths);
+    // That of a byte.
+    let least_price = (8.0 * size.price.bit).max(size.price.cycle);
     loop {
-        let mut best: Option<(f64, Widths, usize)> = None;
+        let mut best: Option<(f64, Widths, f64)> = None;
         let free = (0..rows.len()).filter(|&m| rows[m].forced.is_none());
         for (m, (from, to)) in free.flat_map(|m| widenings().map(move |widening| (m, widening))) {
-            let bits = RowBits::new(size, widths, m);
+            let price = RowPrice::new(size, widths, m);
             let gain = |r: &usize| rows[m].expected(*r, from) - rows[m].expected(*r, to);
-            let gained_at_least = least * (bits.at(to) - bits.at(from));
+            let gained_at_least = least * (price.at(to) - price.at(from));
             let is_worth = |r: &usize| widths[m][*r] == from && gain(r) > gained_at_least;
             let mut candidates: Vec<usize> = (0..widths[m].len()).filter(is_worth).collect();
             candidates.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
@@ -141,10 +156,10 @@ fn fill(widths: &mut Widths, size: &Size<'_>, rows: &[Rows], limit: f64, least: 
             for &r in candidates.iter().take(MOST_AT_ONCE) {
                 wider[m][r] = to;
                 gained += gain(&r);
-                let takes = size.bytes(&wider);
-                let worth = gained / takes.saturating_sub(taken).max(1) as f64;
+                let takes = size.price(&wider);
+                let worth = gained / (takes - taken).max(least_price);
                 let reached = Dimension::made_by(size.dimensions, m).is_some() || are_within_steps(&wider[m]);
-                if takes as f64 <= limit && reached && best.as_ref().is_none_or(|(best, ..)| worth > *best) {
+                if reached && best.as_ref().is_none_or(|(best, ..)| worth > *best) && size.fits(&wider, limit) {
                     best = Some((worth, wider.clone(), takes));
                 }
             }
@@ -165,37 +180,54 @@ fn are_within_steps(widths: &[Option<Width>]) -> bool {
     Width::ALL.into_iter().all(|width| out_of_reach(widths, width).is_none())
 }
 
-/// Bits of one more row of a matrix, without padding.
-struct RowBits {
-    cols: f64,
-    /// Scale, output step if present, and bias if it is removed with the row and counts.
-    overhead: f64,
-    /// Saving by the column that a removed row takes with it: one bit per bit of each row that it crosses.
+/// Price of one more row of a matrix, without padding.
+struct RowPrice {
+    /// At each of [`Width::ALL`].
+    rows: [f64; Width::ALL.len()],
+    /// Saving by what a removed row takes with it: its column of the rows that read it, and its functions.
     saving: f64,
 }
 
-impl RowBits {
+impl RowPrice {
     fn new(size: &Size<'_>, widths: &Widths, m: usize) -> Self {
         let Size { graph, dimensions, values, .. } = *size;
-        let bits_of = |m: usize| -> f64 { widths[m].iter().flatten().map(|w| f64::from(w.bits())).sum() };
         let made = Dimension::made_by(dimensions, m);
+        let cols = Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths));
+        // Scale, output step if present, and bias if it is removed with the row and counts.
+        let overhead = match made {
+            Some(_) if values > 0 => 48.0,
+            Some(_) => 16.0,
+            None => 24.0,
+        };
+        let Price { bit, cycle } = size.price;
+        let row = |width: Width| {
+            let cycles = if cycle > 0.0 { cycle * size.row_cycles(m, width, cols) } else { 0.0 };
+            cycles + bit * (cols as f64 * f64::from(width.bits()) + overhead)
+        };
+        let column = |consumer: usize| -> f64 {
+            let kept = made.map_or(1, |d| d.kept(widths).max(1));
+            let price = |width: Width| {
+                let cycles = if cycle > 0.0 { cycle * size.row_cycles(consumer, width, kept) } else { 0.0 };
+                cycles / kept as f64 + bit * f64::from(width.bits())
+            };
+            let prices = Width::ALL.map(price);
+            widths[consumer].iter().flatten().map(|width| prices[*width as usize]).sum()
+        };
         Self {
-            cols: Dimension::feeding(dimensions, m).map_or(graph.matrices[m].cols, |d| d.kept(widths)) as f64,
-            overhead: match made {
-                Some(_) if values > 0 => 48.0,
-                Some(_) => 16.0,
-                None => 24.0,
-            },
-            saving: made.map_or(0.0, |d| d.consumers.iter().map(|&c| bits_of(c)).sum()),
+            rows: Width::ALL.map(row),
+            saving: made.map_or(0.0, |d| {
+                let functions = if cycle > 0.0 { size.runs[m] as f64 * size.of_functions(d, 1) } else { 0.0 };
+                d.consumers.iter().map(|&consumer| column(consumer)).sum::<f64>() + cycle * functions
+            }),
         }
     }
 
     fn at(&self, width: Option<Width>) -> f64 {
-        width.map_or(-self.saving, |width| self.cols * f64::from(width.bits()) + self.overhead)
+        width.map_or(-self.saving, |width| self.rows[width as usize])
     }
 }
 
-/// Returns the widths that minimize error plus `multiplier` times bits. The saving of a removed row depends on the
+/// Returns the widths that minimize error plus `multiplier` times their price. The saving of a removed row depends on the
 /// other rows' widths, so the choice is repeated until it settles.
 fn choose(size: &Size<'_>, rows: &[Rows], multiplier: f64) -> Widths {
     let Size { graph, dimensions, .. } = size;
@@ -203,8 +235,8 @@ fn choose(size: &Size<'_>, rows: &[Rows], multiplier: f64) -> Widths {
     for _ in 0..4 {
         let next: Widths = (0..graph.matrices.len())
             .map(|m| {
-                let bits = RowBits::new(size, &widths, m);
-                let cost = |r: usize, width: Option<Width>| rows[m].expected(r, width) + multiplier * bits.at(width);
+                let price = RowPrice::new(size, &widths, m);
+                let cost = |r: usize, width: Option<Width>| rows[m].expected(r, width) + multiplier * price.at(width);
                 let best = |r: usize| {
                     let order = |a: &&Option<Width>, b: &&Option<Width>| cost(r, **a).total_cmp(&cost(r, **b));
                     rows[m].forced.or_else(|| CHOICES.iter().min_by(order).copied().flatten())
@@ -255,6 +287,7 @@ fn out_of_reach(widths: &[Option<Width>], width: Width) -> Option<(usize, Option
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::graph::Graph;
     use crate::methods::packing::Packing;
     use crate::random::Random;
 
@@ -272,7 +305,7 @@ mod tests {
         };
         let rows: Vec<Rows> = graph.matrices.iter().map(rows).collect();
         let packings = vec![vec![Packing::of(127, 0), Packing::of(32767, 0)]; 2];
-        let size = Size { graph: &graph, dimensions: &[], packings, values: 0 };
+        let size = Size { packings, ..Size::new(&graph, &[], 0) };
         for limit in (1000..4000).step_by(97).map(f64::from) {
             let widths = allocate(&size, &rows, limit).expect("it fits");
             let taken = size.bytes(&widths);
@@ -296,7 +329,7 @@ mod tests {
         let mut graph = Graph::new(8);
         graph.matrices = vec![WeightMatrix { name: "m".into(), rows: 300, cols: 8, data: vec![0.0; 2400] }];
         let packings = vec![vec![Packing::of(127, 0)]];
-        let size = Size { graph: &graph, dimensions: &[], packings, values: 0 };
+        let size = Size { packings, ..Size::new(&graph, &[], 0) };
         // The row that matters is beyond the reach of a step.
         let energy: Vec<f64> = (0..300).map(|r| if r == 299 { 1.0 } else { 1e-9 }).collect();
         let rows = [Rows { removal: energy.clone(), energy, forced: None }];

@@ -2,8 +2,10 @@
 //! vector, and it reaches only matrices, through elementwise functions.
 
 use actq_kernels::Width;
+use actq_kernels::math::Function;
 
 use crate::graph::operation::{Operand, Product};
+use crate::graph::ops::Pointwise;
 use crate::graph::{Graph, NodeKind};
 
 /// Width of every row per matrix; `None` for rows without bits.
@@ -29,6 +31,18 @@ impl Dimension {
     /// Returns the dimension that matrix `m` makes.
     pub fn made_by(dimensions: &[Self], m: usize) -> Option<&Self> {
         dimensions.iter().find(|d| d.maker == m)
+    }
+
+    /// Returns the functions that every element passes.
+    pub fn functions(&self, graph: &Graph) -> Vec<Function> {
+        let mut functions = Vec::new();
+        let mut value = self.node + 1;
+        while let [next] = graph.readers(value)[..] {
+            let NodeKind::Pointwise(Pointwise(function)) = graph.nodes[next].kind else { break };
+            functions.push(function);
+            value = next + 1;
+        }
+        functions
     }
 
     /// Returns how many of its elements have bits.
@@ -89,11 +103,9 @@ fn consumers(graph: &Graph, node: usize) -> Option<Vec<usize>> {
 
 #[cfg(test)]
 pub(super) mod testing {
-    use actq_kernels::math::Function;
-
     use super::*;
     use crate::graph::WeightMatrix;
-    use crate::graph::ops::{Add, Linear, Pointwise};
+    use crate::graph::ops::{Add, Linear};
 
     /// Makes a network 3 -> 5 tanh -> [2 and, through a residual sum, 5] with different values everywhere.
     pub(in crate::methods::distill) fn graph() -> Graph {

@@ -65,6 +65,14 @@ impl Grid {
         self.round(code) * self.step + self.base
     }
 
+    /// Returns the rate of codes in units of that of 2 bits. A wider row has more steps for the same weights, so equal
+    /// strides would change it less; strides in proportion to the steps would undo the gain of finer ones. The root is
+    /// between (docs/QUANTIZER.md has figures).
+    fn stride(self) -> f32 {
+        const OF_2_BITS: f32 = 3.0;
+        ((self.high - self.low) / OF_2_BITS).sqrt()
+    }
+
     /// Turns the derivatives by weights of one scale into those by their codes; returns that by the logarithm of the
     /// scale.
     #[inline(always)]
@@ -158,7 +166,7 @@ impl Latent {
                     || {
                         let groups = grads.chunks_mut(*group).zip(codes.chunks(*group)).zip(scales);
                         let by_scale = groups.map(|((grads, codes), scale)| grid.through(grads, codes, *scale)).sum();
-                        step(codes, grads, first, second, by_code);
+                        step(codes, grads, first, second, by_code.times(grid.stride()));
                         by_scale
                     },
                 )

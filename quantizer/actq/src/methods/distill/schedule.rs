@@ -9,18 +9,19 @@ use std::time::{Duration, Instant};
 use actq_kernels::math;
 
 use crate::graph::Graph;
+use crate::methods::options::Effort;
 
 /// Share of the steps at the full rate.
 const HELD: f64 = 0.7;
 /// Most steps of a network of [`USUAL`] weights. The steps of others follow the square root of the size: a small
 /// network learns longer, a large one keeps its time. A step costs more for an iterative head, where a frame is one of
 /// every denoising step, and four times as much for a batch of a recurrent network's windows.
-const STEPS: f64 = 20_000.0;
-const DENOISING_STEPS: f64 = 10_000.0;
-const WINDOW_STEPS: f64 = 7_800.0;
+const STEPS: f64 = 8_000.0;
+const DENOISING_STEPS: f64 = 5_000.0;
+const WINDOW_STEPS: f64 = 4_000.0;
 const USUAL: f64 = 200_000.0;
 /// Most steps of any network.
-const MOST: f64 = 20_000.0;
+const MOST: f64 = 10_000.0;
 /// Parts of the most steps whose mean errors form the error's course, and least steps of a part.
 const PARTS: usize = 16;
 const LEAST_PART: usize = 100;
@@ -28,14 +29,14 @@ const LEAST_PART: usize = 100;
 const FALLEN: f64 = 0.01;
 const FLAT: usize = 2;
 
-/// Returns the default most steps of a network.
-pub fn most_steps(graph: &Graph) -> usize {
+/// Returns the most steps of a network.
+pub fn most_steps(graph: &Graph, effort: Effort) -> usize {
     let usual = match graph.state_len() > 0 {
         true => WINDOW_STEPS,
         false if graph.denoising_steps() > 1 => DENOISING_STEPS,
         false => STEPS,
     };
-    scaled(usual, graph.weights())
+    (effort.factor() * scaled(usual, graph.weights()) as f64) as usize
 }
 
 /// Returns the steps of a network of this many weights.
@@ -182,7 +183,7 @@ mod tests {
 
     #[test]
     fn small_networks_take_more_steps() {
-        assert_eq!(scaled(WINDOW_STEPS, 31_000), 19_812);
-        assert_eq!([10, 200_000, 800_000].map(|weights| scaled(STEPS, weights)), [20_000, 20_000, 10_000]);
+        assert_eq!(scaled(WINDOW_STEPS, 50_000), 8_000);
+        assert_eq!([10, 200_000, 800_000].map(|weights| scaled(STEPS, weights)), [10_000, 8_000, 4_000]);
     }
 }

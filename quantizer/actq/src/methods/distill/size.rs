@@ -1,7 +1,10 @@
-//! Bytes as a function of the rows' widths, for the allocation, and their minimum.
+//! Bytes and cycles as functions of the rows' widths, for the allocation, and the fewest bytes.
 
 use actq_kernels::Width;
 use actq_kernels::image::block_bytes;
+use actq_kernels::layout::{BlockShape, STRIP};
+use actq_kernels::math::Function;
+use actq_kernels::pace::cost;
 
 use super::balance::balance_bytes;
 use super::dimension::{Dimension, Widths};
@@ -19,9 +22,68 @@ pub struct Size<'a> {
     pub packings: Vec<Vec<Packing>>,
     /// Counted values of the vectors, with all rows.
     pub values: usize,
+    /// Runs of every matrix in a step.
+    pub runs: Vec<usize>,
+    /// Most modelled cycles of the products and of the functions after them; `None`: time does not matter.
+    pub cycles: Option<f64>,
+    /// What the allocation pays with.
+    pub price: Price,
 }
 
-impl Size<'_> {
+/// Shares of a bit and of a cycle in the price of a row.
+#[derive(Clone, Copy, Debug)]
+pub struct Price {
+    /// Of a bit.
+    pub bit: f64,
+    /// Of a cycle.
+    pub cycle: f64,
+}
+
+impl<'a> Size<'a> {
+    /// Counts bytes alone, of matrices whose layouts are still to be chosen.
+    pub fn new(graph: &'a Graph, dimensions: &'a [Dimension], values: usize) -> Self {
+        let runs = (0..graph.matrices.len()).map(|m| graph.runs(m)).collect();
+        let price = Price { bit: 1.0, cycle: 0.0 };
+        Self { graph, dimensions, packings: Vec::new(), values, runs, cycles: None, price }
+    }
+
+    /// Returns `true` if the widths keep `limit`, in bytes, and the limit on cycles.
+    pub fn fits(&self, widths: &Widths, limit: f64) -> bool {
+        self.bytes(widths) as f64 <= limit && self.cycles.is_none_or(|most| self.cycles(widths) <= most)
+    }
+
+    /// Returns the price of the widths.
+    pub fn price(&self, widths: &Widths) -> f64 {
+        let Price { bit, cycle } = self.price;
+        let cycles = if cycle > 0.0 { cycle * self.cycles(widths) } else { 0.0 };
+        cycles + if bit > 0.0 { bit * 8.0 * self.bytes(widths) as f64 } else { 0.0 }
+    }
+
+    /// Returns the modelled cycles of the matrices' rows in a step, with those of the functions after them.
+    pub fn cycles(&self, widths: &Widths) -> f64 {
+        let of_matrix = |m: usize| {
+            let Some(&packing) = self.packings[m].first() else { return 0.0 };
+            let blocks = self.blocks(widths, m, packing).map(|(shape, sorted)| cost::of_rows(shape, sorted).cycles);
+            let functions =
+                Dimension::made_by(self.dimensions, m).map_or(0.0, |d| self.of_functions(d, d.kept(widths)));
+            self.runs[m] as f64 * (blocks.sum::<u64>() as f64 + functions)
+        };
+        (0..self.packings.len()).map(of_matrix).sum()
+    }
+
+    /// Returns the cycles of one more row of `cols` columns in every run of a matrix.
+    pub fn row_cycles(&self, m: usize, width: Width, cols: usize) -> f64 {
+        let Some(packing) = self.packings[m].first() else { return 0.0 };
+        let of = |rows: usize| cost::of_rows(packing.shape(width, rows, cols.max(1)), true).cycles as f64;
+        self.runs[m] as f64 * (of(2 * STRIP) - of(STRIP)) / STRIP as f64
+    }
+
+    /// Returns the cycles of the functions of a dimension of `len` elements.
+    pub fn of_functions(&self, dimension: &Dimension, len: usize) -> f64 {
+        let of = |function: &Function| cost::of_values(*function, len).cycles as f64;
+        dimension.functions(self.graph).iter().map(of).sum()
+    }
+
     /// Returns all counted bytes: the balance, the vectors, and all matrices. Rows without bits and the columns that
     /// compaction removes do not count. Of a matrix's possible layouts, the largest counts.
     pub fn bytes(&self, widths: &Widths) -> usize {
@@ -40,12 +102,17 @@ impl Size<'_> {
     /// Returns the bytes of a matrix in one layout. Rows of a dimension are sorted by width; other matrices have output
     /// steps if their order is not that of the blocks.
     pub fn matrix(&self, widths: &Widths, m: usize, packing: Packing) -> usize {
+        self.blocks(widths, m, packing).map(|(shape, sorted)| block_bytes(shape, !sorted)).sum()
+    }
+
+    /// Returns the blocks of a matrix in one layout; `true` if its rows need no output steps.
+    fn blocks(&self, widths: &Widths, m: usize, packing: Packing) -> impl Iterator<Item = (BlockShape, bool)> + use<> {
         let fed = Dimension::feeding(self.dimensions, m);
         let cols = fed.map_or(self.graph.matrices[m].cols, |d| d.kept(widths).max(1));
         let sorted = Dimension::made_by(self.dimensions, m).is_some() || are_in_order(&widths[m]);
-        let rows_of = |width: Width| widths[m].iter().filter(|w| **w == Some(width)).count();
-        let used = Width::ALL.into_iter().map(|width| (width, rows_of(width))).filter(|(_, rows)| *rows > 0);
-        used.map(|(width, rows)| block_bytes(packing.shape(width, rows, cols), !sorted)).sum()
+        let rows_of = Width::ALL.map(|width| (width, widths[m].iter().filter(|w| **w == Some(width)).count()));
+        let used = rows_of.into_iter().filter(|(_, rows)| *rows > 0);
+        used.map(move |(width, rows)| (packing.shape(width, rows, cols), sorted))
     }
 
     /// Returns the widths that take the fewest bytes. Every matrix keeps one row, since without any it would disconnect
@@ -103,7 +170,7 @@ mod tests {
         graph.matrices = vec![WeightMatrix { name: "m".into(), rows: 23, cols: 19, data: Vec::new() }];
         for x_max in [127, 32767] {
             let packing = Packing::of(x_max, 0);
-            let size = Size { graph: &graph, dimensions: &[], packings: vec![vec![packing]], values: 0 };
+            let size = Size { packings: vec![vec![packing]], ..Size::new(&graph, &[], 0) };
             for _ in 0..200 {
                 let choices = [None, Some(Width::W2), Some(Width::W3), Some(Width::W4), Some(Width::W8)];
                 let of = 1 + random.below(5);
@@ -122,7 +189,7 @@ mod tests {
         let graph = graph();
         let dimensions = dimensions(&graph);
         let packings = vec![vec![Packing::of(127, 0)]; 3];
-        let size = Size { graph: &graph, dimensions: &dimensions, packings, values: 13 };
+        let size = Size { packings, ..Size::new(&graph, &dimensions, 13) };
         let least = size.bytes(&size.smallest(&[None; 3]));
         let mut random = Random::new(5);
         for _ in 0..500 {

@@ -17,12 +17,13 @@ use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
 use crate::graph::{Derivatives, Graph, Network, Vectors, Weights};
+use crate::methods::options::Effort;
 use crate::methods::quantized::Quantized;
 use crate::random::Random;
 
 /// Learning rates.
 struct Rates {
-    /// Rate of latent weights, in steps.
+    /// Rate of latent weights, in steps, of rows of 2 bits; wider ones take larger strides ([`Latent::learn`]).
     latent: f32,
     /// Rate of the scales' logarithms.
     scale: f32,
@@ -30,8 +31,8 @@ struct Rates {
     vector: f32,
 }
 
-/// Rates of feed-forward networks. With higher ones, they fit the recording better and held-out episodes worse.
-const OF_FRAMES: Rates = Rates { latent: 4e-3, scale: 3e-3, vector: 1e-3 };
+/// Rates of feed-forward networks.
+const OF_FRAMES: Rates = Rates { latent: 8e-3, scale: 6e-3, vector: 2e-3 };
 /// Rates of recurrent networks, which take fewer steps: with the rates above, g1_lstm64 ends at 1.6 times the error
 /// (docs/records).
 const OF_WINDOWS: Rates = Rates { latent: 3e-2, scale: 1e-2, vector: 1e-2 };
@@ -95,7 +96,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
         false => ((FRAMES / task.graph.denoising_steps().isqrt()).max(4 * FRAME_SHARDS), FRAME_SHARDS, OF_FRAMES),
     };
     let objective = Objective::new(&windows.output_variance, task.frames);
-    let mut schedule = Schedule::new(task.bounds, most_steps(task.graph));
+    let mut schedule = Schedule::new(task.bounds, most_steps(task.graph, Effort::Default));
     while let Some(rate) = schedule.rate() {
         for (latent, weights) in latents.iter().zip(&mut weights.matrices) {
             weights.set(|values| latent.weights(values));
