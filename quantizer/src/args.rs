@@ -464,10 +464,13 @@ pub struct SweepArgs {
     /// The held-out recording to measure on [default: heldout.* in POLICY_DIR]
     #[arg(long, value_name = "FILE")]
     pub(crate) heldout: Option<PathBuf>,
-    /// Draw the error over the bits as SVG, and mark the knee of the best method
+    /// The processor's clock for predicted times, in Hz or as 168M
+    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = clock)]
+    pub(crate) clock: f64,
+    /// Draw the error over bytes and over predicted milliseconds as SVG, and mark the knee of the best method
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
-    /// Write errors, bits, bytes and allocations as JSON: an array with one object for each policy
+    /// Write bytes, milliseconds, errors, bits and allocations as JSON: an array with one object for each policy
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
     #[command(flatten)]

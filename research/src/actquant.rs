@@ -181,6 +181,7 @@ mod tests {
                 methods: &[Method::custom(ActQuant(Choices::default()))],
                 budgets: &[50.0, 100.0],
                 effort: Effort::Default,
+                clock_hz: 168e6,
                 steps: None,
                 minutes: None,
                 relative: false,

@@ -38,6 +38,7 @@ pub fn run(args: &SweepArgs, methods: &[Method]) -> Result<()> {
             recordings,
             methods,
             budgets: &args.bpw,
+            clock_hz: args.clock,
             steps: args.learn.steps,
             effort: args.learn.effort,
             minutes: args.learn.minutes,
@@ -49,16 +50,7 @@ pub fn run(args: &SweepArgs, methods: &[Method]) -> Result<()> {
         })?);
     }
     drop(progress);
-    let mut knees = String::new();
-    for sweep in &sweeps {
-        if let Some(knee) = &sweep.knee {
-            knees += &format!(
-                "\n* knee of {}: {} at {:.3} bits per weight, NMSE {:.2e}",
-                sweep.policy, knee.method, knee.bpw, knee.nmse
-            );
-        }
-    }
-    print(&format!("{}\n{knees}\n", report::sweep::table(&sweeps)))?;
+    print(&report::sweep::report(&sweeps))?;
     let (svg, json) = (report::sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
     let contents = [args.svg.is_some().then_some(svg), args.json.is_some().then_some(json)];
     outputs.write(&contents.into_iter().flatten().collect::<Vec<_>>())

@@ -82,16 +82,17 @@ pub fn search(search: &Search) -> String {
     )
 }
 
-/// Formats a row for each try.
+/// Formats a row for each try. Times are at the default clock.
 fn tries(tries: &[Try]) -> Table {
-    let mut table = table(&["budget", "steps", "bits per weight", "NMSE"]);
+    let mut table = table(&["bytes", "ms", "NMSE", "bits (limit)", "steps"]);
     for t in tries {
         let cell = |text: &dyn Fn(&ErrorReport) -> String| t.report.as_ref().map_or("-".to_owned(), text);
         table.add_row([
-            format!("{:.1}", t.budget),
-            t.steps.to_string(),
-            cell(&|r| format!("{:.3}", r.bpw)),
+            cell(&|r| r.bytes.to_string()),
+            t.milliseconds.map_or("-".to_owned(), |ms| format!("{ms:.3}")),
             cell(&|r| format!("{:.2e}", r.nmse)),
+            format!("{} ({:.1})", cell(&|r| format!("{:.3}", r.bpw)), t.budget),
+            t.steps.to_string(),
         ]);
     }
     table

@@ -31,9 +31,10 @@ pub fn report(step: &StepTime) -> String {
 
 /// Formats the time of the step as a sentence.
 pub fn sentence(step: &StepTime) -> String {
-    format!(
-        "Predicted time of a step: {:.3} ms at {} MHz, on a Cortex-M4 with FPU and zero-wait-state memory.\n",
-        step.milliseconds,
-        step.clock_hz / 1e6
-    )
+    format!("Predicted time of a step: {:.3} ms {}.\n", step.milliseconds, conditions(step.clock_hz))
+}
+
+/// Formats the conditions of all predicted times.
+pub fn conditions(clock_hz: f64) -> String {
+    format!("at {} MHz on a Cortex-M4 with FPU and zero-wait-state memory", clock_hz / 1e6)
 }

@@ -33,6 +33,10 @@ impl CellKey {
 pub struct Made {
     /// Error on the held-out recording.
     pub nmse: f64,
+    /// Predicted milliseconds of a step at the default clock; `None` if no kernel computes the format, and in journals
+    /// of earlier versions.
+    #[serde(default)]
+    pub milliseconds: Option<f64>,
     /// Bits per weight, everything counted.
     pub bpw: f64,
     /// Bytes of the image.

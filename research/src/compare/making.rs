@@ -8,6 +8,7 @@ use actq::budget::{Budget, BudgetTooSmall};
 use actq::data::{Dataset, Recording, Recordings};
 use actq::graph::Graph;
 use actq::measure::eval;
+use actq::measure::time::{CLOCK, StepTime};
 use actq::methods::Options;
 use actq::pipeline::Quantizer;
 use actq::policy::Policy;
@@ -130,6 +131,7 @@ impl<'a> Maker<'a> {
         let bytes = simulated.bytes + 4 * (parameters - weights);
         let made = Made {
             nmse: simulated.nmse,
+            milliseconds: None,
             bpw: 8.0 * simulated.bytes as f64 / weights.max(1) as f64,
             bytes,
             bytes_per_parameter: bytes as f64 / parameters.max(1) as f64,
@@ -175,9 +177,12 @@ impl<'a> Maker<'a> {
             Err(error) => return error.budget().map(|small| Err(*small)).ok_or(error.into()),
         };
         let seconds = preparing + begun.elapsed().as_secs_f64();
-        let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, self.subject.heldout()?)?;
+        let buffer = quantized.buffer();
+        let image = buffer.image(Path::new("image in memory"))?;
+        let report = eval::evaluate(image, self.subject.heldout()?)?;
         let made = Made {
             nmse: report.nmse,
+            milliseconds: Some(StepTime::new(&image, CLOCK).milliseconds),
             bpw: report.bpw,
             bytes: report.bytes,
             bytes_per_parameter: report.bytes as f64 / self.subject.policy.parameters.max(1) as f64,
@@ -191,7 +196,8 @@ impl<'a> Maker<'a> {
 
 /// Explains why a budget is too small.
 fn least(BudgetTooSmall { bytes, weights, .. }: &BudgetTooSmall, with: &str) -> String {
-    format!("the least is {:.3} bits per weight, {with}", 8.0 * *bytes as f64 / (*weights).max(1) as f64)
+    let bits = 8.0 * *bytes as f64 / (*weights).max(1) as f64;
+    format!("the least is {bytes} bytes of weights, {bits:.3} bits per weight, {with}")
 }
 
 /// Describes a group.

@@ -3,9 +3,11 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use actq::measure::time::CLOCK;
 use actq::pipeline::driven::DriveOutcome;
 use actq_cli::outputs::files;
 use actq_cli::report::plot::{Plot, Series, Vertical, stacked};
+use actq_cli::report::time::conditions;
 use anyhow::Result;
 use serde_json::Value;
 
@@ -20,9 +22,10 @@ const TRACKING: [(&str, &str); 3] = [("tracking_error_mm", "mm"), ("err_lin", "m
 const PICTURE: &str = "compare.svg";
 
 const READING: &str = "\
-Cells: error on the held-out recording (NMSE, mean over the outputs) · closed-loop success in percent of the episodes (95% interval, \
-Wilson). Every cell of a policy is driven over the same seeds. A column is a budget in bits per weight, scales, steps and padding \
-counted; the second table lists the actual size of each image. `-`: not made, or not driven; the reason is below.";
+Bytes are those of the whole image in flash. NMSE is the error on the held-out recording, mean over the outputs. Success is that of the closed \
+loop in percent of the episodes (95% interval, Wilson); every row of a policy is driven over the same seeds. Bits are per weight, with \
+scales, steps and padding, and in parentheses the most that were allowed; rows with the same limit follow each other. `-`: no kernel, or \
+not driven. Below each table is what was not made, and why.";
 
 const STARRED: &str = "\
 `*`: the method's default group does not fit the budget; of those that do, the one with the lowest held-out error was taken, which is \
@@ -48,7 +51,7 @@ pub(super) fn sentence(cell: &Cell) -> String {
     let made = cell
         .made
         .as_ref()
-        .map(|made| format!("NMSE {:.1e} at {:.3} bits per weight in {:.0} s", made.nmse, made.bpw, made.seconds));
+        .map(|made| format!("NMSE {:.1e} with {} bytes in {:.0} s", made.nmse, made.bytes, made.seconds));
     let driven = cell.outcome().and_then(|outcome| success(&outcome)).map(|success| format!("success {success}"));
     let why = cell.why.as_ref().map(|why| format!("not made: {why}"));
     let parts: Vec<String> = [made, driven, why].into_iter().flatten().collect();
@@ -76,26 +79,35 @@ impl Asked {
     }
 }
 
-/// Returns the plots of success over true bits per weight: one of each driven policy, a line for each method.
+/// Returns the plots of success over bytes and over predicted milliseconds: one of each driven policy, a line for each
+/// method.
 fn plots(journal: &Journal, asked: &Asked) -> Vec<Plot> {
     let percent = |cell: &Cell| cell.outcome()?.success().map(|success| 100.0 * success);
     let find = |policy: &str, method, budget| journal.find(&CellKey { policy: policy.to_owned(), method, budget });
     let line = |policy: &str, method: Contender| -> Series {
-        let cells = asked.budgets.iter().filter_map(|&budget| find(policy, Some(method), Some(budget)));
-        let mut points: Vec<(f64, f64)> =
-            cells.filter_map(|cell| Some((cell.made.as_ref()?.bpw, percent(cell)?))).collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let points = |x: fn(&Made) -> Option<f64>| {
+            let cells = asked.budgets.iter().filter_map(|&budget| find(policy, Some(method), Some(budget)));
+            let mut points: Vec<(f64, f64)> =
+                cells.filter_map(|cell| Some((x(cell.made.as_ref()?)?, percent(cell)?))).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            points
+        };
+        let points = vec![points(|made| Some(made.bytes as f64 / 1e3)), points(|made| made.milliseconds)];
         Series { name: method.title().to_owned(), points }
     };
     let plot = |policy: &String| -> Option<Plot> {
         let f32_success = percent(find(policy, None, None)?)?;
         Some(Plot {
-            title: format!("{policy}: success over bits per weight (f32: {f32_success:.0}%)"),
-            x_label: "bits per weight, everything counted".to_owned(),
+            title: format!("{policy}: success over flash and over time (f32: {f32_success:.0}%)"),
+            x_labels: vec![
+                "flash of the image, kB (1000 bytes)".to_owned(),
+                format!("predicted ms of a step, Cortex-M4 at {} MHz", CLOCK / 1e6),
+            ],
             y_label: "closed-loop success, %".to_owned(),
             vertical: Vertical::Percent,
             series: asked.methods.iter().map(|&method| line(policy, method)).collect(),
             mark: None,
+            frontier: Vec::new(),
         })
     };
     asked.policies.iter().filter_map(plot).collect()
@@ -103,7 +115,7 @@ fn plots(journal: &Journal, asked: &Asked) -> Vec<Plot> {
 
 fn markdown(journal: &Journal, asked: &Asked) -> Result<String> {
     let mut text = head(&journal.header)?;
-    writeln!(text, "\n![Success over bits per weight, a plot a policy]({PICTURE})")?;
+    writeln!(text, "\n![Success over bytes and over predicted milliseconds, a plot a policy]({PICTURE})")?;
     if asked.methods.contains(&Contender::ActQuantK) {
         writeln!(text, "\n{K_QUANTS}")?;
     }
@@ -124,9 +136,10 @@ fn head(header: &Header) -> Result<String> {
     let (seed0, episodes) = (options["seed0"].as_u64().unwrap_or_default(), options["episodes"].as_u64().unwrap_or(1));
     writeln!(
         text,
-        "- {episodes} episodes with the seeds {seed0} to {}, seed {} of the quantizer\n\n{READING}",
+        "- {episodes} episodes with the seeds {seed0} to {}, seed {} of the quantizer\n\n{READING}\n\nms: predicted time of a step, {}.",
         seed0 + episodes.saturating_sub(1),
-        options["seed"]
+        options["seed"],
+        conditions(CLOCK)
     )?;
     Ok(text)
 }
@@ -152,9 +165,9 @@ fn section(text: &mut String, journal: &Journal, asked: &Asked, policy: &str) ->
     };
     let f32_cell = find(None, None);
     let cells: Vec<(Contender, f64, Option<&Cell>)> = asked
-        .methods
+        .budgets
         .iter()
-        .flat_map(|&method| asked.budgets.iter().map(move |&budget| (method, budget)))
+        .flat_map(|&budget| asked.methods.iter().map(move |&method| (method, budget)))
         .map(|(method, budget)| (method, budget, find(Some(method), Some(budget))))
         .collect();
     writeln!(text, "\n## {policy}\n")?;
@@ -163,41 +176,38 @@ fn section(text: &mut String, journal: &Journal, asked: &Asked, policy: &str) ->
         return Ok(());
     }
 
-    let budgets: Vec<String> = asked.budgets.iter().map(|budget| format!("{budget} bits")).collect();
-    header_row(text, "method", &budgets)?;
-    let alone = f32_cell.map_or_else(String::new, |cell| driven(cell).unwrap_or_else(|| "-".to_owned()));
-    row(text, "f32", asked.budgets.iter().map(|_| alone.clone()))?;
-    for method in &asked.methods {
-        let of_method = cells.iter().filter(|(m, ..)| m == method);
-        row(text, method.title(), of_method.map(|(.., cell)| short(*cell)))?;
-    }
-    writeln!(text)?;
-
     let unit = unit(f32_cell.into_iter().chain(cells.iter().filter_map(|(.., cell)| *cell)));
     let tracking = unit.map_or_else(|| "tracking error".to_owned(), |(_, unit)| format!("tracking error, {unit}"));
     let columns =
-        ["budget", "bits per weight", "bytes per parameter", "image bytes", "scale per", "seconds", &tracking];
+        ["bytes", "ms", "NMSE", "success", &tracking, "bits (limit)", "bytes per parameter", "scale per", "seconds"];
     header_row(text, "method", &columns.map(str::to_owned))?;
+    let none = || "-".to_owned();
+    let success_of = |cell: &Cell| driven(cell).unwrap_or_else(none);
     let error_of = |cell: &Cell| {
         let error = unit.and_then(|(key, _)| cell.outcome()?.number(key));
-        error.map_or_else(|| "-".to_owned(), |error| format!("{error:.3}"))
+        error.map_or_else(none, |error| format!("{error:.3}"))
     };
+    let made = || cells.iter().filter_map(|(.., cell)| cell.and_then(|cell| cell.made.as_ref()));
     if let Some(cell) = f32_cell {
-        let sizes = ["-", "32", "4", "-", "-", "-"].map(str::to_owned);
-        row(text, "f32", sizes.into_iter().chain([error_of(cell)]))?;
+        let parameters = made().map(|made| made.bytes as f64 / made.bytes_per_parameter).next();
+        let bytes = parameters.map_or_else(none, |parameters| format!("{:.0}", 4.0 * parameters));
+        let figures = [success_of(cell), error_of(cell)];
+        let rest = ["32", "4", "-", "-"].map(str::to_owned);
+        row(text, "f32", [bytes, none(), "0".to_owned()].into_iter().chain(figures).chain(rest))?;
     }
-    let mut starred = false;
+    let starred = made().any(|made| !made.default_group);
     for (method, budget, cell) in &cells {
         let Some((cell, made)) = cell.and_then(|cell| Some((cell, cell.made.as_ref()?))) else { continue };
-        starred |= !made.default_group;
         let figures = [
-            format!("{budget}"),
-            format!("{:.3}", made.bpw),
-            format!("{:.3}", made.bytes_per_parameter),
             made.bytes.to_string(),
+            made.milliseconds.map_or_else(none, |ms| format!("{ms:.3}")),
+            format!("{:.1e}", made.nmse),
+            success_of(cell),
+            error_of(cell),
+            format!("{:.3} ({budget})", made.bpw),
+            format!("{:.3}", made.bytes_per_parameter),
             format(made),
             format!("{:.1}", made.seconds),
-            error_of(cell),
         ];
         row(text, method.title(), figures)?;
     }
@@ -225,7 +235,7 @@ fn reasons(text: &mut String, cells: &[(Contender, f64, Option<&Cell>)]) -> Resu
         }
     }
     for (method, why, budgets) in reasons {
-        writeln!(text, "- {} at {} is not made: {why}.", method.title(), budgets.join(", "))?;
+        writeln!(text, "- {} at {} bits is not made: {why}.", method.title(), budgets.join(", "))?;
     }
     if !open.is_empty() {
         writeln!(text, "- Not run yet, or failed: {}.", open.join("; "))?;
@@ -243,12 +253,6 @@ fn not_driven(text: &mut String, f32_cell: Option<&Cell>, cells: &[(Contender, f
         )?;
     }
     Ok(())
-}
-
-fn short(cell: Option<&Cell>) -> String {
-    let Some(made) = cell.and_then(|cell| cell.made.as_ref()) else { return "-".to_owned() };
-    let success = cell.and_then(driven).unwrap_or_else(|| "-".to_owned());
-    format!("{:.1e} · {success}", made.nmse)
 }
 
 fn driven(cell: &Cell) -> Option<String> {

@@ -19,6 +19,7 @@ use crate::budget::Rate;
 use crate::data::{Dataset, Recording, Recordings};
 use crate::error::{Context, Result, bail};
 use crate::measure::eval;
+use crate::measure::time::{CLOCK, StepTime};
 use crate::methods::{self, Method, Options, Outcome};
 use crate::policy::Policy;
 
@@ -65,21 +66,25 @@ pub(super) fn smallest(
         let budget = cell as f64 / PER_BIT as f64;
         let options = Options { steps: Some(steps), ..options.clone() };
         let work = format!("try {}: {budget} bits per weight", tries.len() + 1);
-        let report = match quantizer
+        let measured = match quantizer
             .at(Rate::BitsPerWeight(budget), &options, &mut |state| watch.progress(&work, state.share()))
         {
             Err(error) if error.budget().is_some() => None,
             Err(error) => return Err(error),
             Ok(quantized) => {
-                let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, &dataset)?;
+                let buffer = quantized.buffer();
+                let image = buffer.image(Path::new("image in memory"))?;
+                let report = eval::evaluate(image, &dataset)?;
+                let milliseconds = StepTime::new(&image, CLOCK).milliseconds;
                 if report.nmse <= limit && steps == all_steps {
                     found = Some((quantized, report.nmse, budget));
                 }
-                Some(report)
+                Some((report, milliseconds))
             }
         };
+        let (report, milliseconds) = measured.unzip();
         let error = report.as_ref().map_or(f64::INFINITY, |r| r.nmse);
-        tries.push(Try { budget, steps, report });
+        tries.push(Try { budget, steps, report, milliseconds });
         Ok(error)
     };
     let few = all_steps / SHARE;

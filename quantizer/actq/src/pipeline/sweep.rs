@@ -12,6 +12,7 @@ use crate::budget::Budget;
 use crate::data::{Dataset, Recording, Recordings};
 use crate::error::{Context as _, Result};
 use crate::measure::eval;
+use crate::measure::time::StepTime;
 use crate::methods::{Effort, Method, Options, Outcome};
 use crate::policy::Policy;
 
@@ -23,6 +24,8 @@ pub struct Point {
     /// Errors, true bits per weight, bytes.
     #[serde(flatten)]
     pub report: eval::ErrorReport,
+    /// Predicted milliseconds of a step at the sweep's clock.
+    pub milliseconds: f64,
     /// Bit allocation: for each matrix, the number of trained rows of each width (0: no bits).
     pub rows: Vec<BTreeMap<u32, usize>>,
 }
@@ -39,13 +42,17 @@ pub struct Curve {
     pub scores: Vec<BTreeMap<String, f64>>,
 }
 
-/// Point of the best method after which a further bit gains least.
+/// Point of the best method after which a further byte gains least.
 #[derive(Clone, Debug, Serialize)]
 pub struct Knee {
     /// The method.
     pub method: String,
     /// True bits per weight.
     pub bpw: f64,
+    /// Bytes of the image.
+    pub bytes: usize,
+    /// Predicted milliseconds of a step at the sweep's clock.
+    pub milliseconds: f64,
     /// Error (NMSE).
     pub nmse: f64,
 }
@@ -59,6 +66,8 @@ pub struct Sweep {
     pub matrices: Vec<String>,
     /// Allowed bits per weight.
     pub budgets: Vec<f64>,
+    /// Clock of all predicted times in Hz, of a Cortex-M4 with FPU and memory that never waits.
+    pub clock_hz: f64,
     /// One curve per method.
     pub curves: Vec<Curve>,
     /// The [`knee`].
@@ -77,6 +86,8 @@ pub struct SweepPlan<'a> {
     pub methods: &'a [Method],
     /// Allowed bits per weight.
     pub budgets: &'a [f64],
+    /// The processor's clock in Hz, for predicted times.
+    pub clock_hz: f64,
     /// Most steps of distillation; `None`: chosen for the network.
     pub steps: Option<usize>,
     /// Effort, if the steps are not given.
@@ -92,7 +103,7 @@ pub struct SweepPlan<'a> {
 /// Quantizes the policy by every method for every budget, and runs each image over the held-out recording. `watch`
 /// receives the present work and the share of the whole that is done.
 pub fn run(plan: SweepPlan<'_>, mut watch: impl Watch) -> Result<Sweep> {
-    let SweepPlan { policy, mut recordings, methods, budgets, steps, effort, minutes, relative, seed } = plan;
+    let SweepPlan { policy, mut recordings, methods, budgets, clock_hz, steps, effort, minutes, relative, seed } = plan;
     recordings.fill_actions(&policy.graph);
     let heldout = recordings.heldout.as_ref().with_context(|| Recording::Heldout.missing("a sweep"))?;
     let mut curves = Vec::new();
@@ -110,7 +121,7 @@ pub fn run(plan: SweepPlan<'_>, mut watch: impl Watch) -> Result<Sweep> {
             let options = Options { group: method.default_group(), steps, effort, minutes, relative, seed, ..plain };
             let share = |_: &str, share: f64| watch.progress(&work, done(1.0 + b as f64 + share));
             points.push(match quantizer.quantize(&options, share) {
-                Ok(quantized) => Some(point(heldout, budget, &quantized)?),
+                Ok(quantized) => Some(point(heldout, budget, clock_hz, &quantized)?),
                 Err(error) if error.budget().is_some() => None,
                 Err(error) => return Err(error),
             });
@@ -119,12 +130,15 @@ pub fn run(plan: SweepPlan<'_>, mut watch: impl Watch) -> Result<Sweep> {
     }
     let knee = knee(&curves);
     let matrices = policy.graph.matrices.iter().map(|m| m.name.clone()).collect();
-    Ok(Sweep { policy: policy.name.clone(), matrices, budgets: budgets.to_vec(), curves, knee })
+    Ok(Sweep { policy: policy.name.clone(), matrices, budgets: budgets.to_vec(), clock_hz, curves, knee })
 }
 
-fn point(heldout: &Dataset, budget: f64, quantized: &QuantizedPolicy) -> Result<Point> {
-    let report = eval::evaluate(quantized.buffer().image(Path::new("image in memory"))?, heldout)?;
-    Ok(Point { budget, report, rows: quantized.outcomes.iter().map(rows).collect() })
+fn point(heldout: &Dataset, budget: f64, clock_hz: f64, quantized: &QuantizedPolicy) -> Result<Point> {
+    let buffer = quantized.buffer();
+    let image = buffer.image(Path::new("image in memory"))?;
+    let report = eval::evaluate(image, heldout)?;
+    let milliseconds = StepTime::new(&image, clock_hz).milliseconds;
+    Ok(Point { budget, report, milliseconds, rows: quantized.outcomes.iter().map(rows).collect() })
 }
 
 fn rows(outcome: &Outcome) -> BTreeMap<u32, usize> {
@@ -138,8 +152,8 @@ fn rows(outcome: &Outcome) -> BTreeMap<u32, usize> {
 /// Finds the knee of the best method.
 ///
 /// The best method has the lowest error at most budgets; among equals, it is the one named first. Its knee is the point
-/// furthest below the chord from its first point to its last, in log error over true bits per weight. Before the knee a
-/// bit gains more than on average, after it less. `None` if no point is below the chord.
+/// furthest below the chord from its first point to its last, in log error over bytes of the image. Before the knee a
+/// byte gains more than on average, after it less. `None` if no point is below the chord.
 pub fn knee(curves: &[Curve]) -> Option<Knee> {
     let budgets = curves.iter().map(|c| c.points.len()).max()?;
     let mut wins = vec![0; curves.len()];
@@ -150,21 +164,41 @@ pub fn knee(curves: &[Curve]) -> Option<Knee> {
         }
     }
     let best = (0..curves.len()).rev().max_by_key(|&c| wins[c])?;
-    let line = line(&curves[best]);
-    let (&(x0, y0), &(x1, y1)) = (line.first()?, line.last()?);
-    let below = |&(x, y): &(f64, f64)| y0.ln() + (y1 / y0).ln() * (x - x0) / (x1 - x0) - y.ln();
-    let (depth, (bpw, nmse)) = line.iter().map(|point| (below(point), *point)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (depth > 1e-9).then(|| Knee { method: curves[best].method.clone(), bpw, nmse })
+    let mut points: Vec<&Point> = curves[best].points.iter().flatten().collect();
+    points.sort_by_key(|point| point.report.bytes);
+    let at = |point: &Point| (point.report.bytes as f64, drawn_error(point));
+    let ((x0, y0), (x1, y1)) = (at(points.first()?), at(points.last()?));
+    let below = |point: &Point| {
+        let (x, y) = at(point);
+        y0.ln() + (y1 / y0).ln() * (x - x0) / (x1 - x0) - y.ln()
+    };
+    let (depth, point) = points.iter().map(|point| (below(point), *point)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (depth > 1e-9).then(|| Knee {
+        method: curves[best].method.clone(),
+        bpw: point.report.bpw,
+        bytes: point.report.bytes,
+        milliseconds: point.milliseconds,
+        nmse: point.report.nmse,
+    })
 }
 
-/// Returns true bits per weight and error of a curve's points, from few bits to many, each image one time. An error of
-/// 0 has no logarithm; it counts as the smallest that f32 actions can show.
-pub fn line(curve: &Curve) -> Vec<(f64, f64)> {
-    let mut line: Vec<(f64, f64)> =
-        curve.points.iter().flatten().map(|p| (p.report.bpw, p.report.nmse.max(1e-14))).collect();
-    line.sort_by(|a, b| a.0.total_cmp(&b.0));
-    line.dedup();
-    line
+/// Returns a point's error for a logarithmic axis. An error of 0 has no logarithm; it counts as the smallest that f32
+/// actions can show.
+pub fn drawn_error(point: &Point) -> f64 {
+    point.report.nmse.max(1e-14)
+}
+
+/// Returns the points of a line that no other one beats: all with less of the second value than every point with at
+/// most as much of the first.
+pub fn frontier(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let mut least = f64::INFINITY;
+    points.retain(|&(_, y)| {
+        let better = y < least;
+        least = least.min(y);
+        better
+    });
+    points
 }
 
 #[cfg(test)]
@@ -173,9 +207,11 @@ mod tests {
 
     fn curve(method: &str, points: &[(f64, f64)]) -> Curve {
         let point = |&(bpw, nmse): &(f64, f64)| {
+            let bytes = (1000.0 * bpw) as usize;
             let report =
-                eval::ErrorReport { nmse, worst_nmse: nmse, max_abs: 0.0, steps: 1, bpw, bytes: 1, worst_dimension: 0 };
-            (nmse > 0.0).then_some(Point { budget: bpw, report, rows: Vec::new() })
+                eval::ErrorReport { nmse, worst_nmse: nmse, max_abs: 0.0, steps: 1, bpw, bytes, worst_dimension: 0 };
+            let (budget, milliseconds) = (bpw, 0.5 * bpw);
+            (nmse > 0.0).then_some(Point { budget, report, milliseconds, rows: Vec::new() })
         };
         Curve { method: method.to_owned(), points: points.iter().map(point).collect(), scores: Vec::new() }
     }
@@ -186,8 +222,15 @@ mod tests {
         let better = curve("better", &[(2.0, 0.5), (2.5, 0.01), (3.0, 0.006), (4.0, 0.003)]);
         let found = knee(&[worse.clone(), better]).expect("a knee");
         assert_eq!((found.method.as_str(), found.bpw), ("better", 2.5));
+        assert_eq!((found.bytes, found.milliseconds), (2500, 1.25));
         assert!(knee(&[worse]).is_none(), "a curve above its chord has no knee");
         assert!(knee(&[]).is_none());
         assert!(knee(&[curve("one", &[(3.0, 0.1)])]).is_none());
+    }
+    #[test]
+    fn no_other_point_beats_the_frontier() {
+        let points = vec![(3.0, 0.2), (1.0, 0.9), (2.0, 0.9), (3.0, 0.1), (4.0, 0.3), (5.0, 0.01)];
+        assert_eq!(frontier(points), [(1.0, 0.9), (3.0, 0.1), (5.0, 0.01)]);
+        assert_eq!(frontier(Vec::new()), []);
     }
 }

@@ -11,6 +11,8 @@ pub struct Try {
     pub steps: usize,
     /// Errors and true bits per weight; `None` if the budget is too small for any image.
     pub report: Option<ErrorReport>,
+    /// Predicted milliseconds of a step at the default [`CLOCK`](crate::measure::time::CLOCK).
+    pub milliseconds: Option<f64>,
 }
 
 /// Result of a search.
