@@ -12,6 +12,7 @@ pub mod allocation;
 pub mod choices;
 pub mod fisher;
 pub mod hsic;
+pub mod loss;
 pub mod score;
 
 use std::collections::BTreeMap;

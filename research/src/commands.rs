@@ -49,10 +49,12 @@ struct ActQuantArgs {
     /// batch=N [1] (authors: 8): frames whose gradients are averaged before they are squared.
     /// signs=[random]|loss(authors): the loss's derivative if the recorded action is the policy's
     ///   own: a random sign, or the sign of the remaining difference.
+    /// alpha=N [1]: the share of L1 in the action loss, 0 to 1; the rest is the likelihood of the action
+    ///   under a Gaussian.
     /// magnitude=[no]|yes(authors): fits of scales weigh by the importance, or by it times
     ///   sqrt(mean of the row's w^2 + w^2).
     ///
-    /// With one width for all (--bits) there is no bit allocation, and only the last four keys have
+    /// With one width for all (--bits) there is no bit allocation, and only the last five keys have
     /// an effect. research/README.md gives sources and reasons.
     ///
     /// Example: --method actquant --actquant authors,head=free

@@ -8,8 +8,9 @@ use std::str::FromStr;
 
 use actq_kernels::layout::Width;
 
-use super::fisher::{Sampling, Signs};
+use super::fisher::Sampling;
 use super::hsic::Bandwidth;
+use super::loss::Signs;
 
 /// Definition of a matrix's score.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +31,7 @@ pub enum NoiseBits {
 }
 
 /// Choices of ActQuant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choices {
     /// Bandwidth of the Gaussian kernels.
     pub bandwidth: Bandwidth,
@@ -60,7 +61,7 @@ impl Default for Choices {
             noise: NoiseBits::Codes,
             widest: Width::W8,
             head: None,
-            fisher: Sampling { samples: 4096, batch: 1, signs: Signs::Random },
+            fisher: Sampling { samples: 4096, batch: 1, signs: Signs::Random, alpha: 1.0 },
             magnitude: false,
         }
     }
@@ -78,12 +79,18 @@ impl Choices {
         noise: NoiseBits::Format,
         widest: Width::W4,
         head: Some(Width::W8),
-        fisher: Sampling { samples: ALL, batch: 8, signs: Signs::Loss },
+        fisher: Sampling { samples: ALL, batch: 8, signs: Signs::Loss, alpha: 1.0 },
         magnitude: true,
     };
 
+    /// Returns the default choices with alpha 0.5 in the loss.
+    pub fn half() -> Self {
+        let plain = Self::default();
+        Self { fisher: Sampling { alpha: 0.5, ..plain.fisher }, ..plain }
+    }
+
     /// Returns every choice as key and value, in the order of the documentation.
-    fn pairs(&self) -> [(&'static str, String); 10] {
+    fn pairs(&self) -> [(&'static str, String); 11] {
         let number = |n: usize| if n == ALL { "all".to_owned() } else { n.to_string() };
         let bits = |width: Width| width.bits().to_string();
         let word = str::to_owned;
@@ -97,6 +104,7 @@ impl Choices {
             ("samples", number(self.fisher.samples)),
             ("batch", self.fisher.batch.to_string()),
             ("signs", word(if self.fisher.signs == Signs::Random { "random" } else { "loss" })),
+            ("alpha", self.fisher.alpha.to_string()),
             ("magnitude", word(if self.magnitude { "yes" } else { "no" })),
         ]
     }
@@ -130,6 +138,10 @@ impl Choices {
             ("signs", "random") => self.fisher.signs = Signs::Random,
             ("signs", "loss") => self.fisher.signs = Signs::Loss,
             ("signs", _) => return Err(wrong("random or loss")),
+            ("alpha", _) => {
+                let alpha = value.parse().ok().filter(|alpha| (0.0..=1.0).contains(alpha));
+                self.fisher.alpha = alpha.ok_or(wrong("a number from 0 to 1"))?;
+            }
             ("magnitude", "no") => self.magnitude = false,
             ("magnitude", "yes") => self.magnitude = true,
             ("magnitude", _) => return Err(wrong("yes or no")),
@@ -189,7 +201,8 @@ mod tests {
 
     #[test]
     fn choices_parse_as_formatted() {
-        let other = Choices { score: ScoreOf::Output, ..Choices::AUTHORS };
+        let fisher = Sampling { alpha: 0.5, ..Choices::AUTHORS.fisher };
+        let other = Choices { score: ScoreOf::Output, fisher, ..Choices::AUTHORS };
         for (from, to) in [(Choices::default(), other), (other, Choices::default())] {
             for (key, value) in to.pairs() {
                 let mut one = from;
@@ -202,6 +215,7 @@ mod tests {
         assert_eq!(Choices::default().to_string(), "");
         assert_eq!(Choices::AUTHORS.to_string(), "authors");
         assert_eq!("authors,head=free".parse::<Choices>().map(|c| c.to_string()), Ok("authors,head=free".into()));
+        assert_eq!("alpha=0.5".parse::<Choices>().map(|c| c.to_string()), Ok("alpha=0.5".into()));
         assert_eq!("head=4,frames=all".parse::<Choices>().map(|c| c.to_string()), Ok("frames=all,head=4".into()));
     }
 
@@ -218,6 +232,7 @@ mod tests {
             ("batch=0", "1 to 1024"),
             ("batch=all", "1 to 1024"),
             ("bandwidth=", "median or squared"),
+            ("alpha=1.5", "a number from 0 to 1"),
         ] {
             let error = text.parse::<Choices>().expect_err(text);
             assert!(error.contains(words), "{text:?}: {error}");

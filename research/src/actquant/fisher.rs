@@ -5,14 +5,15 @@ use std::borrow::Cow;
 use actq::data::Dataset;
 use actq::error::{Context, Result};
 use actq::graph::{Factors, Graph, Network, Pass, Weights, start_state, zero_state};
-use actq::random::Random;
 use ndarray::{Array2, Array3, Axis, Zip, linalg::general_mat_mul, s};
+
+use super::loss::{ActionLoss, Signs};
 
 /// Steps that the gradient of a recurrent network runs back.
 const WINDOW: usize = 16;
 
 /// Selection of the gradients of the Fisher information.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
     /// Approximate most frames whose gradient is taken, evenly spaced.
     pub samples: usize,
@@ -22,26 +23,15 @@ pub struct Sampling {
     pub batch: usize,
     /// Signs if the recorded actions are the network's own.
     pub signs: Signs,
+    /// Share of L1 in the loss, 0 to 1; the rest is the likelihood of the action.
+    pub alpha: f64,
 }
 
-/// Derivative of `|y - t|` if y equals t, or nearly.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Signs {
-    /// 1 or -1 with equal probability, from a fixed seed. The expectation of the square is `sum over d of (dy_d/dw)^2`.
-    Random,
-    /// Result of automatic differentiation: the sign of any difference, however small, and 0 without one.
-    Loss,
-}
-
-/// Share of a dimension's standard deviation below which an output counts as equal to its record.
-const EQUAL: f32 = 1e-3;
-
-/// Returns the mean over frames (or batches) of `(dL/dw)^2` for every weight, `L = sum over d of |y_d - t_d|`, as
-/// `[rows, cols]` per matrix. This is the action-mixed Fisher information of ActQuant (arXiv 2605.24011) at alpha = 1,
-/// that is, without a token loss.
+/// Returns the mean over frames (or batches) of `(dL/dw)^2` for every weight, as `[rows, cols]` per matrix: the
+/// action-mixed Fisher information of ActQuant (arXiv 2605.24011). `L` is [`ActionLoss`]; at alpha = 1 it is
+/// `sum over d of |y_d - t_d|`, without a likelihood.
 ///
-/// `dL/dy_d` is the sign of `y_d - t_d`. Recorded actions are mostly the policy's own, where `L` has its kink:
-/// [`Signs`].
+/// Recorded actions are mostly the policy's own, where L1 has its kink: [`Signs`].
 ///
 /// A recurrent network's gradient is truncated. Episodes run from their starting state and are cut into windows of 16
 /// steps. Each window's last frame is one sample, whose gradient runs back to the start of the window. Shorter rests
@@ -65,13 +55,12 @@ pub fn importance(
     let longest = dataset.length.iter().copied().max().unwrap_or(0);
     let window = if recurrent { WINDOW.min(longest) } else { 1 };
     let every = (dataset.frames() / window.max(1)).div_ceil(sampling.samples.max(1)).max(1);
-    let equal = deviations(dataset).context("array \"action\" is missing")?.map(|d| EQUAL * d);
+    let mut loss = ActionLoss::new(dataset, sampling.alpha, sampling.signs).context("array \"action\" is missing")?;
 
     let mut alive: Vec<usize> = (0..dataset.length.len()).collect();
     let starts: Vec<_> = alive.iter().map(|&episode| dataset.start(episode)).collect();
     let mut state = start_state(graph, &starts);
     let mut fisher: Vec<Array2<f32>> = graph.matrices.iter().map(|m| Array2::zeros((m.rows, m.cols))).collect();
-    let mut random = Random::new(0);
     let mut batches = 0;
     for (index, start) in (0..longest).step_by(window.max(1)).enumerate() {
         let staying: Vec<usize> = (0..alive.len()).filter(|&i| dataset.length[alive[i]] >= start + window).collect();
@@ -89,15 +78,9 @@ pub fn importance(
             let output = passes[passes.len() - 1].output();
             let recorded =
                 rows(dataset.action.as_ref().context("array \"action\" is missing")?, &alive, start + window - 1);
-            let sign = Array2::from_shape_fn(output.raw_dim(), |at| {
-                let difference = output[at] - recorded[at];
-                match sampling.signs {
-                    Signs::Random if difference.abs() <= equal[at.1] => random.sign(),
-                    Signs::Loss if difference == 0.0 => 0.0,
-                    _ => difference.signum(),
-                }
-            });
-            add_squares(&network, &weights, passes, (sign, sampling.batch), &mut fisher);
+            let d_output =
+                Array2::from_shape_fn(output.raw_dim(), |at| loss.derivative(at.1, output[at] - recorded[at]));
+            add_squares(&network, &weights, passes, (d_output, sampling.batch), &mut fisher);
             batches += alive.len().div_ceil(sampling.batch);
         }
         progress((start + window) as f64 / longest as f64);
@@ -183,29 +166,13 @@ fn rows(array: &Array3<f32>, episodes: &[usize], step: usize) -> Array2<f32> {
     array.index_axis(Axis(1), step).select(Axis(0), episodes).as_standard_layout().into_owned()
 }
 
-/// Returns the standard deviation of every dimension of the recorded actions.
-fn deviations(dataset: &Dataset) -> Option<ndarray::Array1<f32>> {
-    let width = dataset.action.as_ref()?.dim().2;
-    let mut sums = vec![(0f64, 0f64); width];
-    for (episode, &length) in dataset.length.iter().enumerate() {
-        for step in 0..length {
-            for ((sum, square), a) in sums.iter_mut().zip(dataset.action_at(episode, step)?) {
-                *sum += f64::from(a);
-                *square += f64::from(a).powi(2);
-            }
-        }
-    }
-    let n = dataset.frames().max(1) as f64;
-    Some(sums.iter().map(|(sum, square)| (square / n - (sum / n).powi(2)).max(0.0).sqrt() as f32).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::{dataset, lstm, mlp};
     use actq::graph::Derivatives;
 
-    const PLAIN: Sampling = Sampling { samples: 4096, batch: 1, signs: Signs::Random };
+    const PLAIN: Sampling = Sampling { samples: 4096, batch: 1, signs: Signs::Random, alpha: 1.0 };
 
     /// Computes the sum over the recorded dimensions of the action error's magnitude at the last frame of a window.
     fn loss(
@@ -272,6 +239,17 @@ mod tests {
             compare(&lstm(), 5, 5, None, batch);
             compare(&lstm(), 5, 5, Some(state.clone()), batch);
         }
+    }
+
+    #[test]
+    fn alpha_mixes_in_the_likelihood() {
+        let graph = mlp();
+        let dataset = dataset(&graph, 1, 40);
+        let of = |alpha| importance(&graph, &dataset, Sampling { alpha, ..PLAIN }, &mut |_| {}).expect("importance");
+        let [likelihood, half, l1] = [0.0, 0.5, 1.0].map(of);
+        let finite = |matrices: &[Array2<f32>]| matrices.iter().all(|m| m.iter().all(|i| i.is_finite()));
+        assert!(finite(&likelihood) && finite(&half));
+        assert!(likelihood != l1 && half != l1 && half != likelihood);
     }
 
     #[test]

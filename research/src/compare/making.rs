@@ -81,8 +81,8 @@ impl<'a> Maker<'a> {
         mut progress: impl FnMut(&str, f64),
     ) -> Result<Attempt> {
         self.prepare(contender, &mut progress)?;
-        if contender == Contender::ActQuantK {
-            return self.simulate(budget);
+        if contender.is_simulated() {
+            return self.simulate(contender, budget);
         }
         let default = contender.method().default_group();
         let first = self.with_group(contender, budget, default, &mut progress)?;
@@ -112,9 +112,9 @@ impl<'a> Maker<'a> {
     }
 
     /// Makes ActQuant in K-quants.
-    fn simulate(&self, budget: f64) -> Result<Attempt> {
+    fn simulate(&self, contender: Contender, budget: f64) -> Result<Attempt> {
         let begun = Instant::now();
-        let (quantizer, preparing) = self.prepared(Contender::ActQuantK)?;
+        let (quantizer, preparing) = self.prepared(contender)?;
         let statistics = quantizer.method().custom::<ActionStatistics>().context("the method has no statistics")?;
         let policy = &self.subject.policy;
         let simulated = match actquant_k::quantize(&policy.graph, statistics, budget, self.subject.heldout()?) {

@@ -32,6 +32,10 @@ pub enum Contender {
     #[value(name = "actquant-k")]
     #[serde(rename = "actquant-k")]
     ActQuantK,
+    /// The same, with half of the action loss a likelihood (alpha 0.5)
+    #[value(name = "actquant-k-half")]
+    #[serde(rename = "actquant-k-half")]
+    ActQuantKHalf,
     /// distill with --steps 0: not learned
     #[value(name = "distill-0", alias = "best-0")]
     #[serde(rename = "distill-0", alias = "best-0")]
@@ -49,9 +53,15 @@ impl Contender {
             Self::Rtn => Method::Rtn,
             Self::Gptq => Method::Gptq,
             Self::ActQuant | Self::ActQuantK => Method::custom(ActQuant(Choices::default())),
+            Self::ActQuantKHalf => Method::custom(ActQuant(Choices::half())),
             Self::ActQuantAuthors => Method::custom(ActQuant(Choices::AUTHORS)),
             Self::DistillNotLearned | Self::Distill => Method::Distill,
         }
+    }
+
+    /// Returns `true` if the method's formats are simulated in f32, without an image.
+    pub fn is_simulated(self) -> bool {
+        matches!(self, Self::ActQuantK | Self::ActQuantKHalf)
     }
 
     /// Returns the name on the command line.
@@ -67,6 +77,7 @@ impl Contender {
             Self::ActQuant => "actquant",
             Self::ActQuantAuthors => "actquant, authors' choices",
             Self::ActQuantK => "actquant, K-quants",
+            Self::ActQuantKHalf => "actquant, K-quants, alpha 0.5",
             Self::DistillNotLearned => "distill, not learned",
             Self::Distill => "distill",
         }
@@ -84,7 +95,7 @@ pub struct Plan {
         default_value = "go1_mlp,g1_lstm256,g1_lstm64,fetch_pickplace,ur3"
     )]
     pub policies: Vec<String>,
-    /// Methods; distill-0 is distill with --steps 0, not learned; actquant-authors is not in the default
+    /// Methods; distill-0 is distill with --steps 0, not learned; actquant-authors and actquant-k-half are not in the default
     #[arg(
         long,
         value_name = "LIST",

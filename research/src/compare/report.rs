@@ -32,10 +32,11 @@ const STARRED: &str = "\
 in the method's favour.";
 
 const K_QUANTS: &str = "\
-actquant, K-quants: ActQuant in the block formats of its paper (llama.cpp's Q2_K, Q3_K, Q4_K and Q6_K at 2.625, 3.4375, 4.5 and 6.5625 \
-bits per weight), a format a matrix by its scores and allocation. Simulated in f32, in its favour: activations are not rounded, padding of \
-rows to 256 is not counted, and of its importance with and without llama.cpp's factor of the weights' magnitude the one with the lower \
-held-out error was taken. Its image bytes are those of its blocks and everything else in f32.";
+actquant, K-quants: ActQuant in the block formats of its paper (llama.cpp's IQ2_XS, Q2_K, Q3_K, Q4_K and Q6_K at 2.3125, 2.625, 3.4375, 4.5 \
+and 6.5625 bits per weight), a format a matrix by its scores and allocation, alpha 1 in its loss if nothing else is said. Simulated in f32, \
+in its favour: activations are not rounded, padding of rows to 256 is not counted, and of its importance with and without llama.cpp's factor \
+of the weights' magnitude, and of allocations from Q2_K and from IQ2_XS, the one with the lowest held-out error was taken. Its IQ2_XS has a \
+grid of the same size and rate, but not llama.cpp's. Its image bytes are those of its blocks and everything else in f32.";
 
 /// Writes the report beside the journal, and returns its path.
 pub(super) fn write(journal: &Journal, folder: &Path) -> Result<PathBuf> {
@@ -116,7 +117,7 @@ fn plots(journal: &Journal, asked: &Asked) -> Vec<Plot> {
 fn markdown(journal: &Journal, asked: &Asked) -> Result<String> {
     let mut text = head(&journal.header)?;
     writeln!(text, "\n![Success over bytes and over predicted milliseconds, a plot a policy]({PICTURE})")?;
-    if asked.methods.contains(&Contender::ActQuantK) {
+    if asked.methods.iter().any(|method| method.is_simulated()) {
         writeln!(text, "\n{K_QUANTS}")?;
     }
     for policy in &asked.policies {
