@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use actq::budget::{Budget, TimeLimit};
 use actq::data::{Recording, Recordings, Sizes, driven_by, files_of};
+use actq::measure::time::{CLOCK, StepTime};
 use actq::measure::{check, own};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::stats::Stats;
@@ -70,7 +71,10 @@ pub fn run(
     let search = found.search.as_ref().map_or(String::new(), |search| quantized::search(search) + "\n");
     let sampled = quantizer.method().sampled().map_or(String::new(), quantized::sampled);
     let learned = sampled + &found.learning.as_ref().map_or(String::new(), quantized::learning);
-    let time = found.time.as_ref().map_or(String::new(), time::sentence);
+    let time = match &found.time {
+        Some(step) => time::sentence(step),
+        None => time::sentence(&StepTime::new(&found.buffer().image(&args.out)?, CLOCK)),
+    };
     let (parameters, bytes) = (source.parameters, found.image.len());
     let f32_bytes = 4 * parameters;
     print(&format!(

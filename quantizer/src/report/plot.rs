@@ -18,7 +18,7 @@ pub(crate) use drawing::{decade_label, document, text};
 const HEIGHT: f64 = 480.0;
 const MARGIN_LEFT: f64 = 84.0;
 /// The margin that holds the legend.
-const MARGIN_RIGHT: f64 = 264.0;
+const MARGIN_RIGHT: f64 = 284.0;
 const MARGIN_TOP: f64 = 56.0;
 const MARGIN_BOTTOM: f64 = 64.0;
 const PANEL: f64 = 440.0;

@@ -285,6 +285,10 @@ fn quantize_reports_both_errors_and_faults_of_recordings() -> Result<()> {
     let output = quantize()?;
     assert_eq!(notes(&output)?, Vec::<String>::new());
     let report = succeeded(&output)?;
+    ensure!(
+        report.contains(" ms at 168 MHz on a Cortex-M4"),
+        "without --ms the time is at the default clock: {report}"
+    );
     let number = |name: &str| -> Result<f64> {
         let line =
             report.lines().find_map(|line| line.strip_prefix(name)).with_context(|| format!("{name}: {report}"))?;
