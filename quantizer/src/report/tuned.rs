@@ -2,16 +2,18 @@
 
 use std::path::Path;
 
+use actq::measure::time::CLOCK;
 use actq::pipeline::tune::{Round, Tuned};
 use comfy_table::Table;
 use serde_json::{Value, json};
 
 use super::table;
+use super::time::conditions;
 
 /// Columns of every table, from left to right.
-const HEADER: [&str; 7] = ["round", "episodes", "frames", "f32 path", "own path", "success", "seconds"];
+const HEADER: [&str; 9] = ["round", "episodes", "frames", "bytes", "ms", "f32 path", "own path", "success", "seconds"];
 
-/// Formats a row for each image: the recordings it learned from, its errors, and the outcome of its rollout. Each
+/// Formats a row for each image: the recordings it learned from, its bytes, time and errors, and the outcome of its rollout. Each
 /// tracking error that the command printed has a column.
 pub fn table(tuned: &Tuned) -> String {
     let mut tracking: Vec<&str> = tuned.rounds.iter().flat_map(|round| round.driven.keys()).collect();
@@ -20,7 +22,7 @@ pub fn table(tuned: &Tuned) -> String {
     tracking.dedup();
     let names: Vec<String> = tracking.iter().map(|key| key.replace('_', " ")).collect();
     let mut header = HEADER.to_vec();
-    header.splice(6..6, names.iter().map(String::as_str));
+    header.splice(8..8, names.iter().map(String::as_str));
     let mut rows: Table = table::table(&header);
     for round in &tuned.rounds {
         let errors = tracking.iter().map(|key| round.driven.number(key).map_or("-".to_owned(), |v| format!("{v:.3}")));
@@ -28,6 +30,8 @@ pub fn table(tuned: &Tuned) -> String {
             round.round.to_string(),
             round.episodes.to_string(),
             round.frames.to_string(),
+            round.bytes.to_string(),
+            format!("{:.3}", round.milliseconds),
             format!("{:.3e}", round.nmse),
             round.own_nmse.map_or("-".to_owned(), |nmse| format!("{nmse:.3e}")),
             success(round),
@@ -35,7 +39,9 @@ pub fn table(tuned: &Tuned) -> String {
         rows.add_row(front.into_iter().chain(errors).chain([format!("{:.1}", round.seconds)]));
     }
     format!(
-        "{rows}\n\nEpisodes and frames: of the recordings learned from. f32 path: NMSE on {}. own path: NMSE on the image's own rollout.\n",
+        "{rows}\n\nEpisodes and frames: of the recordings learned from. ms: predicted time of a step, {}.\n\
+         f32 path: NMSE on {}. own path: NMSE on the image's own rollout.\n",
+        conditions(CLOCK),
         tuned.measured_on
     )
 }

@@ -12,6 +12,7 @@ use super::watch::Watch;
 use crate::data::{Dataset, Learned, Recording, Recordings, Share};
 use crate::error::{Context as _, Result, ensure};
 use crate::measure::eval;
+use crate::measure::time::{CLOCK, StepTime};
 use crate::methods::Options;
 use crate::policy::Policy;
 
@@ -45,6 +46,8 @@ pub struct Round {
     pub bpw: f64,
     /// Bytes of the image.
     pub bytes: usize,
+    /// Predicted milliseconds of a step at the default [`CLOCK`].
+    pub milliseconds: f64,
     /// Error (NMSE) on the f32 policy's path.
     pub nmse: f64,
     /// Error (NMSE) on the path of the image's own rollout; `None` if the f32 policy's actions never vary there, or if
@@ -120,6 +123,7 @@ pub fn run(
             frames: sum(|share| share.kept),
             bpw: report.bpw,
             bytes: report.bytes,
+            milliseconds: StepTime::new(&image, CLOCK).milliseconds,
             nmse: report.nmse,
             own_nmse: eval::evaluate(image, &own_path).ok().map(|report| report.nmse),
             driven: driven.outcome,
