@@ -107,19 +107,20 @@ fn lowest_multiplier(size: &Size<'_>, rows: &[Rows], limit: f64) -> Option<f64> 
     // The range covers everything from 8 bits to none for any scale of energies.
     let largest = rows.iter().flat_map(|r| r.energy.iter().chain(&r.removal)).fold(1e-300f64, |m, e| m.max(*e));
     let unit = if size.price.bit > 0.0 { size.price.bit } else { size.price.cycle };
-    let (mut low, mut high) = ((largest * 1e-18 / unit).ln(), (largest * 10.0 / unit).ln());
-    if !fits(high.exp()) {
+    let (mut low, mut high) = (largest * 1e-18 / unit, largest * 10.0 / unit);
+    if !fits(high) {
         return None;
     }
     for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if fits(middle.exp()) {
+        // The geometric mean: the range covers many powers of ten.
+        let middle = low.sqrt() * high.sqrt();
+        if fits(middle) {
             high = middle;
         } else {
             low = middle;
         }
     }
-    Some(high.exp())
+    Some(high)
 }
 
 /// Returns the widths that take the fewest bytes, if they fit.

@@ -88,7 +88,7 @@ impl Columns {
 
     /// Computes `(a / h)^(1/4)`, without a limit.
     fn unlimited_factors(&self) -> Vec<f64> {
-        let root = |a: f64, h: f64| (a.max(f64::MIN_POSITIVE) / h).powf(0.25);
+        let root = |a: f64, h: f64| (a.max(f64::MIN_POSITIVE) / h).sqrt().sqrt();
         self.weights.iter().zip(&self.values).map(|(a, h)| root(*a, *h)).collect()
     }
 

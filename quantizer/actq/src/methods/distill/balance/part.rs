@@ -89,7 +89,7 @@ impl Part {
 
     /// Computes the share of a factor that remains if the mean is not subtracted.
     fn share(&self, value: f64, mean: f64) -> f64 {
-        if self.has_means { 1.0 } else { (value / with_mean(value, mean)).powf(0.25) }
+        if self.has_means { 1.0 } else { (value / with_mean(value, mean)).sqrt().sqrt() }
     }
 
     /// `true` if its operations can hold these factors: without means, f32 holds them times a large power of two.
@@ -187,7 +187,7 @@ impl Kept {
             }
         }
         let [weights, values] = self.sums(&is_kept);
-        let kept_factor = is_kept.contains(&true).then(|| (weights / values).powf(0.25));
+        let kept_factor = is_kept.contains(&true).then(|| (weights / values).sqrt().sqrt());
         let lost_bits = (self.error(&is_kept) / self.least).log2();
         let fits = kept_factor.map_or(!self.has_means, |factor| factor > 0.0 && factor.is_finite());
         let is_usable = fits && !runs.is_empty() && lost_bits.is_finite();
