@@ -1,9 +1,10 @@
 //! Errors of an image's actions against the f32 policy's.
 
+use std::ops::Range;
 use std::path::Path;
 
 use actq_kernels::{Head, Image};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::size::bits_per_weight;
 use super::unrounded::Unrounded;
@@ -43,7 +44,8 @@ pub fn evaluate(image: Image<'_>, dataset: &Dataset) -> Result<ErrorReport> {
 /// Returns the NMSE of a network in f32 over `dataset`, comparable to [`ErrorReport::nmse`].
 pub fn network_nmse(graph: &Graph, dataset: &Dataset) -> Result<f64> {
     let mut network = Plain { evaluator: Evaluator::new(graph), output: Vec::new() };
-    Ok(differences(graph.len_of(graph.output()), dataset, &mut network)?.nmse)
+    let sums = ErrorSums::over(graph.len_of(graph.output()), dataset, 0..dataset.length.len(), &mut network)?;
+    Ok(sums.differences(&dataset.path)?.nmse)
 }
 
 /// Error that rounding the activations adds to an image.
@@ -121,49 +123,106 @@ impl Runner for Plain<'_> {
 }
 
 fn compare(image: &Image<'_>, dataset: &Dataset, network: &mut impl Runner) -> Result<ErrorReport> {
-    let Differences { nmse, worst_nmse, worst_dimension, max_abs } = differences(image.output().len, dataset, network)?;
-    let (steps, bpw, bytes) = (dataset.frames(), bits_per_weight(image), image.bytes());
-    Ok(ErrorReport { nmse, worst_nmse, max_abs, steps, bpw, bytes, worst_dimension })
+    ErrorSums::over(image.output().len, dataset, 0..dataset.length.len(), network)?.report(
+        bits_per_weight(image),
+        image.bytes(),
+        &dataset.path,
+    )
 }
 
-/// Differences of a network's outputs to the recorded ones; see [`ErrorReport`].
+/// Sums of errors over a part of a recording, which give the errors of the whole when they are added up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ErrorSums {
+    /// Differences to the recorded values, of each dimension of the raw output.
+    error: Vec<Moment>,
+    /// Recorded values of each dimension.
+    signal: Vec<Moment>,
+    /// Largest absolute difference.
+    max_abs: f64,
+    /// Compared observations.
+    steps: usize,
+}
+
+impl ErrorSums {
+    /// Runs `image` over a range of the recording's episodes, as [`evaluate`] does over all.
+    ///
+    /// # Errors
+    ///
+    /// If the recording has no actions, or the image cannot run on an observation.
+    pub fn of(image: Image<'_>, dataset: &Dataset, episodes: Range<usize>) -> Result<Self> {
+        with_head(image, |head| Self::over(image.output().len, dataset, episodes, head))
+    }
+
+    fn over(out_len: usize, dataset: &Dataset, episodes: Range<usize>, network: &mut impl Runner) -> Result<Self> {
+        let none = vec![Moment::default(); out_len];
+        let mut sums = Self { error: none.clone(), signal: none, max_abs: 0.0, steps: 0 };
+        for episode in episodes {
+            network.start(dataset.start(episode).as_deref());
+            for (step, obs) in dataset.episode(episode).enumerate() {
+                let at = || format!("{}: episode {episode}, step {step}", dataset.path.display());
+                let out = network.infer(&obs).with_context(at)?;
+                let recorded = dataset.action_at(episode, step).context("array \"action\" is missing")?;
+                for (i, (&y, &r)) in out.iter().zip(&recorded).enumerate() {
+                    let difference = f64::from(y) - f64::from(r);
+                    sums.error[i].add(difference);
+                    sums.signal[i].add(f64::from(r));
+                    sums.max_abs = sums.max_abs.max(difference.abs());
+                }
+                sums.steps += 1;
+            }
+        }
+        Ok(sums)
+    }
+
+    /// Adds the sums of another part of the same recording.
+    ///
+    /// # Errors
+    ///
+    /// If the sums are of another number of dimensions.
+    pub fn add(&mut self, other: &Self) -> Result<()> {
+        let [own, others] = [&*self, other].map(|sums| (sums.error.len(), sums.signal.len()));
+        ensure!(own == others, "sums of {} and {} dimensions cannot be added", own.0, others.0);
+        let pairs = self.error.iter_mut().zip(&other.error).chain(self.signal.iter_mut().zip(&other.signal));
+        pairs.for_each(|(own, other)| own.join(other));
+        self.max_abs = self.max_abs.max(other.max_abs);
+        self.steps += other.steps;
+        Ok(())
+    }
+
+    /// Returns the errors of an image of `bytes` bytes, at `bpw` bits per weight; `recording` names the recording in an
+    /// error.
+    ///
+    /// # Errors
+    ///
+    /// If the recorded actions never vary.
+    pub fn report(&self, bpw: f64, bytes: usize, recording: &Path) -> Result<ErrorReport> {
+        let Differences { nmse, worst_nmse, worst_dimension } = self.differences(recording)?;
+        Ok(ErrorReport { nmse, worst_nmse, max_abs: self.max_abs, steps: self.steps, bpw, bytes, worst_dimension })
+    }
+
+    fn differences(&self, recording: &Path) -> Result<Differences> {
+        let ratios: Vec<(usize, f64)> = (0..self.error.len())
+            .filter(|&i| self.signal[i].variance() > 0.0)
+            .map(|i| (i, self.error[i].mean_square() / self.signal[i].variance()))
+            .collect();
+        ensure!(
+            !ratios.is_empty(),
+            "{}: the recorded actions never vary; record episodes in which the robot acts",
+            recording.display()
+        );
+        let (worst_dimension, worst_nmse) =
+            ratios.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
+        let nmse = ratios.iter().map(|r| r.1).sum::<f64>() / ratios.len() as f64;
+        Ok(Differences { nmse, worst_nmse, worst_dimension })
+    }
+}
+
+/// Relative errors; see [`ErrorReport`].
 struct Differences {
     nmse: f64,
     worst_nmse: f64,
     worst_dimension: usize,
-    max_abs: f64,
-}
-
-fn differences(out_len: usize, dataset: &Dataset, network: &mut impl Runner) -> Result<Differences> {
-    let mut error = vec![Moment::default(); out_len];
-    let mut signal = vec![Moment::default(); out_len];
-    let mut max_abs = 0f64;
-    for episode in 0..dataset.length.len() {
-        network.start(dataset.start(episode).as_deref());
-        for (step, obs) in dataset.episode(episode).enumerate() {
-            let at = || format!("{}: episode {episode}, step {step}", dataset.path.display());
-            let out = network.infer(&obs).with_context(at)?;
-            let recorded = dataset.action_at(episode, step).context("array \"action\" is missing")?;
-            for (i, (&y, &r)) in out.iter().zip(&recorded).enumerate() {
-                let difference = f64::from(y) - f64::from(r);
-                error[i].add(difference);
-                signal[i].add(f64::from(r));
-                max_abs = max_abs.max(difference.abs());
-            }
-        }
-    }
-    let ratios: Vec<(usize, f64)> = (0..out_len)
-        .filter(|&i| signal[i].variance() > 0.0)
-        .map(|i| (i, error[i].mean_square() / signal[i].variance()))
-        .collect();
-    ensure!(
-        !ratios.is_empty(),
-        "{}: the recorded actions never vary; record episodes in which the robot acts",
-        dataset.path.display()
-    );
-    let (worst_dimension, worst_nmse) = ratios.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
-    let nmse = ratios.iter().map(|r| r.1).sum::<f64>() / ratios.len() as f64;
-    Ok(Differences { nmse, worst_nmse, worst_dimension, max_abs })
 }
 
 /// Reads the held-out recording of a policy folder that must belong to `image`.
@@ -204,7 +263,8 @@ pub fn fill_actions(dataset: &mut Dataset, source: Option<&Policy>) -> Result<()
     Ok(())
 }
 
-#[derive(Clone, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Moment {
     n: f64,
     sum: f64,
@@ -216,6 +276,12 @@ impl Moment {
         self.n += 1.0;
         self.sum += x;
         self.square += x * x;
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.n += other.n;
+        self.sum += other.sum;
+        self.square += other.square;
     }
 
     fn mean_square(&self) -> f64 {
