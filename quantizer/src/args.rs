@@ -1,5 +1,6 @@
 //! The command line.
 
+pub(crate) mod jobs;
 pub(crate) mod link;
 mod values;
 
@@ -10,13 +11,14 @@ use actq_kernels::Width;
 use anyhow::{Result, bail};
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
+use jobs::{JobArgs, MergeArgs, PlanArgs, PoolArgs};
 use link::{KeygenArgs, LinkArgs, SignArgs};
 use values::{clock, effort, forced, group, minutes, npz, pair, positive, rounds, size, two_files, width};
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
 ///
-/// Exit status: 0 on success, 1 on an error, 2 on a wrong command line, 128 + N if signal N ended the command (130 for
-/// Ctrl-C). Long work shows its progress on standard error: a bar on a terminal, else a line every 10 s.
+/// Exit status: 0 on success, 1 on an error, 2 on a wrong command line, 75 if the same job may succeed later, 128 + N if
+/// signal N ended the command (130 for Ctrl-C). Long work shows its progress on standard error: a bar on a terminal, else a line every 10 s.
 #[derive(Parser)]
 #[command(name = "actq", version, max_term_width = 100)]
 pub(crate) struct Cli {
@@ -133,7 +135,13 @@ pub(crate) enum Command {
     /// its default group size. Activations are int8; method distill takes int16 for matrices that profit from it. A
     /// star marks the knee of the policy's best method.
     ///
+    /// With --store, the only POLICY_DIR is a spec (SPEC.toml) or a plan (the output of `actq plan`). Its jobs run on this
+    /// machine, as many at a time as there are cores. Results go into the store, and jobs whose results are there do not
+    /// run again: the same command resumes after any interruption. docs/SCALE.md documents specs and stores.
+    ///
     /// Example: actq sweep policies/ur3 policies/go1 --bpw 2.5,3,4 --svg errors.svg
+    ///
+    /// Example: actq sweep sweep.toml --store results --svg errors.svg
     Sweep {
         #[command(flatten)]
         args: SweepArgs,
@@ -141,6 +149,29 @@ pub(crate) enum Command {
         #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,distill")]
         methods: Vec<MethodArg>,
     },
+    /// Print the jobs of a sweep, one JSON object a line
+    ///
+    /// A job has a kind (quantize, evaluate, drive, learn, merge), options, the digests of its files, the addresses of the
+    /// jobs that it needs (deps), and estimates: cpus, memory_mib, seconds. Its address is the SHA-256 of everything that
+    /// its result depends on. A job of stage N needs only jobs of earlier stages. docs/SCALE.md documents specs.
+    ///
+    /// Example: actq plan sweep.toml > plan.jsonl
+    Plan(PlanArgs),
+    /// Run one job, and put its result into a store
+    ///
+    /// Does nothing if the store has the result. The result is whole or absent at every time, and does not depend on the
+    /// machine or the number of threads. Exit status: 0 with a result; 75 or above 127 if another try may succeed (a full
+    /// disk, a missing result of another job, a signal); 1 if none can.
+    ///
+    /// Example: sed -n 7p plan.jsonl | actq job - --store results
+    Job(JobArgs),
+    /// Print the results of a sweep: tables, the frontier and its plot
+    ///
+    /// Counts of episodes add up over the jobs of an image. A star marks images of the frontier: no other image has fewer
+    /// bytes and a smaller error, or with closed-loop episodes more success.
+    ///
+    /// Example: actq merge sweep.toml --store results --svg frontier.svg
+    Merge(MergeArgs),
     /// Run an image as a policy over standard input and output
     ///
     /// Little-endian: "R" resets and has no reply; the reply to "S" and an observation in f32 is the action in f32. If
@@ -451,7 +482,7 @@ pub(crate) struct TuneArgs {
 /// Arguments of `actq sweep`, without the methods.
 #[derive(clap::Args, Debug)]
 pub struct SweepArgs {
-    /// The policy folders
+    /// The policy folders; with --store, one spec or plan
     #[arg(required = true)]
     pub(crate) policy_dirs: Vec<PathBuf>,
     /// Budgets, in bits per weight of all weights
@@ -477,6 +508,8 @@ pub struct SweepArgs {
     pub(crate) learn: LearnArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+    #[command(flatten)]
+    pub(crate) pool: PoolArgs,
 }
 
 /// Options of distillation, which also ends when the error no longer falls.

@@ -21,9 +21,14 @@ pub fn load(path: &Path) -> Result<Policy> {
     Ok(importer(path).load(path)?)
 }
 
-/// Lists all files that a policy may be read from, with its recordings. They need not exist.
+/// Lists all files that a policy may be read from. They need not exist.
+pub(crate) fn source_files(path: &Path) -> Vec<PathBuf> {
+    importer(path).files(path)
+}
+
+/// Lists the [`source_files`] of a policy with its recordings.
 pub(crate) fn policy_files(path: &Path) -> Vec<PathBuf> {
-    let own = importer(path).files(path);
+    let own = source_files(path);
     own.into_iter().chain(Recording::Calib.paths(path)).chain(Recording::Heldout.paths(path)).collect()
 }
 

@@ -21,10 +21,11 @@ mod threads;
 use std::process::ExitCode;
 
 use actq::text::printable;
+use actq_jobs::error::{AGAIN, JobError};
 use anyhow::Result;
 
 use args::{Command, MethodArg};
-use commands::{bundle, eval, import, inspect, link, quantize, sign, sweep, tune};
+use commands::{bundle, eval, import, inspect, jobs, link, quantize, sign, sweep, tune};
 use outputs::unfinished;
 
 /// Runs the command line of this process.
@@ -45,7 +46,10 @@ pub fn run_work(work: impl FnOnce() -> Result<()>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("actq: {}", printable(&format!("{error:#}")));
-            ExitCode::FAILURE
+            match error.downcast_ref::<JobError>() {
+                Some(JobError { again: true, .. }) => AGAIN.into(),
+                _ => ExitCode::FAILURE,
+            }
         }
     }
 }
@@ -64,6 +68,10 @@ fn run_command(command: &Command) -> Result<()> {
         Command::ExportC(args) => commands::export_c::run(args),
         Command::Deploy(args) => commands::deploy::run(args),
         Command::Tune(args) => tune::run(args),
+        Command::Plan(args) => jobs::plan::run(args),
+        Command::Job(args) => jobs::job::run(args),
+        Command::Merge(args) => jobs::merge::run(args),
+        Command::Sweep { args, .. } if args.pool.store.is_some() => jobs::pool::run(args),
         Command::Sweep { args, methods } => {
             sweep::run(args, &methods.iter().map(|method| method.method()).collect::<Result<Vec<_>>>()?)
         }

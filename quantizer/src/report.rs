@@ -7,6 +7,7 @@ pub mod imported;
 pub mod inspect;
 pub mod learned;
 pub mod memory;
+pub mod merged;
 pub mod notes;
 pub mod plot;
 pub mod progress;

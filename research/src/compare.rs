@@ -22,6 +22,7 @@ use std::{env, fs};
 
 use actq_bench::{command, ur3};
 use actq_cli::outputs::files;
+use actq_cli::report::progress::duration;
 use anyhow::{Context as _, Result, anyhow, ensure};
 
 pub use cell::{Cell, CellKey, Made};
@@ -221,7 +222,7 @@ impl Status {
         let missing: Vec<CellKey> = self.keys.iter().filter(|key| journal.find(key).is_none()).cloned().collect();
         let left = pace::seconds_left(&journal.cells, &missing).unwrap_or_default();
         let (done, all) = (self.keys.len() - missing.len(), self.keys.len());
-        eprintln!("[{done}/{all}] {title}: {what}; about {} left", pace::duration(left));
+        eprintln!("[{done}/{all}] {title}: {what}; about {} left", duration(left));
         Ok(())
     }
 }

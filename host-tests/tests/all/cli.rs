@@ -7,6 +7,7 @@ mod export_c;
 mod fixture;
 mod inspect;
 mod interrupts;
+mod jobs;
 mod policies;
 mod quantize;
 mod refusals;

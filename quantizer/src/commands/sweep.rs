@@ -1,9 +1,11 @@
 //! `actq sweep`
 
+use std::path::PathBuf;
+
 use actq::data::{Recording, Recordings, Sizes, files_of};
 use actq::methods::Method;
 use actq::pipeline::sweep::{self, SweepPlan};
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 
 use crate::args::SweepArgs;
 use crate::importers::{learned, load, policy_files};
@@ -13,6 +15,10 @@ use crate::threads::start_threads;
 
 /// Quantizes policies by several methods at several budgets and compares the errors.
 pub fn run(args: &SweepArgs, methods: &[Method]) -> Result<()> {
+    let is_spec = |path: &&PathBuf| path.extension().is_some_and(|ending| ending == "toml" || ending == "jsonl");
+    if let Some(spec) = args.policy_dirs.iter().find(is_spec) {
+        bail!("{}: is a spec; add --store DIR, the folder of its results", spec.display());
+    }
     let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
     let calib = files_of(&args.calib)?;
     let inputs = folders.chain(calib.iter().chain(&args.heldout).cloned());

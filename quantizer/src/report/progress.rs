@@ -38,6 +38,15 @@ impl Cadence {
     }
 }
 
+/// Formats a remaining time, in seconds.
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        ..90.0 => format!("{seconds:.0} s"),
+        ..5400.0 => format!("{:.0} min", seconds / 60.0),
+        _ => format!("{:.1} h", seconds / 3600.0),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,6 +66,11 @@ mod tests {
         assert_eq!(line(47.5).as_deref(), Some("progress: 47 s, 35%: learning"));
         assert_eq!([line(50.0), line(57.4)], [None, None]);
         assert!(line(57.5).is_some());
+    }
+
+    #[test]
+    fn durations_have_one_unit() {
+        assert_eq!([80.0, 600.0, 9000.0].map(duration), ["80 s", "10 min", "2.5 h"]);
     }
 
     #[test]

@@ -25,15 +25,6 @@ pub(super) fn seconds_left(done: &[Cell], missing: &[CellKey]) -> Option<f64> {
     (!done.is_empty()).then(|| made.max(driven) + 0.0)
 }
 
-/// Formats a duration.
-pub(super) fn duration(seconds: f64) -> String {
-    match seconds {
-        ..90.0 => format!("{seconds:.0} s"),
-        ..5400.0 => format!("{:.0} min", seconds / 60.0),
-        _ => format!("{:.1} h", seconds / 3600.0),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -50,6 +41,5 @@ mod tests {
         assert_eq!(left(&[key("b", Contender::Distill)]), 30.0);
         assert_eq!(left(&[key("c", Contender::Distill), key("a", Contender::Gptq)]), 30.0);
         assert_eq!(left(&[]), 0.0);
-        assert_eq!([80.0, 600.0, 9000.0].map(duration), ["80 s", "10 min", "2.5 h"]);
     }
 }

@@ -1,0 +1,254 @@
+//! Sweeps as jobs: `actq plan`, `job`, `sweep --store` and `merge`, and the script for Slurm.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use actq_bench::command::{actq, binary, failed, run, succeeded};
+use actq_bench::{golden::Random, root};
+use anyhow::{Context as _, Result, ensure};
+use ndarray::Array3;
+use serde_json::Value;
+
+use super::fixture::{Fixture, OBS, write_npy};
+use crate::folder::snapshot;
+
+/// A simulator of short episodes, whose observations depend on the seed.
+const SIMULATOR: &str = r#"
+last=$((ACTQ_SEED + ACTQ_EPISODES))
+seed=$ACTQ_SEED
+while [ $seed -lt $last ]; do
+    printf R
+    for step in 1 2 3 4 5 6 7 8 9 10; do
+        value="\\$(printf %03o $(((7 * seed + step) % 100)))\\000\\200\\077"
+        four=$value$value$value$value
+        printf "S$four$four$four$four$four$four$four$four$four$four"
+    done
+    seed=$((seed + 1))
+done | sh -c "$POLICY_CMD" > /dev/null
+echo "{\"episodes\": $ACTQ_EPISODES, \"success\": 0.5}"
+"#;
+
+const SPEC: &str = r#"
+policies = ["policy"]
+methods = ["rtn", "distill"]
+bpw = [4, 5]
+steps = 2
+
+[drive]
+command = "sh simulator.sh"
+files = ["simulator.sh"]
+episodes = 4
+first_seed = 100
+per_job = 2
+
+[learn]
+rounds = 1
+episodes = 1
+first_seed = 10
+"#;
+
+/// A policy with a recording long enough to learn from, a simulator, and a spec; commands run beside them.
+struct Sweep(Fixture);
+
+impl Sweep {
+    fn new() -> Result<Self> {
+        let fixture = Fixture::new()?;
+        let random = &mut Random::new(8);
+        let obs = Array3::from_shape_simple_fn((1, 300, OBS), || 2.0 * random.unit());
+        fs::remove_file(fixture.policy().join("calib.npz"))?;
+        write_npy(&fixture.policy().join("calib.npy"), &obs)?;
+        let sweep = Self(fixture);
+        fs::write(sweep.folder()?.join("simulator.sh"), SIMULATOR)?;
+        fs::write(sweep.folder()?.join("sweep.toml"), SPEC)?;
+        Ok(sweep)
+    }
+
+    fn folder(&self) -> Result<std::path::PathBuf> {
+        Ok(self.0.policy().parent().context("a folder")?.to_owned())
+    }
+
+    fn command(&self, line: &str) -> Result<Command> {
+        let mut command = actq(&line.split_whitespace().collect::<Vec<_>>());
+        command.current_dir(self.folder()?);
+        Ok(command)
+    }
+
+    fn run(&self, line: &str, input: &str) -> Result<Output> {
+        run(self.command(line)?, input.as_bytes())
+    }
+
+    /// The names and contents of a store's files; hidden ones are those of killed processes.
+    fn store(&self, name: &str) -> Result<Vec<(String, Option<Vec<u8>>)>> {
+        let file_name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let files = snapshot(&self.folder()?.join(name))?.into_iter().map(|(path, file)| (file_name(&path), file));
+        Ok(files.filter(|(name, _)| !name.starts_with('.')).collect())
+    }
+}
+
+/// Counts the results in a store.
+fn results(store: &Path) -> usize {
+    let names = fs::read_dir(store).into_iter().flatten().flatten().map(|entry| entry.file_name());
+    names.filter(|name| name.to_string_lossy().ends_with(".json") && name != "store.json").count()
+}
+
+#[test]
+fn interrupted_sweeps_resume_to_the_same_store() -> Result<()> {
+    let sweep = Sweep::new()?;
+    let plan = succeeded(&sweep.run("plan sweep.toml", "")?)?;
+    let jobs = plan.lines().count();
+    let table = succeeded(&sweep.run("sweep sweep.toml --store whole --threads 1 --quiet --json whole.json", "")?)?;
+    ensure!(table.contains("distill, round 1") && table.contains("0.500"), "{table}");
+    ensure!(results(&sweep.folder()?.join("whole")) == jobs, "one result a job");
+    let merged = succeeded(&sweep.run("merge sweep.toml --store whole --json merged.json --svg merged.svg", "")?)?;
+    ensure!(merged == table, "{merged}");
+    let read = |name: &str| -> Result<Vec<u8>> { Ok(fs::read(sweep.folder()?.join(name))?) };
+    ensure!(read("merged.json")? == read("whole.json")?);
+    ensure!(String::from_utf8(read("merged.svg")?)?.contains(">frontier<"));
+
+    // Killed several times, each after one result more, by signals that it can and cannot catch.
+    let store = sweep.folder()?.join("killed");
+    for signal in ["KILL", "TERM", "INT", "KILL"] {
+        let before = results(&store);
+        let mut child = sweep
+            .command("sweep sweep.toml --store killed --threads 2 --quiet")?
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()?;
+        let begun = Instant::now();
+        while results(&store) <= before && child.try_wait()?.is_none() {
+            ensure!(begun.elapsed() < Duration::from_secs(120), "no result");
+            sleep(Duration::from_millis(2));
+        }
+        Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).stderr(Stdio::null()).status()?;
+        child.wait()?;
+    }
+    failed(
+        &sweep.run("merge sweep.toml --store killed", "")?,
+        1,
+        &["jobs have no result yet; run `actq sweep sweep.toml"],
+    )
+    .or_else(|error| if results(&store) == jobs { Ok(()) } else { Err(error) })?;
+    // The plan as a file gives the same.
+    fs::write(sweep.folder()?.join("plan.jsonl"), &plan)?;
+    let again = succeeded(&sweep.run("sweep plan.jsonl --store killed --threads 2 --quiet --log log.jsonl", "")?)?;
+    ensure!(again == table, "{again}");
+    ensure!(sweep.store("killed")? == sweep.store("whole")?, "the stores differ");
+    // Nothing is left to do.
+    let path = sweep.folder()?.join("log.jsonl");
+    // No file, if the sweep had ended before it was killed.
+    let log = || fs::read_to_string(&path).unwrap_or_default();
+    let before = log();
+    succeeded(&sweep.run("sweep sweep.toml --store killed --quiet --log log.jsonl", "")?)?;
+    ensure!(log() == before);
+    Ok(())
+}
+
+/// `sbatch` as a script that runs the array's tasks as processes, several at a time.
+const SBATCH: &str = r#"#!/bin/sh
+while [ $# -gt 0 ]; do
+    case $1 in
+        --array=0-*) last=${1#--array=0-} ;;
+        --*) ;;
+        *) break ;;
+    esac
+    shift
+done
+task=0
+while [ $task -le $last ]; do
+    SLURM_ARRAY_JOB_ID=1 SLURM_ARRAY_TASK_ID=$task SLURM_ARRAY_TASK_COUNT=$((last + 1)) SLURM_CPUS_PER_TASK=1 sh "$@" >&2 &
+    task=$((task + 1))
+    if [ $((task % 3)) = 0 ]; then wait; fi
+done
+wait
+echo 1
+"#;
+
+#[test]
+fn slurm_arrays_give_the_same_store() -> Result<()> {
+    let sweep = Sweep::new()?;
+    succeeded(&sweep.run("sweep sweep.toml --store whole --threads 1 --quiet", "")?)?;
+    let bin = sweep.folder()?.join("bin");
+    fs::create_dir(&bin)?;
+    fs::write(bin.join("sbatch"), SBATCH)?;
+    fs::set_permissions(bin.join("sbatch"), fs::Permissions::from_mode(0o755))?;
+    std::os::unix::fs::symlink(binary()?, bin.join("actq"))?;
+    let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap_or_default());
+    let mut script = Command::new("sh");
+    script.arg(root().join("examples/slurm/sweep.sh")).args(["sweep.toml", "array", "--partition=any"]);
+    script.current_dir(sweep.folder()?).env("PATH", path);
+    succeeded(&run(script, b"")?)?;
+    ensure!(sweep.store("array")? == sweep.store("whole")?, "the stores differ");
+    succeeded(&sweep.run("merge sweep.toml --store array", "")?)?;
+    Ok(())
+}
+
+#[test]
+fn a_status_says_whether_another_try_helps() -> Result<()> {
+    let sweep = Sweep::new()?;
+    let plan = succeeded(&sweep.run("plan sweep.toml", "")?)?;
+    let line = |kind: &str| {
+        let is_kind = |line: &&str| line.contains(&format!("{{\"kind\":\"{kind}\"")) && line.contains("rtn at 5");
+        plan.lines().find(is_kind).context("a job")
+    };
+    failed(&sweep.run("job - --store store", line("drive")?)?, 75, &["run that job first"])?;
+    // No file may grow: a stand-in for a full disk.
+    let full = |line: &str| -> Result<Output> {
+        let mut shell = Command::new("sh");
+        let limited = format!("trap '' XFSZ; ulimit -f 0; exec '{}' job - --store store", binary()?.display());
+        shell.args(["-c", &limited]).current_dir(sweep.folder()?);
+        run(shell, line.as_bytes())
+    };
+    failed(&full(line("quantize")?)?, 75, &["cannot write the file"])?;
+    ensure!(results(&sweep.folder()?.join("store")) == 0);
+    let told = succeeded(&sweep.run("job - --store store --progress", line("quantize")?)?)?;
+    let last: Value = serde_json::from_str(told.lines().last().context("lines")?)?;
+    ensure!(last["cached"] == false && last["seconds"].is_f64(), "{last}");
+    ensure!(succeeded(&sweep.run("job - --store store --progress", line("quantize")?)?)?.contains("\"cached\":true"));
+    ensure!(results(&sweep.folder()?.join("store")) == 1);
+    let with = |command: &str| -> Result<Output> {
+        fs::write(sweep.folder()?.join("other.toml"), SPEC.replace("sh simulator.sh", command))?;
+        let plan = succeeded(&sweep.run("plan other.toml", "")?)?;
+        let is_drive = |line: &&str| line.contains("\"kind\":\"drive\"") && line.contains("rtn at 5");
+        sweep.run("job - --store store", plan.lines().find(is_drive).context("a job")?)
+    };
+    failed(&with("exit 75")?, 75, &["the drive command failed", "exit 75"])?;
+    failed(&with("exit 3")?, 1, &["the drive command failed", "exit 3"])?;
+    failed(&with("kill -9 $$")?, 75, &["the drive command failed"])?;
+    failed(&with("echo '{\\\"episodes\\\": 9}'")?, 1, &["ran 9 episodes instead of 2"])?;
+    ensure!(results(&sweep.folder()?.join("store")) == 1);
+    Ok(())
+}
+
+#[test]
+fn failed_jobs_leave_the_other_results() -> Result<()> {
+    let sweep = Sweep::new()?;
+    fs::write(sweep.folder()?.join("broken.toml"), SPEC.replace("sh simulator.sh", "exit 75"))?;
+    let output = sweep.run("sweep broken.toml --store store --tries 2 --quiet --log log.jsonl", "")?;
+    failed(&output, 1, &["it is tried again", "no further try", "jobs failed, and", "have their results in store"])?;
+    let log = fs::read_to_string(sweep.folder()?.join("log.jsonl"))?;
+    let of = |kind: &str, status: &str| {
+        log.lines().filter(|line| line.contains(&format!("\"{kind}\"")) && line.contains(status)).count()
+    };
+    // Two ranges of episodes of each of four images, and one to learn from of two of them, each two times.
+    ensure!((of("drive", "\"status\":75"), of("quantize", "\"status\":0")) == (2 * (8 + 2), 4), "{log}");
+    Ok(())
+}
+
+#[test]
+fn sweeps_are_refused_before_any_job() -> Result<()> {
+    let sweep = Sweep::new()?;
+    fs::write(sweep.folder()?.join("key.toml"), format!("bits = 3\n{SPEC}"))?;
+    failed(&sweep.run("sweep key.toml --store store --quiet", "")?, 1, &["key.toml", "unknown field `bits`"])?;
+    failed(&sweep.run("sweep none.toml --store store --quiet", "")?, 1, &["none.toml: cannot read the file"])?;
+    failed(&sweep.run("sweep sweep.toml --store store --bpw 3", "")?, 2, &["cannot be used with"])?;
+    failed(&sweep.run("sweep sweep.toml --quiet", "")?, 1, &["sweep.toml: is a spec; add --store DIR"])?;
+    failed(&sweep.run("sweep sweep.toml --store policy --quiet", "")?, 1, &["is not empty, and has no store.json"])?;
+    failed(&sweep.run("merge sweep.toml --store new", "")?, 1, &["jobs have no result yet"])?;
+    failed(&sweep.run("job - --store store", "{}")?, 1, &["standard input: is not one job"])?;
+    failed(&sweep.run("plan simulator.sh", "")?, 1, &["simulator.sh: is not a plan"])
+}

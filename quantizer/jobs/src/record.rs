@@ -1,0 +1,39 @@
+//! The result of a job, as its file in the store.
+
+use serde::{Deserialize, Serialize};
+
+use crate::figures::{Driven, Evaluated, Made};
+use crate::merged::Merged;
+
+/// The version of the files.
+pub const FORMAT: u32 = 1;
+
+/// A job's result.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// [`FORMAT`].
+    pub format: u32,
+    /// The job's address.
+    pub address: String,
+    /// Version of the package that made it.
+    pub version: String,
+    /// The result.
+    pub result: Outcome,
+}
+
+/// A result.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(tag = "kind", content = "value", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Outcome {
+    /// An image, in `ADDRESS.actq`.
+    Made(Made),
+    /// The reason why no image is within the budget. Jobs that need the image have the same result.
+    Impossible(String),
+    /// Errors on the held-out recording.
+    Evaluated(Evaluated),
+    /// Outcome of closed-loop episodes.
+    Driven(Driven),
+    /// The results of a plan.
+    Merged(Merged),
+}

@@ -1,0 +1,72 @@
+//! Runs one job.
+
+mod drive;
+mod images;
+mod inputs;
+mod merge;
+
+use std::path::Path;
+
+use actq::data::{Dataset, Sizes};
+use actq::error::{Context as _, ensure};
+use actq::measure::eval::ErrorSums;
+
+use crate::error::JobError;
+use crate::figures::Evaluated;
+use crate::host::Host;
+use crate::job::{self, Job, VERSION, Work};
+use crate::record::{FORMAT, Outcome, Record};
+use crate::store::Store;
+use inputs::{Kept, check_inputs, image, path_of};
+
+/// Runs a job and writes its result into the store. Returns `false` if the store has the result already. `watch`
+/// receives the present work and the share of it that is done.
+///
+/// # Errors
+///
+/// [`JobError::again`] is `true` if another try may succeed. The store then has no part of the result.
+pub fn run(job: &Job, store: &Store, host: &dyn Host, watch: &mut dyn FnMut(&str, f64)) -> Result<bool, JobError> {
+    if store.has(&job.address) {
+        // A damaged result must not count.
+        store.read(&job.address)?;
+        return Ok(false);
+    }
+    let mut work = || -> Result<(), JobError> {
+        check_inputs(&job.inputs)?;
+        let (result, kept) = match &job.work {
+            Work::Quantize(make) => images::quantize(job, make, store, host, watch)?,
+            Work::Learn(learn) => images::learn(job, learn, store, host, watch)?,
+            Work::Evaluate(evaluate) => (self::evaluate(job, evaluate, store, host)?, None),
+            Work::Drive(drive) => drive::drive(job, drive, store, host)?,
+            Work::Merge(merge) => (Outcome::Merged(merge::merge(merge, store)?), None),
+        };
+        let record = Record { format: FORMAT, address: job.address.clone(), version: VERSION.to_owned(), result };
+        let blob = kept.as_ref().map(|Kept { path, bytes }| (path.as_path(), &bytes[..]));
+        store.write_result(&record, blob, host)
+    };
+    work().map_err(|error| error.context(job.title.clone()))?;
+    Ok(true)
+}
+
+fn evaluate(job: &Job, evaluate: &job::Evaluate, store: &Store, host: &dyn Host) -> Result<Outcome, JobError> {
+    let buffer = match image(&evaluate.image, store)? {
+        Ok((_, buffer)) => buffer,
+        Err(why) => return Ok(Outcome::Impossible(why)),
+    };
+    let measure = || {
+        let policy = host.load(path_of(evaluate.policy.as_deref())?)?;
+        let mut dataset = heldout(job, Sizes::of(&policy))?;
+        dataset.fill_actions(&policy.graph);
+        let [first, count] = [evaluate.episodes.first, evaluate.episodes.count].map(|n| n as usize);
+        let end = first.saturating_add(count);
+        ensure!(end <= dataset.length.len(), "{}: has no episode {}", dataset.path.display(), end.saturating_sub(1));
+        let sums = ErrorSums::of(buffer.image(Path::new(&evaluate.image))?, &dataset, first..end)?;
+        Ok(Outcome::Evaluated(Evaluated { episodes: evaluate.episodes, sums }))
+    };
+    Ok(measure()?)
+}
+
+fn heldout(job: &Job, sizes: Sizes) -> actq::error::Result<Dataset> {
+    let input = job.inputs.iter().find(|input| input.role == job::Role::Heldout);
+    Dataset::load(&input.context("the job has no held-out recording")?.path, sizes)
+}

@@ -1,0 +1,178 @@
+//! The folder of results: one file per job, whole or absent.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use actq::error::{Context as _, Error, Result, bail, ensure};
+use serde::{Deserialize, Serialize};
+
+use crate::digest::{is_digest, of_bytes};
+use crate::error::JobError;
+use crate::host::Host;
+use crate::record::{FORMAT, Outcome, Record};
+
+/// Name of the file that makes a folder a store.
+const HEADER: &str = "store.json";
+const NAME: &str = "actq-store";
+
+/// First file of a store.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    format: String,
+    version: u32,
+}
+
+/// A store. It holds `store.json` with the version of its files, and for each result `ADDRESS.json`; an image or a
+/// recording is beside it, as `ADDRESS.actq` or `ADDRESS.npz`, and is written first.
+#[derive(Clone, Debug)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+impl Store {
+    /// Opens a store; makes one in a folder that is absent or empty.
+    ///
+    /// # Errors
+    ///
+    /// If the folder holds other files, or a store of another version; if it cannot be made or read.
+    pub fn open(folder: &Path, host: &dyn Host) -> Result<Self, JobError> {
+        let name = folder.display();
+        let folder = std::path::absolute(folder).map_err(JobError::never)?;
+        let store = Self { folder };
+        let path = store.folder.join(HEADER);
+        match fs::read(&path) {
+            Ok(bytes) => store.check(&bytes).map_err(|error| JobError::never(error.context(name.to_string())))?,
+            Err(error) if error.kind() == ErrorKind::NotFound => store.make(host)?,
+            Err(error) => {
+                return Err(JobError::again(error).context(format!("{}: cannot read the file", path.display())));
+            }
+        }
+        Ok(store)
+    }
+
+    fn check(&self, bytes: &[u8]) -> Result<()> {
+        let Ok(header) = serde_json::from_slice::<Header>(bytes) else {
+            bail!("{HEADER} is not that of a store; choose another folder")
+        };
+        ensure!(header.format == NAME, "{HEADER} is not that of a store; choose another folder");
+        ensure!(
+            header.version == FORMAT,
+            "is a store of version {}, and this is actq with stores of version {FORMAT}; use the actq that made it, or another \
+             folder",
+            header.version
+        );
+        Ok(())
+    }
+
+    fn make(&self, host: &dyn Host) -> Result<(), JobError> {
+        let name = self.folder.display();
+        fs::create_dir_all(&self.folder)
+            .map_err(|error| JobError::again(error).context(format!("{name}: cannot create the folder")))?;
+        let entries = fs::read_dir(&self.folder)
+            .map_err(|error| JobError::again(error).context(format!("{name}: cannot read the folder")))?;
+        for entry in entries.flatten() {
+            let file = entry.file_name();
+            // Another process may be making the same store: hidden files are not yet in place.
+            if !file.to_string_lossy().starts_with('.') && file != HEADER {
+                let text = format!(
+                    "{name}: is not empty, and has no {HEADER}: it holds {}; choose an empty or new folder",
+                    file.display()
+                );
+                return Err(JobError::never(Error::input(text)));
+            }
+        }
+        let header = Header { format: NAME.to_owned(), version: FORMAT };
+        self.write(HEADER, &line(&header)?, host)
+    }
+
+    /// Returns its folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Returns the place of an image.
+    pub fn image(&self, address: &str) -> PathBuf {
+        self.folder.join(format!("{address}.actq"))
+    }
+
+    /// Returns the place of a recording.
+    pub fn recording(&self, address: &str) -> PathBuf {
+        self.folder.join(format!("{address}.npz"))
+    }
+
+    fn result(&self, address: &str) -> PathBuf {
+        self.folder.join(format!("{address}.json"))
+    }
+
+    /// Returns `true` if the store has the result of a job.
+    pub fn has(&self, address: &str) -> bool {
+        is_digest(address) && self.result(address).is_file()
+    }
+
+    /// Reads the result of a job.
+    ///
+    /// # Errors
+    ///
+    /// "Again" if there is none yet; "never" if the file is damaged.
+    pub fn read(&self, address: &str) -> Result<Outcome, JobError> {
+        let path = self.result(address);
+        let name = path.display();
+        let bytes = match fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                let text = format!("{name}: the result of this job is missing; run that job first");
+                return Err(JobError::again(Error::input(text)));
+            }
+            Err(error) => return Err(JobError::again(error).context(format!("{name}: cannot read the file"))),
+        };
+        let damaged = |why: String| {
+            let text = format!("{name}: is damaged ({why}); remove it, and run its job again");
+            JobError::never(Error::input(text))
+        };
+        let record: Record = serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
+        if record.format != FORMAT || record.address != address {
+            return Err(damaged(format!("format {}, address {}", record.format, record.address)));
+        }
+        Ok(record.result)
+    }
+
+    /// Reads a file beside a result, and checks its digest.
+    ///
+    /// # Errors
+    ///
+    /// If it is missing or does not have the digest.
+    pub fn read_blob(&self, path: &Path, sha256: &str) -> Result<Vec<u8>, JobError> {
+        let name = path.display();
+        let bytes =
+            fs::read(path).map_err(|error| JobError::again(error).context(format!("{name}: cannot read the file")))?;
+        if of_bytes(&bytes) != sha256 {
+            let text = format!("{name}: is damaged; remove it and its .json, and run its job again");
+            return Err(JobError::never(Error::input(text)));
+        }
+        Ok(bytes)
+    }
+
+    /// Writes a result, after the file beside it.
+    ///
+    /// # Errors
+    ///
+    /// "Again" if a file cannot be written, as on a full disk; the store then has no part of the result that a reader
+    /// would take.
+    pub fn write_result(&self, record: &Record, blob: Option<(&Path, &[u8])>, host: &dyn Host) -> Result<(), JobError> {
+        if let Some((path, bytes)) = blob {
+            host.write(path, bytes).map_err(JobError::again)?;
+        }
+        self.write(&format!("{}.json", record.address), &line(record)?, host)
+    }
+
+    fn write(&self, name: &str, bytes: &[u8], host: &dyn Host) -> Result<(), JobError> {
+        host.write(&self.folder.join(name), bytes).map_err(JobError::again)
+    }
+}
+
+/// Formats a file of one line.
+fn line(value: &impl Serialize) -> Result<Vec<u8>, JobError> {
+    let text = serde_json::to_string(value).context("cannot format a result").map_err(JobError::never)?;
+    Ok((text + "\n").into_bytes())
+}

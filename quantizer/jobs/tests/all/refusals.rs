@@ -1,0 +1,136 @@
+//! Specs, plans and stores that are refused.
+
+use std::fs;
+
+use crate::common::{Fake, SPEC, files, folder, jobs};
+use actq_jobs::job::Job;
+use actq_jobs::order;
+use actq_jobs::run::run;
+use actq_jobs::schedule::{Counts, Ended, Schedule};
+use actq_jobs::store::Store;
+
+#[test]
+fn specs_are_refused_with_the_key() {
+    let cases = [
+        ("bpw = [1, 20]", "bpw = [1, 20]\nbwp = 3", "unknown field `bwp`"),
+        ("[evaluate]", "[evaluation]", "unknown field `evaluation`"),
+        ("per_job = 2\n\n[drive]", "per_jobs = 2\n\n[drive]", "unknown field `per_jobs`"),
+        ("steps = 2", "minutes = 2", "minutes: learning that time limits"),
+        ("steps = 2", "steps = -2", "invalid value"),
+        ("bpw = [1, 20]", "bpw = [1, 0]", "budgets are numbers above 0"),
+        ("bpw = [1, 20]", "bpw = []", "bpw: the list is empty"),
+        ("bpw = [1, 20]", "bpw = [2, 2.0]", "bpw: 2 is named twice"),
+        ("\"distill\"]", "\"rtn\"]", "methods: rtn is named twice"),
+        ("\"rtn\", \"distill\"", "\"rtn\"", "only method distill learns"),
+        ("\"rtn\", ", "\"rtm\", ", "method \"rtm\" is unknown"),
+        ("policies = [\"policy\"]", "policies = [\"nowhere\"]", "nowhere"),
+        ("policies = [\"policy\"]", "policies = [\"policy\", \"./policy\"]", "two policies are named \"tiny\""),
+        ("episodes = 5", "episodes = 0", "drive.episodes: 0"),
+        ("first_seed = 10\n", "first_seed = 98\n", "seeds 98 to 100 are also seeds of [drive], 100 to 104"),
+        ("command = \"simulator\"", "command = \"s\"\nfiles = [\"missing.py\"]", "missing.py: cannot read the file"),
+        ("command = \"simulator\"", "command = \" \"", "drive.command: is empty"),
+    ];
+    for (from, to, expected) in cases {
+        assert!(SPEC.contains(from), "{from}");
+        let dir = folder(&SPEC.replacen(from, to, 1));
+        let error = format!("{:#}", jobs(&dir).expect_err(to));
+        assert!(error.contains(expected), "{to}: {error}");
+    }
+    let dir = folder(SPEC);
+    fs::remove_file(dir.path().join("policy/heldout.npz")).expect("removed");
+    let error = format!("{:#}", jobs(&dir).expect_err("no recording"));
+    assert!(error.contains("a sweep needs recorded observations"), "{error}");
+}
+
+/// Returns the plan's text with one address replaced by another.
+fn replaced(jobs: &[Job], from: usize, to: usize) -> String {
+    order::text(jobs).expect("text").replace(&jobs[from].address, &jobs[to].address)
+}
+
+#[test]
+fn damaged_plans_are_refused() {
+    let plan = jobs(&folder(SPEC)).expect("a plan");
+    let refused = |text: &str, expected: &str| {
+        let error = format!("{:#}", order::read(text).expect_err(expected));
+        assert!(error.contains(expected), "{expected}: {error}");
+    };
+    let text = order::text(&plan).expect("text");
+    refused("", "has no job");
+    refused("{}", "line 1");
+    refused(&replaced(&plan, 0, 4), "have one address");
+    refused(&text.lines().skip(1).collect::<Vec<_>>().join("\n"), "which is not in the plan");
+    // The first image waits for the merge, which waits for all.
+    let (first, rest) = text.split_once('\n').expect("lines");
+    let waits = first.replace("\"deps\":[]", &format!("\"deps\":[\"{}\"]", plan.last().expect("a job").address));
+    refused(&format!("{waits}\n{rest}"), "form a cycle");
+    refused(&text.replacen("\"seed\":1", "\"seed\":2", 1), "must not be edited");
+    refused(&text.replacen("\"steps\":null", "\"steps\":null,\"minutes\":1.0", 1), "has the option minutes");
+    refused(&text.replacen("\"steps\":null", "\"steps\":null,\"pace\":1", 1), "unknown field `pace`");
+    refused(&text.replacen("\"version\":\"", "\"version\":\"9", 1), "was planned by version 9");
+}
+
+#[test]
+fn other_folders_are_no_stores() {
+    let (dir, host) = (folder(SPEC), Fake::default());
+    let refused = |expected: &str| {
+        let error = Store::open(dir.path(), &host).expect_err(expected);
+        assert!(!error.again && format!("{:#}", error.error).contains(expected), "{:#}", error.error);
+    };
+    refused("is not empty, and has no store.json");
+    fs::write(dir.path().join("store.json"), "{\"format\":\"actq-store\",\"version\":2}").expect("written");
+    refused("is a store of version 2, and this is actq with stores of version 1");
+    fs::write(dir.path().join("store.json"), "{}").expect("written");
+    refused("is not that of a store");
+}
+
+#[test]
+fn damaged_results_are_not_used() {
+    let (dir, host) = (folder(SPEC), Fake::default());
+    let plan = jobs(&dir).expect("a plan");
+    let store = Store::open(&dir.path().join("store"), &host).expect("a store");
+    let quantize = plan.iter().find(|job| job.title.contains("rtn at 20")).expect("a job");
+    let evaluate = plan.iter().find(|job| job.deps == [quantize.address.clone()]).expect("a job");
+    let run = |job: &Job| run(job, &store, &host, &mut |_, _| ());
+    assert!(run(quantize).expect("made"));
+    let before = files(store.folder());
+    fs::write(store.image(&quantize.address), "other").expect("written");
+    let error = run(evaluate).expect_err("a damaged image");
+    assert!(!error.again && format!("{:#}", error.error).contains("is damaged; remove it"), "{:#}", error.error);
+    fs::write(store.folder().join(format!("{}.json", quantize.address)), "{\"format\":1").expect("written");
+    let error = run(quantize).expect_err("a damaged result");
+    assert!(format!("{:#}", error.error).contains("is damaged"), "{:#}", error.error);
+    // As the errors say: remove the files, and run the job again.
+    fs::remove_file(store.folder().join(format!("{}.json", quantize.address))).expect("removed");
+    assert!(run(quantize).expect("made again"));
+    assert_eq!(files(store.folder()), before);
+}
+
+#[test]
+fn failed_jobs_are_tried_again_or_skip_their_dependents() {
+    let plan = jobs(&folder(SPEC)).expect("a plan");
+    let mut schedule = Schedule::new(&plan, |_| false, 2);
+    let first = schedule.start(1).expect("a job");
+    assert!(plan[first].title.contains("distill"), "the longest job is first: {}", plan[first].title);
+    assert!(schedule.end(first, Ended::Again), "a first failure is tried again");
+    assert_eq!(schedule.start(1), Some(first));
+    assert!(!schedule.end(first, Ended::Again), "a second one is not");
+    // Its measurements, its round, the round's measurements, and the merge.
+    let Counts { failed, skipped, .. } = schedule.counts();
+    assert_eq!((failed, skipped), (1, 6 + 2 + 1 + 6 + 1));
+    let mut left = 0;
+    while let Some(job) = schedule.start(1) {
+        assert!(plan[job].deps.iter().all(|dep| *dep != plan[first].address));
+        schedule.end(job, Ended::Done);
+        left += 1;
+    }
+    let Counts { done, running, all, .. } = schedule.counts();
+    assert_eq!((done, running, all), (left, 0, left + 17));
+    // A job that takes more cores than are free waits, and runs if it is alone.
+    let mut wide = plan.clone();
+    wide.iter_mut().for_each(|job| job.cpus = 4);
+    let mut schedule = Schedule::new(&wide, |_| false, 1);
+    let alone = schedule.start(2).expect("it runs alone");
+    assert_eq!(schedule.start(2), None);
+    schedule.end(alone, Ended::Never);
+    assert!(schedule.start(2).is_some());
+}

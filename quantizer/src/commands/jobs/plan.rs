@@ -1,0 +1,37 @@
+//! `actq plan`
+
+use std::fs;
+use std::path::Path;
+
+use actq_jobs::job::Job;
+use actq_jobs::spec::Spec;
+use actq_jobs::store::Store;
+use actq_jobs::{order, plan};
+use anyhow::{Context as _, Result};
+
+use super::host::Command;
+use crate::args::jobs::PlanArgs;
+use crate::terminal::print;
+
+/// Prints the jobs of a spec.
+pub(crate) fn run(args: &PlanArgs) -> Result<()> {
+    let mut jobs = read(&args.spec)?;
+    if let Some(folder) = &args.missing {
+        let store = Store::open(folder, &Command)?;
+        jobs.retain(|job| !store.has(&job.address));
+    }
+    jobs.retain(|job| args.stage.is_none_or(|stage| job.stage == stage));
+    print(&order::text(&jobs)?)
+}
+
+/// Plans a spec, or reads a plan.
+pub(super) fn read(path: &Path) -> Result<Vec<Job>> {
+    let name = path.display();
+    if path.extension().is_some_and(|ending| ending == "toml") {
+        return plan::jobs(&Spec::read(path)?, &Command).with_context(|| name.to_string());
+    }
+    let text = fs::read_to_string(path).with_context(|| format!("{name}: cannot read the file"))?;
+    order::read(&text).with_context(|| {
+        format!("{name}: is not a plan; name a spec with the ending .toml, or the output of `actq plan`")
+    })
+}

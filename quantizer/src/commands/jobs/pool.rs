@@ -1,0 +1,201 @@
+//! `actq sweep SPEC.toml`: a pool of worker processes on this machine.
+
+use std::collections::BTreeMap;
+use std::env;
+use std::fs::OpenOptions;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Sender, channel};
+use std::thread;
+use std::time::Instant;
+
+use actq_jobs::error::AGAIN;
+use actq_jobs::job::Job;
+use actq_jobs::schedule::{Counts, Ended, Schedule};
+use actq_jobs::store::Store;
+use anyhow::{Context as _, Result, ensure};
+use serde_json::{Value, json};
+
+use super::{host, merge, plan};
+use crate::args::SweepArgs;
+use crate::group;
+use crate::report::progress::duration;
+use crate::terminal::{Progress, note, reserve};
+use crate::threads::allocation;
+
+/// Runs the jobs of a spec that have no result yet, and prints the results.
+pub(crate) fn run(args: &SweepArgs) -> Result<()> {
+    let folder = args.pool.store.as_deref().context("name a folder with --store")?;
+    let [spec] = &args.policy_dirs[..] else {
+        anyhow::bail!("--store takes one spec or plan, and {} are given", args.policy_dirs.len())
+    };
+    let outputs = reserve(args.svg.iter().chain(&args.json), [spec])?;
+    let progress = Progress::new(args.run.quiet, "planning")?;
+    let jobs = plan::read(spec)?;
+    let store = Store::open(folder, &host::Command)?;
+    let cores = if args.run.threads == 0 { allocation() } else { args.run.threads.into() };
+    let mut pool = Pool {
+        jobs: &jobs,
+        store: &store,
+        schedule: Schedule::new(&jobs, |job| store.has(&job.address), args.pool.tries.into()),
+        cores,
+        actq: env::current_exe().context("cannot find the running executable")?,
+        log: args.pool.log.clone(),
+        shares: BTreeMap::new(),
+    };
+    let ended = pool.work(&progress);
+    drop(progress);
+    ended?;
+    let Counts { failed, skipped, .. } = pool.schedule.counts();
+    ensure!(
+        failed == 0,
+        "{failed} jobs failed, and {skipped} that need them did not run; the others have their results in {}. Run the same command \
+         again to retry",
+        folder.display()
+    );
+    merge::report(&jobs, &store, outputs, args.svg.is_some(), args.json.is_some())
+}
+
+/// Jobs, store and workers.
+struct Pool<'a> {
+    jobs: &'a [Job],
+    store: &'a Store,
+    schedule: Schedule<'a>,
+    /// Cores for all workers together.
+    cores: usize,
+    actq: PathBuf,
+    log: Option<PathBuf>,
+    /// Share done of each running job.
+    shares: BTreeMap<usize, f64>,
+}
+
+/// A message of a worker's thread.
+enum Message {
+    Share(usize, f64),
+    Ended(usize, Try),
+}
+
+/// A try of a job.
+struct Try {
+    ended: Ended,
+    /// Exit status, as a shell shows it.
+    status: i32,
+    seconds: f64,
+    /// Standard error of the worker.
+    said: String,
+}
+
+impl Pool<'_> {
+    fn work(&mut self, progress: &Progress) -> Result<()> {
+        let (sender, receiver) = channel();
+        let (begun, left_at_begin) = (Instant::now(), self.schedule.work().0);
+        let mut free = self.cores;
+        loop {
+            while let Some(job) = self.schedule.start(free) {
+                free = free.saturating_sub(self.jobs[job].cpus);
+                self.shares.insert(job, 0.0);
+                self.start(job, sender.clone())?;
+            }
+            if self.shares.is_empty() {
+                return Ok(());
+            }
+            let (left, all) = self.left();
+            let Counts { done, running, all: count, .. } = self.schedule.counts();
+            // Before the first progress, nothing is known but the estimates of the plan.
+            let made = left_at_begin - left;
+            let seconds =
+                if made > 0.0 { begun.elapsed().as_secs_f64() * left / made } else { left / self.cores as f64 };
+            let work = format!("{done} of {count} jobs, {running} running, {} left", duration(seconds));
+            progress.set(&work, if all > 0.0 { 1.0 - left / all } else { 0.0 });
+            match receiver.recv().context("the workers' threads have ended")? {
+                Message::Share(job, share) => drop(self.shares.insert(job, share)),
+                Message::Ended(job, of) => {
+                    self.shares.remove(&job);
+                    free = (free + self.jobs[job].cpus).min(self.cores);
+                    self.end(job, &of)?;
+                }
+            }
+        }
+    }
+
+    /// Returns the estimated core seconds that remain, and those of all jobs.
+    fn left(&self) -> (f64, f64) {
+        let (left, all) = self.schedule.work();
+        let part = |(job, share): (&usize, &f64)| self.jobs[*job].seconds * self.jobs[*job].cpus as f64 * share;
+        ((left - self.shares.iter().map(part).sum::<f64>()).max(0.0), all)
+    }
+
+    /// Starts a worker, and a thread that reads its output.
+    fn start(&self, job: usize, sender: Sender<Message>) -> Result<()> {
+        let line = serde_json::to_string(&self.jobs[job])?;
+        let mut command = Command::new(&self.actq);
+        command.args(["job", "-", "--progress", "--store"]).arg(self.store.folder());
+        command.args(["--threads", &self.jobs[job].cpus.min(self.cores).min(256).to_string()]);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let begun = Instant::now();
+        let mut child = group::spawn(&mut command).context("cannot start a worker")?;
+        // A worker that has ended reports it by its status.
+        child.stdin.take().iter_mut().for_each(|stdin| drop(stdin.write_all(line.as_bytes())));
+        thread::spawn(move || {
+            let (status, said) = watch(child, |share| drop(sender.send(Message::Share(job, share))));
+            let ended = match status {
+                0 => Ended::Done,
+                again if again == i32::from(AGAIN) || again > 127 => Ended::Again,
+                _ => Ended::Never,
+            };
+            let seconds = begun.elapsed().as_secs_f64();
+            drop(sender.send(Message::Ended(job, Try { ended, status, seconds, said })));
+        });
+        Ok(())
+    }
+
+    fn end(&mut self, job: usize, Try { ended, status, seconds, said }: &Try) -> Result<()> {
+        let again = self.schedule.end(job, *ended);
+        let job = &self.jobs[job];
+        if *ended != Ended::Done {
+            let next = if again { "it is tried again" } else { "no further try" };
+            note([format!("{}: failed with status {status}; {next}: {}", job.title, said.trim_end())]);
+        }
+        let Some(log) = &self.log else { return Ok(()) };
+        let entry = json!({
+            "address": job.address,
+            "title": job.title,
+            "kind": job.work.kind(),
+            "estimated": job.seconds,
+            "seconds": seconds,
+            "status": status,
+        });
+        append(log, &format!("{entry}\n"))
+    }
+}
+
+/// Reads a worker's output until it ends. Returns its exit status, as a shell shows it, and its errors.
+fn watch(mut child: Child, mut report: impl FnMut(f64)) -> (i32, String) {
+    let errors = child.stderr.take();
+    let reader = thread::spawn(move || {
+        let mut text = Vec::new();
+        errors.map(|mut errors| errors.read_to_end(&mut text));
+        String::from_utf8_lossy(&text).into_owned()
+    });
+    for line in child.stdout.take().map(BufReader::new).into_iter().flat_map(BufReader::lines).map_while(Result::ok) {
+        let share = serde_json::from_str(&line).ok().and_then(|line: Value| line.get("share")?.as_f64());
+        share.into_iter().for_each(&mut report);
+    }
+    let status = group::wait(child).ok();
+    let said = reader.join().unwrap_or_default();
+    (status.map_or(i32::from(AGAIN), shell_status), said)
+}
+
+fn shell_status(status: std::process::ExitStatus) -> i32 {
+    #[cfg(unix)]
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        return 128 + signal;
+    }
+    status.code().unwrap_or(1)
+}
+
+fn append(path: &Path, line: &str) -> Result<()> {
+    let write = || OpenOptions::new().create(true).append(true).open(path)?.write_all(line.as_bytes());
+    write().with_context(|| format!("{}: cannot write the file", path.display()))
+}
