@@ -1,4 +1,5 @@
-//! Estimates of a job's time and memory, from the network's size alone. `docs/SCALE.md` compares them with measurements.
+//! Estimates of a job's time and memory, from the network's size alone. A record of `docs/SCALE.md` has the
+//! measurements that they come from.
 
 use actq::graph::Graph;
 use actq::methods::Method;
@@ -6,18 +7,19 @@ use actq::methods::Method;
 use crate::spec::Spec;
 
 /// Seconds of a job that does almost nothing: the start of the process, and reading.
-const LEAST_SECONDS: f64 = 0.1;
-/// Seconds of a weight: rounding and packing it, and with a recording its statistics.
-const ROUNDING: f64 = 1e-6;
-const STATISTICS: f64 = 2e-5;
+const LEAST_SECONDS: f64 = 0.02;
+/// Seconds of a weight: rounding and packing it; with a recording also its statistics; with two-sided error feedback.
+const ROUNDING: f64 = 3e-6;
+const STATISTICS: f64 = 7e-6;
+const FEEDBACK: f64 = 2.6e-5;
 /// Seconds of a weight in a step of distillation, on one core.
-const STEP: f64 = 4e-8;
+const STEP: f64 = 1.1e-7;
 /// Seconds of a weight for one observation, in the executor on a host.
-const OBSERVATION: f64 = 2e-9;
+const OBSERVATION: f64 = 2e-10;
 
 /// Bytes of a process, and bytes of a weight while it learns.
-const PROCESS: u64 = 64 << 20;
-const WEIGHT: u64 = 256;
+const PROCESS: u64 = 32 << 20;
+const WEIGHT: u64 = 160;
 /// Copies of the recording's bytes in memory.
 const RECORDINGS: u64 = 4;
 
@@ -28,7 +30,7 @@ pub(crate) fn making(graph: &Graph, method: &Method, spec: &Spec) -> f64 {
         Method::Rtn => ROUNDING,
         Method::Distill => {
             let steps = spec.steps.unwrap_or_else(|| actq::methods::distill::schedule::most_steps(graph));
-            STATISTICS + steps as f64 * STEP
+            if steps == 0 { FEEDBACK } else { STATISTICS + steps as f64 * STEP }
         }
         Method::Gptq | Method::Custom(_) => STATISTICS,
     };

@@ -9,23 +9,22 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
-
-from conftest import UR3
 
 ray = pytest.importorskip("ray", reason="ray is not installed")
 
-SPEC = f"""
-policies = [{json.dumps(str(UR3))}]
+SPEC = """
+policies = ["policy"]
 methods = ["rtn", "gptq", "distill"]
 bpw = [2.5, 3, 4]
-steps = 10
+steps = 200
 
 [evaluate]
 per_job = 2
 
 [drive]
-command = {json.dumps(sys.executable + " simulator.py")}
+command = PYTHON
 files = ["simulator.py"]
 episodes = 4
 first_seed = 100
@@ -35,7 +34,7 @@ per_job = 2
 rounds = 1
 episodes = 2
 first_seed = 10
-"""
+""".replace("PYTHON", json.dumps(sys.executable + " simulator.py"))
 
 SIMULATOR = """
 import os, random, struct, subprocess
@@ -45,14 +44,35 @@ for seed in range(first, first + count):
     draw = random.Random(seed)
     policy.stdin.write(b"R")
     for step in range(50):
-        values = [draw.uniform(-1, 1) for value in range(OBS)]
+        values = [draw.uniform(-1, 1) for value in range(INPUTS)]
         policy.stdin.write(b"S" + struct.pack("<%df" % len(values), *values))
         policy.stdin.flush()
-        policy.stdout.read(4 * ACT)
+        policy.stdout.read(4 * OUTPUTS)
 policy.stdin.close()
 policy.wait()
 print('{"episodes": %d, "success": 0.5}' % count)
 """
+
+
+SIZES = [12, 64, 64, 4]
+
+
+def write_policy(folder):
+    """Writes a policy of random weights, and its recordings."""
+    folder.mkdir()
+    draw = np.random.default_rng(1)
+    ops, tensors, data = [], {}, b""
+    for i, (cols, rows) in enumerate(zip(SIZES, SIZES[1:])):
+        weight = (draw.normal(size=(rows, cols)) / np.sqrt(cols)).astype("<f4").tobytes()
+        tensors[f"w{i}"] = {"dtype": "F32", "shape": [rows, cols], "data_offsets": [len(data), len(data) + len(weight)]}
+        data += weight
+        ops += [{"op": "linear", "w": f"w{i}"}, {"op": "tanh"}]
+    header = json.dumps(tensors).encode()
+    (folder / "policy.safetensors").write_bytes(len(header).to_bytes(8, "little") + header + data)
+    policy = {"name": "tiny", "obs_dim": SIZES[0], "act_dim": SIZES[-1], "ops": ops[:-1]}
+    (folder / "policy.json").write_text(json.dumps(policy))
+    for name in ("calib", "heldout"):
+        np.savez(folder / f"{name}.npz", obs=draw.normal(size=(8, 100, SIZES[0])).astype(np.float32))
 
 
 @pytest.fixture
@@ -60,8 +80,8 @@ def sweep(command, tmp_path, monkeypatch):
     """A folder with a spec, and the store `serial` of a run without Ray."""
     monkeypatch.setenv("RAY_AUTH_MODE", "disabled")
     monkeypatch.chdir(tmp_path)
-    sizes = json.loads((UR3 / "policy.json").read_text())
-    simulator = SIMULATOR.replace("OBS", str(sizes["obs_dim"])).replace("ACT", str(sizes["act_dim"]))
+    write_policy(tmp_path / "policy")
+    simulator = SIMULATOR.replace("INPUTS", str(SIZES[0])).replace("OUTPUTS", str(SIZES[-1]))
     Path("simulator.py").write_text(simulator)
     Path("spec.toml").write_text(SPEC)
     command("sweep", "spec.toml", "--store", "serial", "--threads", "1", "--quiet")
@@ -93,19 +113,20 @@ def tasks(node):
             parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
         except (OSError, ValueError, IndexError):
             continue
-        if words.startswith(b"ray::") and b"IDLE" not in words and parent in raylets:
+        # Other processes of a node have no job's title.
+        if words.startswith(b"ray::") and b", seed " in words and parent in raylets:
             yield int(folder.name)
 
 
 def kill_tasks(nodes, count, running):
-    """Kills `count` random workers, a second apart, while the sweep runs; returns how many."""
-    killed, draw = 0, random.Random(1)
+    """Kills `count` random workers, each after two results more; returns how many."""
+    killed, wanted, draw = 0, results("store") + 2, random.Random(1)
     while killed < count and running.poll() is None:
-        found = [pid for node in nodes for pid in tasks(node)]
+        found = [pid for node in nodes for pid in tasks(node)] if results("store") >= wanted else []
         if found:
             os.kill(draw.choice(found), signal.SIGKILL)
-            killed += 1
-        time.sleep(1)
+            killed, wanted = killed + 1, results("store") + 2
+        time.sleep(0.05)
     return killed
 
 

@@ -8,6 +8,7 @@ a URL that fsspec knows. Jobs that have a result do not run again, so the same c
 from __future__ import annotations
 
 import argparse
+import heapq
 import json
 import os
 import subprocess
@@ -85,19 +86,24 @@ class Sweep:
         there = names(options.store)
         missing = [job for job in plan if job["address"] + ".json" not in there]
         self.open = {job["address"]: job for job in missing}
-        self.waiting = {job["address"]: {dep for dep in job["deps"] if dep in self.open} for job in missing}
+        self.waiting = {job["address"]: sum(dep in self.open for dep in job["deps"]) for job in missing}
+        self.dependents: dict[str, list[str]] = {address: [] for address in self.open}
+        for job in missing:
+            for dep in self.open.keys() & set(job["deps"]):
+                self.dependents[dep].append(job["address"])
+        # Ready jobs, those with the longest estimate first.
+        self.ready = [(-job["seconds"], job["address"]) for job in missing if not self.waiting[job["address"]]]
+        heapq.heapify(self.ready)
         self.tries = dict.fromkeys(self.open, 0)
         self.running: dict[Any, tuple[Job, float]] = {}
         self.failed: list[str] = []
         self.count = len(plan)
         self.task = ray.remote(max_retries=0)(run_job)
 
-    def start(self) -> None:
-        """Start ready jobs, those with the longest estimate first, while Ray's queue is short."""
-        most = 2 * int(ray.cluster_resources().get("CPU", 1)) + 2
-        ready = [self.open[address] for address, deps in self.waiting.items() if not deps]
-        for job in sorted(ready, key=lambda job: -job["seconds"])[: max(0, most - len(self.running))]:
-            del self.waiting[job["address"]]
+    def start(self, most: int) -> None:
+        """Start ready jobs, until `most` are in Ray's queue."""
+        while self.ready and len(self.running) < most:
+            job = self.open[heapq.heappop(self.ready)[1]]
             task = self.task.options(num_cpus=job["cpus"], memory=job["memory_mib"] << 20, name=job["title"])
             self.running[task.remote(job, self.options.store, self.options.actq)] = (job, time.time())
 
@@ -115,11 +121,13 @@ class Sweep:
         self.log(job, status, seconds, begun)
         if status == 0:
             del self.open[address]
-            for deps in self.waiting.values():
-                deps.discard(address)
+            for dependent in self.dependents[address]:
+                self.waiting[dependent] -= 1
+                if self.waiting[dependent] == 0:
+                    heapq.heappush(self.ready, (-self.open[dependent]["seconds"], dependent))
         elif (status == AGAIN or status > 127) and self.tries[address] < self.options.tries:
             print(f"{job['title']}: status {status}, it is tried again: {errors.strip()}", file=sys.stderr)
-            self.waiting[address] = set()
+            heapq.heappush(self.ready, (-job["seconds"], address))
         else:
             print(f"{job['title']}: failed with status {status}: {errors.strip()}", file=sys.stderr)
             self.failed.append(address)
@@ -133,17 +141,18 @@ class Sweep:
 
     def run(self) -> bool:
         """Run all jobs that can run; return whether all have a result."""
-        shown = 0.0
-        self.start()
-        while self.running:
+        shown, most = 0.0, 0
+        while self.running or self.ready:
+            if time.monotonic() - shown >= 10:
+                shown = time.monotonic()
+                # Nodes come and go. The queue is short, so that long jobs that become ready are not last.
+                most = 2 * int(ray.cluster_resources().get("CPU", 1)) + 2
+                done = self.count - len(self.open)
+                print(f"progress: {done} of {self.count} jobs, {len(self.running)} running", file=sys.stderr)
+            self.start(most)
             ended, _ = ray.wait(list(self.running), num_returns=1, timeout=10)
             for task in ended:
                 self.end(task)
-            self.start()
-            if time.monotonic() - shown >= 10 or not self.running:
-                shown = time.monotonic()
-                done = self.count - len(self.open)
-                print(f"progress: {done} of {self.count} jobs, {len(self.running)} running", file=sys.stderr)
         return not self.open
 
 
