@@ -146,7 +146,8 @@ class Sweep:
             if time.monotonic() - shown >= 10:
                 shown = time.monotonic()
                 # Nodes come and go. The queue is short, so that long jobs that become ready are not last.
-                most = 2 * int(ray.cluster_resources().get("CPU", 1)) + 2
+                cpus = ray.cluster_resources().get("CPU", 1)  # type: ignore[no-untyped-call]
+                most = 2 * int(cpus) + 2
                 done = self.count - len(self.open)
                 print(f"progress: {done} of {self.count} jobs, {len(self.running)} running", file=sys.stderr)
             self.start(most)
