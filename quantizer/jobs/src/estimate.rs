@@ -2,7 +2,8 @@
 //! measurements that they come from.
 
 use actq::graph::Graph;
-use actq::methods::Method;
+use actq::methods::distill::schedule::most_steps;
+use actq::methods::{Effort, Method};
 
 use crate::spec::Spec;
 
@@ -29,7 +30,7 @@ pub(crate) fn making(graph: &Graph, method: &Method, spec: &Spec) -> f64 {
     let work = match method {
         Method::Rtn => ROUNDING,
         Method::Distill => {
-            let steps = spec.steps.unwrap_or_else(|| actq::methods::distill::schedule::most_steps(graph));
+            let steps = spec.steps.unwrap_or_else(|| most_steps(graph, Effort::Default));
             if steps == 0 { FEEDBACK } else { STATISTICS + steps as f64 * STEP }
         }
         Method::Gptq | Method::Custom(_) => STATISTICS,

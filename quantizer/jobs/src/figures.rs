@@ -15,6 +15,8 @@ pub struct Made {
     pub image: String,
     /// Its bytes.
     pub bytes: usize,
+    /// Predicted cycles of a step on a Cortex-M4 with FPU.
+    pub cycles: u64,
     /// True bits per weight, everything counted.
     pub bpw: f64,
     /// Steps of distillation that were taken.

@@ -1,6 +1,7 @@
 //! The results of a plan as one.
 
 use actq::measure::eval::ErrorReport;
+use actq::measure::time::CLOCK;
 use actq::pipeline::sweep::{Curve, Point, Sweep, knee};
 use serde::{Deserialize, Serialize};
 
@@ -145,7 +146,8 @@ impl MergedPolicy {
         }
         let matrices = self.images.iter().find_map(|image| Some(image.made.as_ref()?.image.matrices.clone()));
         let knee = knee(&curves);
-        Sweep { policy: self.policy.clone(), matrices: matrices.unwrap_or_default(), budgets, curves, knee }
+        let (policy, matrices) = (self.policy.clone(), matrices.unwrap_or_default());
+        Sweep { policy, matrices, budgets, clock_hz: CLOCK, curves, knee }
     }
 
     /// Returns the name of an image's curve: its method, and the seed and round if they differ.
@@ -173,6 +175,7 @@ impl MergedImage {
             bytes: image.bytes,
             worst_dimension: 0,
         };
-        Some(Point { budget: self.budget, report, rows: image.rows.clone() })
+        let milliseconds = 1e3 * image.cycles as f64 / CLOCK;
+        Some(Point { budget: self.budget, report, milliseconds, rows: image.rows.clone() })
     }
 }

@@ -1,19 +1,20 @@
 //! The tables and the plots of `actq merge`.
 
-use actq::pipeline::sweep::line;
+use actq::measure::time::CLOCK;
+use actq::pipeline::sweep::frontier;
 use actq_jobs::merged::{Figures, Merged, MergedImage, MergedPolicy};
 
-use super::plot::{Mark, Plot, Series, Vertical, stacked};
-use super::table;
+use super::plot::{Plot, Series, Vertical, stacked};
+use super::sweep::{plot, x_labels};
+use super::{table, time};
 
 /// Columns of the table that are always present.
-const HEADER: [&str; 5] = ["policy", "image", "budget", "bytes", "bits"];
+const HEADER: [&str; 7] = ["policy", "image", "limit", "bytes", "ms", "NMSE", "bits"];
 
 /// Formats a row for each image, and the knee of each policy. A star marks images of the frontiers.
 pub fn report(merged: &Merged) -> String {
     let is_driven = figures(merged).any(|figures| figures.driven.is_some());
     let mut header = HEADER.to_vec();
-    header.push("NMSE");
     if is_driven {
         header.extend(["episodes", "success", "95% interval"]);
     }
@@ -31,12 +32,12 @@ pub fn report(merged: &Merged) -> String {
     for policy in &merged.policies {
         if let Some(knee) = policy.sweep().knee {
             text += &format!(
-                "knee of {}: {} at {:.3} bits per weight, NMSE {:.2e}\n",
-                policy.policy, knee.method, knee.bpw, knee.nmse
+                "knee of {}: {} at {} bytes and {:.3} ms, NMSE {:.2e}\n",
+                policy.policy, knee.method, knee.bytes, knee.milliseconds, knee.nmse
             );
         }
     }
-    text
+    text + &format!("ms: predicted time of a step, {}\n", time::conditions(CLOCK))
 }
 
 fn figures(merged: &Merged) -> impl Iterator<Item = &Figures> {
@@ -46,11 +47,12 @@ fn figures(merged: &Merged) -> impl Iterator<Item = &Figures> {
 /// Returns the cells of an image from its bytes on.
 fn cells(policy: &MergedPolicy, i: usize, image: &MergedImage, is_driven: bool) -> Vec<String> {
     let star = |frontier: &[usize]| if frontier.contains(&i) { "*" } else { " " };
-    let Some(made) = &image.made else { return vec!["-".to_owned(); if is_driven { 6 } else { 3 }] };
+    let Some(made) = &image.made else { return vec!["-".to_owned(); if is_driven { 7 } else { 4 }] };
     let mut cells = vec![
         made.image.bytes.to_string(),
-        format!("{:.3}", made.image.bpw),
+        format!("{:.3}", milliseconds(made)),
         format!("{:.3e}{}", made.nmse, star(&policy.frontier)),
+        format!("{:.3}", made.image.bpw),
     ];
     if is_driven {
         let or_dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
@@ -61,58 +63,41 @@ fn cells(policy: &MergedPolicy, i: usize, image: &MergedImage, is_driven: bool) 
     cells
 }
 
-/// Draws the error over true bits per weight for each policy, with the frontier; and the success, if there is one.
-pub fn svg(merged: &Merged) -> String {
-    let success = merged.policies.iter().filter(|policy| !policy.success_frontier.is_empty()).map(success_plot);
-    stacked(&merged.policies.iter().map(error_plot).chain(success).collect::<Vec<_>>())
+fn milliseconds(made: &Figures) -> f64 {
+    1e3 * made.image.cycles as f64 / CLOCK
 }
 
-const BITS: &str = "bits per weight, with scales and padding";
-
-fn error_plot(policy: &MergedPolicy) -> Plot {
-    let sweep = policy.sweep();
-    let mut series: Vec<Series> =
-        sweep.curves.iter().map(|curve| Series { name: curve.method.clone(), points: line(curve) }).collect();
-    series.push(frontier(policy, &policy.frontier, |figures| Some(figures.nmse.max(1e-14))));
-    Plot {
-        title: format!("{}: action error over bits per weight", policy.policy),
-        x_label: BITS.to_owned(),
-        y_label: "NMSE of the actions, held-out observations".to_owned(),
-        vertical: Vertical::Decades,
-        series,
-        mark: sweep.knee.as_ref().map(|knee| Mark {
-            at: (knee.bpw, knee.nmse),
-            label: format!("knee: {:.2} bits, NMSE {:.2e}", knee.bpw, knee.nmse),
-        }),
-    }
+/// Draws the error of each policy over bytes and over predicted milliseconds; and the success, if there is one.
+pub fn svg(merged: &Merged) -> String {
+    let errors = merged.policies.iter().map(|policy| plot(&policy.sweep()));
+    let success = merged.policies.iter().filter(|policy| !policy.success_frontier.is_empty()).map(success_plot);
+    stacked(&errors.chain(success).collect::<Vec<_>>())
 }
 
 fn success_plot(policy: &MergedPolicy) -> Plot {
-    let percent = |figures: &Figures| Some(100.0 * figures.success()?);
     let mut series: Vec<Series> = Vec::new();
     for image in &policy.images {
         let name = policy.curve(image);
-        let Some(point) = image.made.as_ref().and_then(|made| Some((made.image.bpw, percent(made)?))) else { continue };
+        let Some(made) = &image.made else { continue };
+        let Some(percent) = made.success().map(|share| 100.0 * share) else { continue };
+        let points = [(made.image.bytes as f64 / 1e3, percent), (milliseconds(made), percent)];
         match series.iter_mut().find(|series| series.name == name) {
-            Some(series) => series.points.push(point),
-            None => series.push(Series { name, points: vec![point] }),
+            Some(series) => series.points.iter_mut().zip(points).for_each(|(panel, point)| panel.push(point)),
+            None => series.push(Series { name, points: points.map(|point| vec![point]).into_iter().collect() }),
         }
     }
-    series.push(frontier(policy, &policy.success_frontier, percent));
+    let failures = |panel: usize| {
+        let points = series.iter().flat_map(|series| &series.points[panel]);
+        let least = frontier(points.map(|(x, percent)| (*x, 100.0 - percent)).collect());
+        least.into_iter().map(|(x, failed)| (x, 100.0 - failed)).collect()
+    };
     Plot {
-        title: format!("{}: success over bits per weight", policy.policy),
-        x_label: BITS.to_owned(),
+        title: format!("{}: success over flash and over time", policy.policy),
+        x_labels: x_labels(CLOCK),
         y_label: "successful episodes, percent".to_owned(),
         vertical: Vertical::Percent,
+        frontier: [0, 1].map(failures).into_iter().collect(),
         series,
         mark: None,
     }
-}
-
-fn frontier(policy: &MergedPolicy, images: &[usize], height: impl Fn(&Figures) -> Option<f64>) -> Series {
-    let of = |i: &usize| {
-        let made = policy.images[*i].made.as_ref()?;
-        Some((made.image.bpw, height(made)?))
-    };
-    Series { name: "frontier".to_owned(), points: images.iter().filter_map(of).collect() }
 }

@@ -17,7 +17,16 @@ fn line(curve: &Curve, x: fn(&Point) -> f64) -> Vec<(f64, f64)> {
     line
 }
 
-fn plot(sweep: &Sweep) -> Plot {
+/// Returns the names of both axes, for predictions at a clock.
+pub(super) fn x_labels(clock_hz: f64) -> Vec<String> {
+    vec![
+        "flash of the image, kB (1000 bytes)".to_owned(),
+        format!("predicted ms of a step, Cortex-M4 at {} MHz", clock_hz / 1e6),
+    ]
+}
+
+/// Draws a policy's errors.
+pub(super) fn plot(sweep: &Sweep) -> Plot {
     let series = |curve: &Curve| Series {
         name: curve.method.clone(),
         points: AXES.map(|x| line(curve, x)).into_iter().collect(),
@@ -25,10 +34,7 @@ fn plot(sweep: &Sweep) -> Plot {
     let all = |x| frontier(sweep.curves.iter().flat_map(|curve| line(curve, x)).collect());
     Plot {
         title: format!("{}: action error over flash and over time", sweep.policy),
-        x_labels: vec![
-            "flash of the image, kB (1000 bytes)".to_owned(),
-            format!("predicted ms of a step, Cortex-M4 at {} MHz", sweep.clock_hz / 1e6),
-        ],
+        x_labels: x_labels(sweep.clock_hz),
         y_label: "NMSE of the actions, held-out observations".to_owned(),
         vertical: Vertical::Decades,
         series: sweep.curves.iter().map(series).collect(),

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use actq::budget::Budget;
 use actq::data::{Dataset, Learned, Recordings, Sizes};
 use actq::error::Result;
+use actq::measure::time::{CLOCK, StepTime};
 use actq::methods::{Method, Options, Outcome as MatrixOutcome};
 use actq::pipeline::{QuantizedPolicy, Quantizer};
 use actq::policy::Policy;
@@ -88,6 +89,7 @@ fn made(
     let result = Made {
         image: of_bytes(&quantized.image),
         bytes: image.bytes(),
+        cycles: StepTime::new(&image, CLOCK).cycles,
         bpw: actq::measure::size::bits_per_weight(&image),
         steps: quantized.steps(),
         frames,
