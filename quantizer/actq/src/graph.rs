@@ -11,6 +11,7 @@ mod denoising;
 mod evaluate;
 pub mod hoist;
 pub mod lowering;
+mod matrix;
 mod nodes;
 pub mod operation;
 pub mod ops;
@@ -21,8 +22,9 @@ mod weights;
 
 pub use denoising::Denoising;
 pub use evaluate::Evaluator;
+pub use matrix::{Factors, Matrix};
 pub use nodes::{Graph, Node};
 pub use ops::NodeKind;
 pub use run::{Network, Pass};
 pub use values::{ValueId, WeightMatrix};
-pub use weights::{Derivatives, Factors, State, Vectors, Weights, start_state, zero_state};
+pub use weights::{Derivatives, State, Vectors, Weights, start_state, zero_state};

@@ -4,9 +4,9 @@ use ndarray::{Array2, ArrayView1, ArrayView2};
 
 use super::arrays::round_rows;
 use super::lowering::{BufferId, Lowering};
+use super::matrix::{Factors, Matrix};
 use super::syntax::Syntax;
 use super::values::{ValueId, WeightMatrix};
-use super::weights::{Factors, Matrix};
 use crate::error::{Result, ensure};
 use crate::gemm::Panels;
 
