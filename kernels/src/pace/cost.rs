@@ -105,7 +105,7 @@ pub fn of_op(op: &Op<'_>) -> Cost {
 
 /// Computes the cost of rows of one width in a linear operation, with the preparation of their input; `in_order` is
 /// `false` if they have output steps.
-#[cfg(any(test, feature = "writer"))]
+#[cfg(feature = "writer")]
 pub fn of_rows(shape: BlockShape, in_order: bool) -> Cost {
     total(|add| {
         prepare(shape, add);
@@ -114,7 +114,7 @@ pub fn of_rows(shape: BlockShape, in_order: bool) -> Cost {
 }
 
 /// Computes the cost of the values of a function.
-#[cfg(any(test, feature = "writer"))]
+#[cfg(feature = "writer")]
 pub fn of_values(function: crate::math::Function, values: usize) -> Cost {
     total(|add| add(Feature::function(function), values))
 }

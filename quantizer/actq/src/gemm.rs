@@ -53,15 +53,16 @@ impl<T: Element> Panels<T> {
         Self { depth, cols, values }
     }
 
-    /// Packs the transpose of `w`.
+    /// Packs the transpose of `w`, on this thread alone: commands read policies before they start their threads.
     pub(crate) fn transposed(w: ArrayView2<'_, T>) -> Self {
         let (cols, depth) = w.dim();
         let mut panels = Self { depth, cols, values: vec![[T::default(); COLS]; depth * cols.div_ceil(COLS)] };
-        panels.refill(w);
+        let values = panels.values.chunks_exact_mut(depth.max(1));
+        w.axis_chunks_iter(Axis(0), COLS).zip(values).for_each(|(strip, values)| transpose(strip, values));
         panels
     }
 
-    /// Packs the transpose of another matrix of the same shape.
+    /// Packs the transpose of another matrix of the same shape, on all threads.
     pub(crate) fn refill(&mut self, w: ArrayView2<'_, T>) {
         let strips: Vec<_> = w.axis_chunks_iter(Axis(0), COLS).collect();
         let panels = self.values.par_chunks_exact_mut(self.depth.max(1));

@@ -108,7 +108,7 @@ fn interrupted_sweeps_resume_to_the_same_store() -> Result<()> {
     ensure!(merged == table, "{merged}");
     let read = |name: &str| -> Result<Vec<u8>> { Ok(fs::read(sweep.folder()?.join(name))?) };
     ensure!(read("merged.json")? == read("whole.json")?);
-    ensure!(String::from_utf8(read("merged.svg")?)?.contains(">frontier<"));
+    ensure!(String::from_utf8(read("merged.svg")?)?.contains(">frontier of all methods<"));
 
     // Killed several times, each after one result more, by signals that it can and cannot catch.
     let store = sweep.folder()?.join("killed");

@@ -20,7 +20,7 @@ use crate::methods::quantized::{Quantized, dequantized};
 use crate::random::Random;
 
 /// Least steps of which a part is spent on choices.
-const LEAST_STEPS: usize = 800;
+const LEAST_STEPS: usize = 3000;
 /// Divisor of the steps, and of the time, for one choice.
 const STEPS: usize = 8;
 const TIME: u32 = 12;

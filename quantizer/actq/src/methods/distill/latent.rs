@@ -34,6 +34,17 @@ pub(super) struct Latent {
     adam_scales: Adam,
 }
 
+/// Strides of codes of different widths. A wider row has more steps for the same weights, so equal strides change it
+/// less.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Strides {
+    /// Equal, in steps.
+    Equal,
+    /// In proportion to the root of the number of levels: between equal in steps and equal in weights
+    /// (docs/records/2026-11-25-frontier.md).
+    ByWidth,
+}
+
 /// Rounding of a latent code at a width: lowest and highest code, and the level of code `c`, `step * c + base`.
 #[derive(Clone, Copy)]
 struct Grid {
@@ -65,12 +76,13 @@ impl Grid {
         self.round(code) * self.step + self.base
     }
 
-    /// Returns the rate of codes in units of that of 2 bits. A wider row has more steps for the same weights, so equal
-    /// strides would change it less; strides in proportion to the steps would undo the gain of finer ones. The root is
-    /// between (docs/QUANTIZER.md has figures).
-    fn stride(self) -> f32 {
+    /// Returns the rate of codes in units of that of 2 bits.
+    fn stride(self, strides: Strides) -> f32 {
         const OF_2_BITS: f32 = 3.0;
-        ((self.high - self.low) / OF_2_BITS).sqrt()
+        match strides {
+            Strides::Equal => 1.0,
+            Strides::ByWidth => ((self.high - self.low) / OF_2_BITS).sqrt(),
+        }
     }
 
     /// Turns the derivatives by weights of one scale into those by their codes; returns that by the logarithm of the
@@ -151,7 +163,7 @@ impl Latent {
     }
 
     /// Moves codes and scales along `grads`, the derivative by the weights, which becomes that by the codes.
-    pub(super) fn learn(&mut self, grads: &mut [f32], by_code: Stride, by_scale: Stride) {
+    pub(super) fn learn(&mut self, grads: &mut [f32], (by_code, strides): (Stride, Strides), by_scale: Stride) {
         let cols = self.cols;
         let steps: Vec<_> = (0..self.rows).map(|r| self.grid(r).map(|grid| (grid, self.scales(r)))).collect();
         let Adam { first, second } = &mut self.adam_codes;
@@ -166,7 +178,7 @@ impl Latent {
                     || {
                         let groups = grads.chunks_mut(*group).zip(codes.chunks(*group)).zip(scales);
                         let by_scale = groups.map(|((grads, codes), scale)| grid.through(grads, codes, *scale)).sum();
-                        step(codes, grads, first, second, by_code.times(grid.stride()));
+                        step(codes, grads, first, second, by_code.times(grid.stride(strides)));
                         by_scale
                     },
                 )
