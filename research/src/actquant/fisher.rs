@@ -28,7 +28,7 @@ pub struct Sampling {
 }
 
 /// Returns the mean over frames (or batches) of `(dL/dw)^2` for every weight, as `[rows, cols]` per matrix: the
-/// action-mixed Fisher information of ActQuant (arXiv 2605.24011). `L` is [`ActionLoss`]; at alpha = 1 it is
+/// action-mixed Fisher information of ActQuant (arXiv 2605.24011). `L` is `ActionLoss`; at alpha = 1 it is
 /// `sum over d of |y_d - t_d|`, without a likelihood.
 ///
 /// Recorded actions are mostly the policy's own, where L1 has its kink: [`Signs`].

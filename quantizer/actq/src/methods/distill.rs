@@ -45,7 +45,7 @@ use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
 use feedback::feedback;
 use objective::Frames;
-use removal::removals;
+use removal::{Removals, removals};
 use schedule::{Bounds, most_steps};
 use size::Size;
 use train::{Learned, Task, distill};
@@ -63,8 +63,8 @@ pub struct RowStatistics {
     /// Importance of every matrix's columns; of its rows.
     inputs: Vec<Vec<f64>>,
     outputs: Vec<Vec<f64>>,
-    /// Error of removing each row of a matrix; `None` if its rows cannot be removed.
-    removals: Vec<Option<Vec<f64>>>,
+    /// Errors of removing the rows of a matrix; `None` if its rows cannot be removed.
+    removals: Vec<Option<Removals>>,
     /// Moments of every matrix's input, and `G`.
     moments: Vec<(Moments, DMatrix<f64>)>,
     /// Frames or windows that `G` was taken over.
@@ -153,7 +153,12 @@ pub fn quantize(
         .enumerate()
         .map(|(m, matrix)| {
             let energy = energies(matrix, &inputs[m], &outputs[m]);
-            let removal = removals[m].clone().unwrap_or_else(|| energy.clone());
+            // Without learning the gain is small, and small networks get more uneven errors.
+            let removal = match &removals[m] {
+                Some(removals) if options.learns() => removals.together.clone(),
+                Some(removals) => removals.alone.clone(),
+                None => energy.clone(),
+            };
             Rows { energy, removal, forced: forced[m] }
         })
         .collect();

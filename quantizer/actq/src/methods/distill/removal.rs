@@ -23,9 +23,18 @@ use crate::simd::wide;
 /// Rows that a thread takes together.
 const ROWS: usize = 64;
 
-/// Returns the error of removing each element of `dimension`. `moments` has the moments of every matrix's input, `g` the
+/// Errors of removing each element of a hidden vector.
+#[derive(Clone, Debug)]
+pub struct Removals {
+    /// Each alone, with compensation half as far (in logarithms) as the recording allows.
+    pub alone: Vec<f64>,
+    /// Together with those that matter less; at least as much as alone.
+    pub together: Vec<f64>,
+}
+
+/// Returns the errors of removing each element of `dimension`. `moments` has the moments of every matrix's input, `g` the
 /// importance of every matrix's rows.
-pub fn removals(graph: &Graph, dimension: &Dimension, moments: &[&Moments], g: &[Vec<f64>]) -> Vec<f64> {
+pub fn removals(graph: &Graph, dimension: &Dimension, moments: &[&Moments], g: &[Vec<f64>]) -> Removals {
     let n = graph.matrices[dimension.maker].rows;
     let mut effect = Array2::zeros((n, n));
     for &consumer in &dimension.consumers {
@@ -34,10 +43,14 @@ pub fn removals(graph: &Graph, dimension: &Dimension, moments: &[&Moments], g: &
         let weighed = Array2::from_shape_fn(w.raw_dim(), |(r, c)| g[consumer][r] * w[[r, c]]);
         add_product_parallel(weighed.t(), &Panels::of(w.view()), effect.view_mut());
     }
-    let Some(&first) = dimension.consumers.first() else { return vec![0.0; n] };
+    let Some(&first) = dimension.consumers.first() else {
+        return Removals { alone: vec![0.0; n], together: vec![0.0; n] };
+    };
     let centred = moments[first].centred();
-    let alone = importance(&centred, Side::Input).into_iter().enumerate().map(|(j, h)| h * effect[[j, j]]);
-    ranked(&centred, &effect).into_iter().zip(alone).map(|(joint, alone)| joint.max(alone)).collect()
+    let importance = importance(&centred, Side::Input);
+    let alone: Vec<f64> = importance.into_iter().enumerate().map(|(j, h)| h * effect[[j, j]]).collect();
+    let together = ranked(&centred, &effect).into_iter().zip(&alone).map(|(joint, alone)| joint.max(*alone)).collect();
+    Removals { alone, together }
 }
 
 /// Ranks the elements of a vector with the covariance `second` by their effect, a quadratic form; returns the errors of
