@@ -6,7 +6,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use actq_bench::command::{actq, binary, failed, run, succeeded};
 use actq_bench::{golden::Random, root};
@@ -119,9 +119,7 @@ fn interrupted_sweeps_resume_to_the_same_store() -> Result<()> {
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()?;
-        let begun = Instant::now();
         while results(&store) <= before && child.try_wait()?.is_none() {
-            ensure!(begun.elapsed() < Duration::from_secs(120), "no result");
             sleep(Duration::from_millis(2));
         }
         Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).stderr(Stdio::null()).status()?;

@@ -33,7 +33,7 @@ fn the_search_keeps_the_error_with_fewest_bits() -> Result<()> {
 
 /// Returns the steps of every try, from the table of tries.
 fn steps_tried(printed: &str) -> Vec<&str> {
-    let cells = printed.lines().skip(1).map(|line| line.split_whitespace().nth(1));
+    let cells = printed.lines().skip(1).map(|line| line.split_whitespace().last());
     cells.map_while(|steps| steps).collect()
 }
 
