@@ -1,5 +1,7 @@
 //! Quantized weight matrices and networks.
 
+use std::collections::BTreeMap;
+
 use actq_kernels::image::block_bytes;
 use actq_kernels::layout::{BlockShape, Lanes, Width};
 use half::bf16;
@@ -153,6 +155,15 @@ impl Outcome {
     /// Returns the width of every trained row, removed ones included.
     pub fn trained_widths(&self) -> &[Option<Width>] {
         self.allocation.as_ref().map_or(&self.quantized.widths, |allocation| &allocation.widths)
+    }
+
+    /// Returns the number of trained rows of each width; 0: no bits.
+    pub fn trained_rows(&self) -> BTreeMap<u32, usize> {
+        let mut rows = BTreeMap::new();
+        for width in self.trained_widths() {
+            *rows.entry(width.map_or(0, Width::bits)).or_default() += 1;
+        }
+        rows
     }
 
     /// Returns the number of weights of the trained matrix.

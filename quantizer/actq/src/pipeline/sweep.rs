@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use actq_kernels::Width;
 use serde::Serialize;
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
@@ -138,15 +137,7 @@ fn point(heldout: &Dataset, budget: f64, clock_hz: f64, quantized: &QuantizedPol
     let image = buffer.image(Path::new("image in memory"))?;
     let report = eval::evaluate(image, heldout)?;
     let milliseconds = StepTime::new(&image, clock_hz).milliseconds;
-    Ok(Point { budget, report, milliseconds, rows: quantized.outcomes.iter().map(rows).collect() })
-}
-
-fn rows(outcome: &Outcome) -> BTreeMap<u32, usize> {
-    let mut rows = BTreeMap::new();
-    for width in outcome.trained_widths() {
-        *rows.entry(width.map_or(0, Width::bits)).or_default() += 1;
-    }
-    rows
+    Ok(Point { budget, report, milliseconds, rows: quantized.outcomes.iter().map(Outcome::trained_rows).collect() })
 }
 
 /// Finds the knee of the best method.

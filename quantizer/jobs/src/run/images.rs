@@ -9,7 +9,6 @@ use actq::measure::time::{CLOCK, StepTime};
 use actq::methods::{Method, Options, Outcome as MatrixOutcome};
 use actq::pipeline::{QuantizedPolicy, Quantizer};
 use actq::policy::Policy;
-use actq_kernels::Width;
 
 use super::inputs::{Kept, path_of};
 use crate::digest::of_bytes;
@@ -94,7 +93,7 @@ fn made(
         steps: quantized.steps(),
         frames,
         matrices: policy.graph.matrices.iter().map(|matrix| matrix.name.clone()).collect(),
-        rows: quantized.outcomes.iter().map(rows).collect(),
+        rows: quantized.outcomes.iter().map(MatrixOutcome::trained_rows).collect(),
         scores,
     };
     let kept = Kept { path: store.image(&job.address), bytes: quantized.image };
@@ -120,13 +119,4 @@ fn image(
     let quantized = quantizer.quantize(&options, watch)?;
     let scores = quantizer.method().scores();
     Ok((quantized, scores))
-}
-
-/// Returns the number of trained rows of each width.
-fn rows(outcome: &MatrixOutcome) -> BTreeMap<u32, usize> {
-    let mut rows = BTreeMap::new();
-    for width in outcome.trained_widths() {
-        *rows.entry(width.map_or(0, Width::bits)).or_default() += 1;
-    }
-    rows
 }

@@ -51,7 +51,7 @@ impl Lesson {
     }
 }
 
-/// What a part of a batch learns from.
+/// The lesson of a part of a batch.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Source {
     /// A new lesson, drawn with this seed.

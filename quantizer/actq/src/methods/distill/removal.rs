@@ -58,7 +58,7 @@ pub fn removals(graph: &Graph, dimension: &Dimension, moments: &[&Moments], g: &
 fn ranked(second: &DMatrix<f64>, effect: &Array2<f64>) -> Vec<f64> {
     let n = second.nrows();
     let damping = (DAMPING_INPUT * second.trace() / n.max(1) as f64).max(1e-30);
-    // What the elements so far leave unexplained.
+    // The covariance that the elements so far do not explain.
     let mut rest = Array2::from_shape_fn((n, n), |(i, j)| second[(i, j)] + if i == j { damping } else { 0.0 });
     let mut explained = Array1::zeros(n);
     let mut through = Array2::zeros((n, n));
