@@ -1,5 +1,6 @@
 //! The thread pool.
 
+use std::hint::black_box;
 use std::{env, thread};
 
 use anyhow::{Context as _, Result};
@@ -11,7 +12,16 @@ pub(crate) fn start_threads(threads: u16) -> Result<()> {
         0 => slurm().map_or(0, |_| allocation()),
         given => given.into(),
     };
+    keep_freed_memory();
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")
+}
+
+/// Frees one large block. From then on, glibc keeps freed memory up to twice this size for the next allocation; before,
+/// it returns a learner's arrays to the kernel in every step and gets them back page by page. Other allocators ignore
+/// it. (mallopt(3), M_MMAP_THRESHOLD and M_TRIM_THRESHOLD)
+fn keep_freed_memory() {
+    const BLOCK: usize = 31 << 20;
+    drop(black_box(Vec::<u8>::with_capacity(BLOCK)));
 }
 
 /// Returns the number of cores that this process may use: of its affinity and its control group, and at most those that

@@ -9,11 +9,11 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch, f32x16, f64x8};
-use ndarray::{Array2, ArrayView2, ArrayViewMut2, Axis};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2, Axis, s};
 use rayon::prelude::*;
 
 /// Columns of a panel, and of a tile.
-const COLS: usize = 16;
+pub(crate) const COLS: usize = 16;
 /// Rows of a tile of f32: with two registers a row, 12 accumulators. A tile of f64 has half as many.
 const ROWS: usize = 6;
 /// Rows of `B` that a tile takes at one time: 16 KB of a panel.
@@ -62,11 +62,23 @@ impl<T: Element> Panels<T> {
         panels
     }
 
-    /// Packs the transpose of another matrix of the same shape, on all threads.
-    pub(crate) fn refill(&mut self, w: ArrayView2<'_, T>) {
-        let strips: Vec<_> = w.axis_chunks_iter(Axis(0), COLS).collect();
-        let panels = self.values.par_chunks_exact_mut(self.depth.max(1));
-        strips.into_par_iter().zip(panels).for_each(|(strip, values)| transpose(strip, values));
+    /// Returns the parts that 16 rows of a transposed matrix at a time make.
+    pub(crate) fn strips(&mut self) -> impl Iterator<Item = Strip<'_, T>> {
+        self.values.chunks_exact_mut(self.depth.max(1)).map(|values| Strip { values })
+    }
+}
+
+/// A panel of a transposed matrix.
+#[derive(Debug)]
+pub(crate) struct Strip<'a, T = f32> {
+    /// `[k][column]`
+    values: &'a mut [[T; COLS]],
+}
+
+impl<T: Element> Strip<'_, T> {
+    /// Packs the transpose of other rows.
+    pub(crate) fn refill(&mut self, rows: ArrayView2<'_, T>) {
+        transpose(rows, self.values);
     }
 }
 
@@ -103,10 +115,26 @@ pub(crate) fn add_product<T: Element>(a: ArrayView2<'_, T>, b: &Panels<T>, c: Ar
 }
 
 /// Computes `C += A B`, on all threads.
-pub(crate) fn add_product_parallel<T: Element>(a: ArrayView2<'_, T>, b: &Panels<T>, mut c: ArrayViewMut2<'_, T>) {
+pub(crate) fn add_product_parallel<T: Element>(a: ArrayView2<'_, T>, b: &Panels<T>, c: ArrayViewMut2<'_, T>) {
+    add_products_parallel(vec![(vec![(a, b)], c)]);
+}
+
+/// A matrix `C` to which products are added, `A B` of each pair in turn.
+pub(crate) type Sum<'a, T> = (Vec<(ArrayView2<'a, T>, &'a Panels<T>)>, ArrayViewMut2<'a, T>);
+
+/// Computes several sums, on all threads.
+pub(crate) fn add_products_parallel<T: Element>(mut sums: Vec<Sum<'_, T>>) {
     let level = Level::new();
-    let strips: Vec<_> = a.axis_chunks_iter(Axis(0), STRIP).zip(c.axis_chunks_iter_mut(Axis(0), STRIP)).collect();
-    strips.into_par_iter().for_each(|(a, c)| add_at(level, a, b, c));
+    let mut strips = Vec::new();
+    for (products, c) in &mut sums {
+        let of_strip = c.axis_chunks_iter_mut(Axis(0), STRIP).enumerate();
+        strips.extend(of_strip.map(|(i, c)| (&*products, i * STRIP, c)));
+    }
+    strips.into_par_iter().for_each(|(products, from, mut c)| {
+        for (a, b) in products {
+            add_at(level, a.slice(s![from..from + c.nrows(), ..]), b, c.view_mut());
+        }
+    });
 }
 
 fn add_at<T: Element>(level: Level, a: ArrayView2<'_, T>, b: &Panels<T>, c: ArrayViewMut2<'_, T>) {

@@ -22,7 +22,7 @@ mod weights;
 
 pub use denoising::Denoising;
 pub use evaluate::Evaluator;
-pub use matrix::{Factors, Matrix};
+pub use matrix::{Factors, Matrix, MatrixStrip, STRIP};
 pub use nodes::{Graph, Node};
 pub use ops::NodeKind;
 pub use run::{Network, Pass};

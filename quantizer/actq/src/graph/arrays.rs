@@ -50,7 +50,11 @@ fn round(row: &mut [f32], top: f32) {
 /// Adds the rows of `dy` to `sum`.
 pub fn sum_rows(dy: &Array2<f32>, sum: &mut [f32]) {
     for row in dy.rows() {
-        sum.iter_mut().zip(row).for_each(|(s, d)| *s += d);
+        let row = contiguous(&row);
+        wide(
+            #[inline(always)]
+            || sum.iter_mut().zip(row).for_each(|(s, d)| *s += d),
+        );
     }
 }
 

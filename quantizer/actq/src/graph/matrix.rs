@@ -1,9 +1,12 @@
 //! A matrix of weights for products, and the derivative by it.
 
-use ndarray::{Array2, ArrayViewMut2};
+use ndarray::{Array2, ArrayViewMut2, Axis};
 
 use super::values::WeightMatrix;
-use crate::gemm::{Panels, add_product};
+use crate::gemm::{COLS, Panels, Strip, add_product};
+
+/// Rows of a [`MatrixStrip`].
+pub const STRIP: usize = COLS;
 
 /// A matrix of weights, `[row, column]`, with its panels for products.
 #[derive(Clone, Debug)]
@@ -26,7 +29,13 @@ impl Matrix {
     /// Changes the weights, row by row.
     pub fn set(&mut self, change: impl FnOnce(&mut [f32])) {
         change(self.values.as_slice_mut().unwrap_or_default());
-        self.panels.refill(self.values.view());
+        self.strips().for_each(|mut strip| strip.set(|_| ()));
+    }
+
+    /// Returns the weights of [`STRIP`] rows at a time, to change them on several threads.
+    pub fn strips(&mut self) -> impl Iterator<Item = MatrixStrip<'_>> {
+        let rows = self.values.axis_chunks_iter_mut(Axis(0), STRIP);
+        rows.zip(self.panels.strips()).map(|(values, panel)| MatrixStrip { values, panel })
     }
 
     /// Adds `x W'` to `y`.
@@ -37,6 +46,21 @@ impl Matrix {
     /// Packs the weights for products `dy W`.
     pub(super) fn back(&self) -> Panels {
         Panels::of(self.values.view())
+    }
+}
+
+/// Some rows of a matrix.
+#[derive(Debug)]
+pub struct MatrixStrip<'a> {
+    values: ArrayViewMut2<'a, f32>,
+    panel: Strip<'a>,
+}
+
+impl MatrixStrip<'_> {
+    /// Changes the weights, row by row.
+    pub fn set(&mut self, change: impl FnOnce(&mut [f32])) {
+        change(self.values.as_slice_mut().unwrap_or_default());
+        self.panel.refill(self.values.view());
     }
 }
 

@@ -6,8 +6,7 @@ use rayon::prelude::*;
 use super::matrix::{Factors, Matrix};
 use super::nodes::Graph;
 use super::operation::NodeState;
-use super::values::WeightMatrix;
-use crate::gemm::{Panels, add_product_parallel};
+use crate::gemm::{Panels, Sum, add_products_parallel};
 
 /// Vectors of every node, as [`super::operation::Operation::vectors`], or derivatives by them.
 pub type Vectors = Vec<Vec<Vec<f32>>>;
@@ -56,16 +55,15 @@ pub struct Derivatives {
 impl Derivatives {
     /// Returns the sums of several derivatives: those by the matrices `[row, column]`, and those by the vectors.
     pub fn sum(graph: &Graph, all: Vec<Self>) -> (Vec<Array2<f32>>, Vectors) {
-        let of_matrix = |(m, matrix): (usize, &WeightMatrix)| {
-            let factors: Vec<&Factors> = all.iter().flat_map(|d| &d.products).filter(|f| f.matrix == m).collect();
-            let panels: Vec<Panels> = factors.par_iter().map(|factors| Panels::of(factors.x.view())).collect();
-            let mut sum = Array2::zeros((matrix.rows, matrix.cols));
-            for (factors, panels) in factors.iter().zip(&panels) {
-                add_product_parallel(factors.dy.t(), panels, sum.view_mut());
-            }
-            sum
-        };
-        let matrices = graph.matrices.iter().enumerate().map(of_matrix).collect();
+        let factors: Vec<&Factors> = all.iter().flat_map(|d| &d.products).collect();
+        let panels: Vec<Panels> = factors.par_iter().map(|factors| Panels::of(factors.x.view())).collect();
+        let mut matrices: Vec<Array2<f32>> =
+            graph.matrices.iter().map(|matrix| Array2::zeros((matrix.rows, matrix.cols))).collect();
+        let mut sums: Vec<Sum<'_, f32>> = matrices.iter_mut().map(|sum| (Vec::new(), sum.view_mut())).collect();
+        for (factors, panels) in factors.into_iter().zip(&panels) {
+            sums[factors.matrix].0.push((factors.dy.t(), panels));
+        }
+        add_products_parallel(sums);
         let vectors = all.into_iter().map(|d| d.vectors).reduce(|mut sum, vectors| {
             let pairs = sum.iter_mut().flatten().zip(vectors.iter().flatten());
             pairs.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to += from));

@@ -3,8 +3,8 @@
 /// Adam's moments of a range of parameters.
 #[derive(Clone, Debug)]
 pub(super) struct Adam {
-    pub(super) first: Vec<f32>,
-    pub(super) second: Vec<f32>,
+    first: Vec<f32>,
+    second: Vec<f32>,
 }
 
 const FIRST: f32 = 0.9;
@@ -44,14 +44,28 @@ impl Adam {
 
     /// Moves `parameters` along `grads`.
     pub(super) fn step(&mut self, parameters: &mut [f32], grads: &[f32], stride: Stride) {
-        step(parameters, grads, &mut self.first, &mut self.second, stride);
+        step(parameters, grads, Moments { first: &mut self.first, second: &mut self.second }, stride);
+    }
+
+    /// Returns the moments of `len` parameters at a time.
+    pub(super) fn chunks(&mut self, len: usize) -> impl Iterator<Item = Moments<'_>> {
+        let pairs = self.first.chunks_mut(len).zip(self.second.chunks_mut(len));
+        pairs.map(|(first, second)| Moments { first, second })
     }
 }
 
-/// Does [`Adam::step`] on a part of the parameters and their moments.
+/// Moments of a part of the parameters.
+#[derive(Debug)]
+pub(super) struct Moments<'a> {
+    pub(super) first: &'a mut [f32],
+    pub(super) second: &'a mut [f32],
+}
+
+/// Does [`Adam::step`] on a part of the parameters.
 #[inline(always)]
-pub(super) fn step(parameters: &mut [f32], grads: &[f32], first: &mut [f32], second: &mut [f32], stride: Stride) {
-    for ((p, g), (m, v)) in parameters.iter_mut().zip(grads).zip(first.iter_mut().zip(second)) {
+pub(super) fn step(parameters: &mut [f32], grads: &[f32], moments: Moments<'_>, stride: Stride) {
+    let moments = moments.first.iter_mut().zip(moments.second);
+    for ((p, g), (m, v)) in parameters.iter_mut().zip(grads).zip(moments) {
         *m = FIRST * *m + (1.0 - FIRST) * g;
         *v = SECOND * *v + (1.0 - SECOND) * g * g;
         *p -= stride.rate * *m * stride.first / ((*v * stride.second).sqrt() + TINY);

@@ -4,18 +4,15 @@ use actq_kernels::Width;
 use actq_kernels::math;
 use actq_kernels::round::ROUND;
 use half::bf16;
-use rayon::prelude::*;
 
-use super::adam::{Adam, Stride, step};
-use crate::graph::WeightMatrix;
+use super::adam::{Adam, Moments, Stride, step};
+use crate::graph::{Matrix, STRIP, WeightMatrix};
 use crate::methods::quantized::Quantized;
 use crate::methods::scale::Scales;
 use crate::simd::wide;
 
 /// Least scale, so that learning can change it.
 const SMALLEST: f32 = 1e-12;
-/// Rows that a thread takes together.
-const ROWS: usize = 16;
 /// Partial sums of a derivative by a scale.
 const LANES: usize = 16;
 
@@ -118,87 +115,131 @@ impl Latent {
             adam_codes: Adam::new(rows * cols),
             adam_scales: Adam::new(rows),
         };
-        for r in 0..rows {
-            let Some(grid) = latent.grid(r) else { continue };
-            for at in r * cols..(r + 1) * cols {
-                let scale = latent.scale(r) * f32::from(latent.fitted.group_scale(r, at % cols));
-                latent.codes[at] = (matrix.data[at] / scale - grid.base) / grid.step;
+        let of_rows = latent.codes.chunks_mut(cols).zip(matrix.data.chunks(cols)).zip(widths).enumerate();
+        for (r, ((codes, weights), width)) in of_rows {
+            let Some(grid) = width.map(Grid::of) else { continue };
+            let (group, scales) = scales(&latent.fitted, 0.0, r, cols);
+            let of_groups = codes.chunks_mut(group).zip(weights.chunks(group)).zip(scales);
+            for ((codes, weights), scale) in of_groups {
+                codes.iter_mut().zip(weights).for_each(|(code, w)| *code = (w / scale - grid.base) / grid.step);
             }
         }
         latent
     }
 
-    fn grid(&self, row: usize) -> Option<Grid> {
-        self.widths[row].map(Grid::of)
+    /// Returns the rows in strips that learn independently of each other, as [`Matrix::strips`] does.
+    pub(super) fn strips(&mut self) -> impl Iterator<Item = Strip<'_>> {
+        let Self { cols, widths, codes, log_scales, fitted, adam_codes, adam_scales, .. } = self;
+        let (cols, fitted) = (*cols, &*fitted);
+        let of_codes = codes.chunks_mut(STRIP * cols.max(1)).zip(adam_codes.chunks(STRIP * cols.max(1)));
+        let of_scales = log_scales.chunks_mut(STRIP).zip(adam_scales.chunks(STRIP));
+        let strips = widths.chunks(STRIP).zip(of_codes).zip(of_scales).enumerate();
+        strips.map(move |(i, ((widths, (codes, of_codes)), (log_scales, of_scales)))| Strip {
+            from: i * STRIP,
+            cols,
+            widths,
+            fitted,
+            codes,
+            log_scales,
+            of_codes,
+            of_scales,
+        })
     }
 
-    fn scale(&self, row: usize) -> f32 {
-        bf16::from_f32(self.fitted.rows[row].to_f32().max(SMALLEST) * math::exp(self.log_scales[row])).to_f32()
+    /// Writes the weights of the rounded codes.
+    pub(super) fn write(&mut self, matrix: &mut Matrix) {
+        self.strips().zip(matrix.strips()).for_each(|(strip, mut to)| to.set(|weights| strip.weights(weights)));
     }
 
-    /// Returns the columns of a group, and the factors of a row's levels, group by group.
-    fn scales(&self, row: usize) -> (usize, Vec<f32>) {
-        let group = if self.fitted.group == 0 { self.cols } else { self.fitted.group };
-        let scale = self.scale(row);
-        let of = move |start| scale * f32::from(self.fitted.group_scale(row, start));
-        (group, (0..self.cols).step_by(group).map(of).collect())
+    /// Returns the rounded codes.
+    pub(super) fn quantized(&self) -> Quantized {
+        let Self { rows, cols, .. } = *self;
+        let grids: Vec<Option<Grid>> = self.widths.iter().map(|width| width.map(Grid::of)).collect();
+        let code = |(at, code): (usize, &f32)| grids[at / cols].map_or(0, |grid| grid.round(*code) as i32 as u8);
+        Quantized {
+            rows,
+            cols,
+            group: self.fitted.group,
+            widths: self.widths.clone(),
+            scales: (0..rows).map(|r| scale(&self.fitted, self.log_scales[r], r)).collect(),
+            group_scales: self.fitted.groups.clone(),
+            codes: self.codes.iter().enumerate().map(code).collect(),
+        }
     }
+}
 
+/// Rows of a matrix during learning.
+pub(super) struct Strip<'a> {
+    /// First row.
+    from: usize,
+    cols: usize,
+    widths: &'a [Option<Width>],
+    fitted: &'a Scales,
+    codes: &'a mut [f32],
+    log_scales: &'a mut [f32],
+    of_codes: Moments<'a>,
+    of_scales: Moments<'a>,
+}
+
+/// How far a step goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gait {
+    pub(super) codes: Stride,
+    pub(super) scales: Stride,
+    /// Codes of rows wider than 2 bits.
+    pub(super) strides: Strides,
+}
+
+impl Strip<'_> {
     /// Writes the weights of the rounded codes, row by row.
     pub(super) fn weights(&self, out: &mut [f32]) {
-        let rows = out.par_chunks_mut(self.cols).zip(self.codes.par_chunks(self.cols)).enumerate();
-        rows.with_min_len(ROWS).for_each(|(r, (out, codes))| {
-            let Some(grid) = self.grid(r) else {
+        let rows = out.chunks_mut(self.cols).zip(self.codes.chunks(self.cols)).zip(self.widths).enumerate();
+        for (r, ((out, codes), width)) in rows {
+            let Some(grid) = width.map(Grid::of) else {
                 out.fill(0.0);
-                return;
+                continue;
             };
-            let (group, scales) = self.scales(r);
+            let (group, scales) = scales(self.fitted, self.log_scales[r], self.from + r, self.cols);
             for ((out, codes), scale) in out.chunks_mut(group).zip(codes.chunks(group)).zip(scales) {
                 wide(
                     #[inline(always)]
                     || out.iter_mut().zip(codes).for_each(|(w, c)| *w = grid.level(*c) * scale),
                 );
             }
-        });
+        }
     }
 
     /// Moves codes and scales along `grads`, the derivative by the weights, which becomes that by the codes.
-    pub(super) fn learn(&mut self, grads: &mut [f32], (by_code, strides): (Stride, Strides), by_scale: Stride) {
-        let cols = self.cols;
-        let steps: Vec<_> = (0..self.rows).map(|r| self.grid(r).map(|grid| (grid, self.scales(r)))).collect();
-        let Adam { first, second } = &mut self.adam_codes;
-        let moments = first.par_chunks_mut(cols).zip(second.par_chunks_mut(cols));
-        let rows = self.codes.par_chunks_mut(cols).zip(grads.par_chunks_mut(cols)).zip(moments).zip(&steps);
-        let by_scales: Vec<f32> = rows
-            .with_min_len(ROWS)
-            .map(|(((codes, grads), (first, second)), of_row)| {
-                let Some((grid, (group, scales))) = of_row else { return 0.0 };
-                wide(
-                    #[inline(always)]
-                    || {
-                        let groups = grads.chunks_mut(*group).zip(codes.chunks(*group)).zip(scales);
-                        let by_scale = groups.map(|((grads, codes), scale)| grid.through(grads, codes, *scale)).sum();
-                        step(codes, grads, first, second, by_code.times(grid.stride(strides)));
-                        by_scale
-                    },
-                )
-            })
-            .collect();
-        self.adam_scales.step(&mut self.log_scales, &by_scales, by_scale);
-    }
-
-    /// Returns the rounded codes.
-    pub(super) fn quantized(&self) -> Quantized {
-        let Self { rows, cols, .. } = *self;
-        let code = |(at, code): (usize, &f32)| self.grid(at / cols).map_or(0, |grid| grid.round(*code) as i32 as u8);
-        Quantized {
-            rows,
-            cols,
-            group: self.fitted.group,
-            widths: self.widths.clone(),
-            scales: (0..rows).map(|r| bf16::from_f32(self.scale(r))).collect(),
-            group_scales: self.fitted.groups.clone(),
-            codes: self.codes.iter().enumerate().map(code).collect(),
+    pub(super) fn learn(&mut self, grads: &mut [f32], gait: Gait) {
+        let Self { from, cols, widths, fitted, .. } = *self;
+        let moments = self.of_codes.first.chunks_mut(cols).zip(self.of_codes.second.chunks_mut(cols));
+        let rows = self.codes.chunks_mut(cols).zip(grads.chunks_mut(cols)).zip(moments).zip(widths).enumerate();
+        for (r, (((codes, grads), (first, second)), width)) in rows {
+            let Some(grid) = width.map(Grid::of) else { continue };
+            let (group, scales) = scales(fitted, self.log_scales[r], from + r, cols);
+            let by_scale: f32 = wide(
+                #[inline(always)]
+                || {
+                    let groups = grads.chunks_mut(group).zip(codes.chunks(group)).zip(&scales);
+                    let by_scale = groups.map(|((grads, codes), scale)| grid.through(grads, codes, *scale)).sum();
+                    step(codes, grads, Moments { first, second }, gait.codes.times(grid.stride(gait.strides)));
+                    by_scale
+                },
+            );
+            let Moments { first, second } = &mut self.of_scales;
+            let of_row = Moments { first: &mut first[r..=r], second: &mut second[r..=r] };
+            step(&mut self.log_scales[r..=r], &[by_scale], of_row, gait.scales);
         }
     }
+}
+
+fn scale(fitted: &Scales, log_scale: f32, row: usize) -> bf16 {
+    bf16::from_f32(fitted.rows[row].to_f32().max(SMALLEST) * math::exp(log_scale))
+}
+
+/// Returns the columns of a group, and the factors of a row's levels, group by group.
+fn scales(fitted: &Scales, log_scale: f32, row: usize, cols: usize) -> (usize, Vec<f32>) {
+    let group = if fitted.group == 0 { cols } else { fitted.group };
+    let scale = scale(fitted, log_scale, row).to_f32();
+    (group, (0..cols).step_by(group).map(|start| scale * f32::from(fitted.group_scale(row, start))).collect())
 }

@@ -6,17 +6,17 @@
 //! the widened inputs.
 
 use actq_kernels::Width;
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
 use super::adam::{Adam, Stride};
-use super::latent::{Latent, Strides};
+use super::latent::{Gait, Latent, Strides};
 use super::lessons::{Lesson, Lessons, Source};
 use super::objective::{Frames, Objective};
 use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
-use crate::graph::{Derivatives, Graph, Network, Vectors, Weights};
+use crate::graph::{Derivatives, Graph, Matrix, Network, STRIP, Vectors, Weights};
 use crate::methods::options::Effort;
 use crate::methods::quantized::Quantized;
 use crate::random::Random;
@@ -93,6 +93,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
     let mut latents: Vec<Latent> =
         matrices.map(|((matrix, widths), importance)| Latent::new(matrix, widths, task.group, importance)).collect();
     let mut adam_vectors: Vec<Adam> = weights.vectors.iter().flatten().map(|v| Adam::new(v.len())).collect();
+    latents.iter_mut().zip(&mut weights.matrices).for_each(|(latent, matrix)| latent.write(matrix));
     let mut lessons = Lessons::new(task.seed);
     let (size, shards, rates) = match windows.recurrent() {
         true => (WINDOWS, WINDOW_SHARDS, OF_WINDOWS),
@@ -105,9 +106,6 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
     let objective = Objective::new(&windows.output_variance, task.frames);
     let mut schedule = Schedule::new(task.bounds, most_steps(task.graph, Effort::Default));
     while let Some(rate) = schedule.rate() {
-        for (latent, weights) in latents.iter().zip(&mut weights.matrices) {
-            weights.set(|values| latent.weights(values));
-        }
         let learned: Vec<(f32, Derivatives, Option<Lesson>)> = lessons
             .next(shards)
             .into_par_iter()
@@ -136,10 +134,9 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
         }
         schedule.took(loss);
         let stride = |of: f32| Stride::new(of * rate, schedule.steps() as i32);
-        let (by_code, by_scale, by_vector) = (stride(rates.latent), stride(rates.scale), stride(rates.vector));
-        for (latent, grads) in latents.iter_mut().zip(&mut of_matrices) {
-            latent.learn(grads.as_slice_mut().unwrap_or_default(), (by_code, rates.strides), by_scale);
-        }
+        let gait = Gait { codes: stride(rates.latent), scales: stride(rates.scale), strides: rates.strides };
+        let by_vector = stride(rates.vector);
+        learn(&mut latents, &mut of_matrices, gait, &mut weights.matrices);
         let vectors = weights.vectors.iter_mut().flatten().zip(of_vectors.iter().flatten());
         for (adam, (vector, grads)) in adam_vectors.iter_mut().zip(vectors) {
             adam.step(vector, grads, by_vector);
@@ -149,6 +146,18 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
     let mut graph = task.graph.clone();
     weights.store_vectors(&mut graph);
     Learned { quantized: latents.iter().map(Latent::quantized).collect(), graph, steps: schedule.steps() }
+}
+
+/// Moves all codes and scales along `grads`, the derivatives by the weights, and writes the new weights.
+fn learn(latents: &mut [Latent], grads: &mut [Array2<f32>], gait: Gait, weights: &mut [Matrix]) {
+    let mut strips = Vec::new();
+    for ((latent, grads), matrix) in latents.iter_mut().zip(grads).zip(weights) {
+        strips.extend(latent.strips().zip(grads.axis_chunks_iter_mut(Axis(0), STRIP)).zip(matrix.strips()));
+    }
+    strips.into_par_iter().for_each(|((mut strip, mut grads), mut weights)| {
+        strip.learn(grads.as_slice_mut().unwrap_or_default(), gait);
+        weights.set(|values| strip.weights(values));
+    });
 }
 
 /// Computes the loss on a lesson, and its derivatives by the (rounded) weights.
