@@ -17,6 +17,7 @@ pub mod schedule;
 pub mod size;
 pub mod train;
 
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use actq_kernels::Width;
@@ -45,7 +46,7 @@ use compact::{Compacted, add_to_bias, compact};
 use dimension::{Dimension, dimensions};
 use feedback::feedback;
 use objective::Frames;
-use removal::{Removals, removals};
+use removal::Effect;
 use schedule::{Bounds, most_steps};
 use size::Size;
 use train::{Learned, Task, distill};
@@ -63,8 +64,10 @@ pub struct RowStatistics {
     /// Importance of every matrix's columns; of its rows.
     inputs: Vec<Vec<f64>>,
     outputs: Vec<Vec<f64>>,
-    /// Errors of removing the rows of a matrix; `None` if its rows cannot be removed.
-    removals: Vec<Option<Removals>>,
+    /// Errors of removing the rows of a matrix, one by one and, when needed, together; `None` if its rows cannot be
+    /// removed.
+    alone: Vec<Option<Vec<f64>>>,
+    together: OnceLock<Vec<Option<Vec<f64>>>>,
     /// Moments of every matrix's input, and `G`.
     moments: Vec<(Moments, DMatrix<f64>)>,
     /// Frames or windows that `G` was taken over.
@@ -94,16 +97,15 @@ impl RowStatistics {
         let outputs: Vec<Vec<f64>> = output_moments.iter().map(|g| importance(g, Side::Output)).collect();
         let balanced = balance(graph, &mut moments, &outputs)?;
         let of_inputs: Vec<&Moments> = moments.iter().collect();
-        let dimensions = dimensions(&balanced);
-        let removals = (0..balanced.matrices.len())
-            .map(|m| Dimension::made_by(&dimensions, m).map(|d| removals(&balanced, d, &of_inputs, &outputs)))
-            .collect();
+        let alone =
+            effects(&balanced, &of_inputs, &outputs).map(|effect| effect.map(|effect| effect.alone())).collect();
         Ok(Self {
             mixed: mixed_units(&balanced, &moments),
             windows: windows.with(balanced),
             inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
             outputs,
-            removals,
+            alone,
+            together: OnceLock::new(),
             moments: moments.into_iter().zip(output_moments).collect(),
             outputs_of,
         })
@@ -112,6 +114,15 @@ impl RowStatistics {
     /// Returns the network with balanced columns.
     pub fn graph(&self) -> &Graph {
         &self.windows.graph
+    }
+
+    /// Returns the errors of removing each row of every matrix. Without learning those of single rows count: the gain of
+    /// the others is small then, and small networks get more uneven errors.
+    fn removals(&self, learns: bool) -> &[Option<Vec<f64>>] {
+        let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
+        let together =
+            || effects(self.graph(), &of_inputs, &self.outputs).map(|effect| Some(effect?.together())).collect();
+        if learns { self.together.get_or_init(together) } else { &self.alone }
     }
 
     /// Returns the most steps of distillation with these options.
@@ -127,6 +138,12 @@ impl RowStatistics {
     }
 }
 
+/// Returns the effect of every matrix's output; `None` if its rows cannot be removed.
+fn effects(graph: &Graph, moments: &[&Moments], g: &[Vec<f64>]) -> impl Iterator<Item = Option<Effect>> {
+    let dimensions = dimensions(graph);
+    (0..graph.matrices.len()).map(move |m| Some(Effect::of(graph, Dimension::made_by(&dimensions, m)?, moments, g)))
+}
+
 /// Quantizes a network. The result lacks hidden elements without bits; its biases and norms have been learned.
 pub fn quantize(
     statistics: &RowStatistics,
@@ -134,7 +151,7 @@ pub fn quantize(
     options: &Options,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<QuantizedNetwork> {
-    let RowStatistics { windows, inputs, outputs, removals, moments, .. } = statistics;
+    let RowStatistics { windows, inputs, outputs, moments, .. } = statistics;
     let graph = &windows.graph;
     for (name, _) in &options.forced {
         let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -147,18 +164,14 @@ pub fn quantize(
     let allowed = rate.bytes(graph.weights());
     let forced = forced(graph, rate, options);
     let dimensions = dimensions(graph);
+    let removals = statistics.removals(options.learns());
     let rows: Vec<Rows> = graph
         .matrices
         .iter()
         .enumerate()
         .map(|(m, matrix)| {
             let energy = energies(matrix, &inputs[m], &outputs[m]);
-            // Without learning the gain is small, and small networks get more uneven errors.
-            let removal = match &removals[m] {
-                Some(removals) if options.learns() => removals.together.clone(),
-                Some(removals) => removals.alone.clone(),
-                None => energy.clone(),
-            };
+            let removal = removals[m].clone().unwrap_or_else(|| energy.clone());
             Rows { energy, removal, forced: forced[m] }
         })
         .collect();

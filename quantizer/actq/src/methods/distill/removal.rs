@@ -23,34 +23,47 @@ use crate::simd::wide;
 /// Rows that a thread takes together.
 const ROWS: usize = 64;
 
-/// Errors of removing each element of a hidden vector.
-#[derive(Clone, Debug)]
-pub struct Removals {
-    /// Each alone, with compensation half as far (in logarithms) as the recording allows.
-    pub alone: Vec<f64>,
-    /// Together with those that matter less; at least as much as alone.
-    pub together: Vec<f64>,
+/// A hidden vector and what the network makes of it.
+#[derive(Debug)]
+pub struct Effect {
+    /// Covariance of its elements.
+    centred: DMatrix<f64>,
+    /// The network's error as a quadratic form of the vector's.
+    effect: Array2<f64>,
 }
 
-/// Returns the errors of removing each element of `dimension`. `moments` has the moments of every matrix's input, `g` the
-/// importance of every matrix's rows.
-pub fn removals(graph: &Graph, dimension: &Dimension, moments: &[&Moments], g: &[Vec<f64>]) -> Removals {
-    let n = graph.matrices[dimension.maker].rows;
-    let mut effect = Array2::zeros((n, n));
-    for &consumer in &dimension.consumers {
-        let matrix = &graph.matrices[consumer];
-        let w = Array2::from_shape_fn((matrix.rows, n), |(r, c)| f64::from(matrix.data[r * n + c]));
-        let weighed = Array2::from_shape_fn(w.raw_dim(), |(r, c)| g[consumer][r] * w[[r, c]]);
-        add_product_parallel(weighed.t(), &Panels::of(w.view()), effect.view_mut());
+impl Effect {
+    /// Measures the vector `dimension`. `moments` has the moments of every matrix's input, `g` the importance of every
+    /// matrix's rows.
+    pub fn of(graph: &Graph, dimension: &Dimension, moments: &[&Moments], g: &[Vec<f64>]) -> Self {
+        let n = graph.matrices[dimension.maker].rows;
+        let mut effect = Array2::zeros((n, n));
+        for &consumer in &dimension.consumers {
+            let matrix = &graph.matrices[consumer];
+            let w = Array2::from_shape_fn((matrix.rows, n), |(r, c)| f64::from(matrix.data[r * n + c]));
+            let weighed = Array2::from_shape_fn(w.raw_dim(), |(r, c)| g[consumer][r] * w[[r, c]]);
+            add_product_parallel(weighed.t(), &Panels::of(w.view()), effect.view_mut());
+        }
+        let centred = match dimension.consumers.first() {
+            Some(&first) => moments[first].centred(),
+            None => DMatrix::zeros(n, n),
+        };
+        Self { centred, effect }
     }
-    let Some(&first) = dimension.consumers.first() else {
-        return Removals { alone: vec![0.0; n], together: vec![0.0; n] };
-    };
-    let centred = moments[first].centred();
-    let importance = importance(&centred, Side::Input);
-    let alone: Vec<f64> = importance.into_iter().enumerate().map(|(j, h)| h * effect[[j, j]]).collect();
-    let together = ranked(&centred, &effect).into_iter().zip(&alone).map(|(joint, alone)| joint.max(*alone)).collect();
-    Removals { alone, together }
+
+    /// Returns the errors of removing each element alone, with compensation half as far (in logarithms) as the
+    /// recording allows.
+    pub fn alone(&self) -> Vec<f64> {
+        let importance = importance(&self.centred, Side::Input);
+        importance.into_iter().enumerate().map(|(j, h)| h * self.effect[[j, j]]).collect()
+    }
+
+    /// Returns the errors of removing each element together with those that matter less, at least as much as alone.
+    /// The work grows with the cube of the vector's length.
+    pub fn together(&self) -> Vec<f64> {
+        let joint = ranked(&self.centred, &self.effect);
+        joint.into_iter().zip(self.alone()).map(|(joint, alone)| joint.max(alone)).collect()
+    }
 }
 
 /// Ranks the elements of a vector with the covariance `second` by their effect, a quadratic form; returns the errors of
