@@ -24,6 +24,15 @@ impl Moments {
         let mean = nalgebra::DVectorView::from_slice(&self.mean, self.mean.len());
         &self.second - mean * mean.transpose()
     }
+
+    /// Returns the moments of some elements.
+    pub fn of(&self, elements: &[usize]) -> Self {
+        Self {
+            second: self.second.select_rows(elements).select_columns(elements),
+            mean: elements.iter().map(|&element| self.mean[element]).collect(),
+            count: self.count,
+        }
+    }
 }
 
 /// Input vectors that are collected before they are multiplied together.

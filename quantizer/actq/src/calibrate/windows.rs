@@ -2,6 +2,7 @@
 //! at their start for a recurrent one.
 
 use ndarray::{Array2, Axis, s};
+use rayon::prelude::*;
 
 use super::widening::{MEMORY, Widening};
 use crate::data::Dataset;
@@ -12,6 +13,8 @@ use crate::random::Random;
 const WINDOW: usize = 64;
 /// Share of the windows that start from the zero state, wherever they are.
 const FROM_ZERO: f32 = 0.15;
+/// Episodes that a thread runs at one time.
+const EPISODES: usize = 8;
 /// One episode in this many is held out to measure choices.
 const HELD_OUT: usize = 4;
 
@@ -20,8 +23,26 @@ const HELD_OUT: usize = 4;
 pub struct Batch {
     /// `[frame, element]`: the first step of every window, then the second step of every window, and so on.
     pub frames: Array2<f32>,
-    /// State before the first step.
+    /// The f32 network's state before the first step.
     pub state: State,
+    /// Episode and step that each window of a recurrent network begins at; `None`: at the zero state.
+    pub starts: Vec<Option<(usize, usize)>>,
+}
+
+impl Batch {
+    /// Returns the state before the first step of another network, whose `states` are those of the episodes.
+    pub fn state_of(&self, graph: &Graph, states: &[State]) -> State {
+        let mut state = zero_state(graph, self.starts.len());
+        for (sample, start) in self.starts.iter().enumerate() {
+            let Some((episode, step)) = *start else { continue };
+            for (to, from) in state.iter_mut().flatten().zip(states[episode].iter().flatten()) {
+                if from.ncols() > 0 {
+                    to.row_mut(sample).assign(&from.row(step));
+                }
+            }
+        }
+        state
+    }
 }
 
 /// The f32 network and its recorded observations.
@@ -90,6 +111,11 @@ impl Windows {
         !self.states.is_empty()
     }
 
+    /// Returns the frames of all episodes.
+    pub fn frames(&self) -> usize {
+        self.episodes.iter().map(Array2::nrows).sum()
+    }
+
     fn row(&self, random: &mut Random) -> ndarray::ArrayView1<'_, f32> {
         let episode = &self.episodes[random.below(self.episodes.len())];
         episode.row(random.below(episode.nrows()))
@@ -112,7 +138,7 @@ impl Windows {
     /// Draws a batch of `size` windows, at the recorded observations or widened.
     pub fn batch(&self, size: usize, widening: Option<Widening>, random: &mut Random) -> Batch {
         let mut frames = Array2::zeros((size * self.window, self.graph.input_len()));
-        let mut state = zero_state(&self.graph, size);
+        let mut starts = vec![None; size];
         for sample in 0..size {
             let e = random.below(self.episodes.len());
             let start = random.below(self.episodes[e].nrows() + 1 - self.window);
@@ -124,15 +150,19 @@ impl Windows {
                 self.widen(widening, (0..self.window).map(|t| t * size + sample), &mut frames, random);
                 from_zero = random.share() < FROM_ZERO;
             }
-            if let (Some(states), false) = (self.states.get(e), from_zero) {
-                for (to, from) in state.iter_mut().flatten().zip(states.iter().flatten()) {
-                    if from.ncols() > 0 {
-                        to.row_mut(sample).assign(&from.row(start));
-                    }
-                }
-            }
+            starts[sample] = (self.recurrent() && !from_zero).then_some((e, start));
         }
-        Batch { frames, state }
+        let mut batch = Batch { frames, state: State::new(), starts };
+        batch.state = batch.state_of(&self.graph, &self.states);
+        batch
+    }
+
+    /// Runs a recurrent network over the episodes, from the f32 network's first states if `graph` has as many values;
+    /// returns its states before each step.
+    pub fn states_of(&self, network: &Network<'_>, weights: &Weights) -> Vec<State> {
+        let episodes: Vec<(&Array2<f32>, &State)> = self.episodes.iter().zip(&self.states).collect();
+        let of_some = |episodes: &[(&Array2<f32>, &State)]| states_of(network, weights, episodes);
+        episodes.par_chunks(EPISODES).flat_map_iter(of_some).collect()
     }
 
     /// Adds noise to the window in these rows of `frames`.
@@ -187,6 +217,34 @@ impl Windows {
         let mut state = batch.state.clone();
         Network::new(&self.graph).forward(&self.weights, batch.frames.clone(), &mut state).into_output()
     }
+}
+
+/// Runs a network over some episodes at one time; returns its states before each step.
+fn states_of(network: &Network<'_>, weights: &Weights, episodes: &[(&Array2<f32>, &State)]) -> Vec<State> {
+    let graph = network.graph;
+    let mut state = zero_state(graph, episodes.len());
+    for (i, (_, first)) in episodes.iter().enumerate() {
+        for (to, from) in state.iter_mut().flatten().zip(first.iter().flatten()) {
+            if from.ncols() == to.ncols() && from.ncols() > 0 {
+                to.row_mut(i).assign(&from.row(0));
+            }
+        }
+    }
+    let mut states: Vec<State> = episodes.iter().map(|(episode, _)| zero_state(graph, episode.nrows())).collect();
+    let longest = episodes.iter().map(|(episode, _)| episode.nrows()).max().unwrap_or(0);
+    for t in 0..longest {
+        for (i, kept) in states.iter_mut().enumerate() {
+            for (kept, now) in kept.iter_mut().flatten().zip(state.iter().flatten()) {
+                if t < kept.nrows() && now.ncols() > 0 {
+                    kept.row_mut(t).assign(&now.row(i));
+                }
+            }
+        }
+        let row = |i: usize| episodes[i].0.row(t.min(episodes[i].0.nrows() - 1));
+        let frames = Array2::from_shape_fn((episodes.len(), graph.input_len()), |(i, c)| row(i)[c]);
+        network.forward(weights, frames, &mut state);
+    }
+    states
 }
 
 /// Repeats the last observation until the episode has `steps` steps, so that a short episode, at whose end a robot may

@@ -38,6 +38,7 @@ pub use lstm::Lstm;
 pub use mul::Mul;
 pub use norm::{LayerNorm, RmsNorm};
 pub use normalize::{Balance, Normalize};
+pub use recurrent::unit_rows;
 pub use table::Table;
 
 use super::operation::Operation;

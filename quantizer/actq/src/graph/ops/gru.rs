@@ -3,7 +3,7 @@ use actq_kernels::math;
 use actq_kernels::ops::cells::gru_cell;
 use ndarray::Array2;
 
-use super::recurrent::{KEYS, Parts};
+use super::recurrent::{KEYS, Parts, keep};
 use crate::error::Result;
 use crate::graph::arrays::{contiguous, contiguous_mut, rows, rows_mut, step_rows, sum_rows};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
@@ -58,6 +58,12 @@ impl Operation for Gru {
     }
 
     learned! { input_bias, state_bias }
+
+    fn keep_units(&mut self, units: &[usize]) {
+        keep(&mut self.input_bias, self.hidden, units);
+        keep(&mut self.state_bias, self.hidden, units);
+        self.hidden = units.len();
+    }
 
     fn state_lens(&self) -> [usize; 2] {
         [self.hidden, 0]

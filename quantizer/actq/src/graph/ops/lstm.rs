@@ -3,7 +3,7 @@ use actq_kernels::math;
 use actq_kernels::ops::cells::lstm_cell;
 use ndarray::Array2;
 
-use super::recurrent::{KEYS, Parts};
+use super::recurrent::{KEYS, Parts, keep};
 use crate::error::Result;
 use crate::graph::arrays::{contiguous, contiguous_mut, rows, rows_mut, step_rows, sum_rows};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
@@ -62,6 +62,11 @@ impl Operation for Lstm {
     fn trained_values(&self) -> usize {
         // torch stores both biases.
         2 * self.bias.len()
+    }
+
+    fn keep_units(&mut self, units: &[usize]) {
+        keep(&mut self.bias, self.hidden, units);
+        self.hidden = units.len();
     }
 
     fn state_lens(&self) -> [usize; 2] {

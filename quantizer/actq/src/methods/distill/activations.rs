@@ -5,7 +5,7 @@ use actq_kernels::Width;
 use super::allocate::{Rows, allocate};
 use super::dimension::Widths;
 use super::size::Size;
-use super::train::loss;
+use super::train::losses;
 use crate::calibrate::allowance::Allowance;
 use crate::calibrate::windows::Windows;
 use crate::error::Result;
@@ -114,7 +114,7 @@ pub(super) fn choose_activations(
         let network = Network::rounded(graph, x_max);
         let samples = (SAMPLES / windows.window).max(8);
         let batches = (0..measured).map(|i| windows.batch(samples, None, &mut Random::new(seed + i as u64)));
-        batches.map(|batch| loss(&network, &weights, windows, batch)).sum()
+        losses(&network, &weights, windows, batches).sum()
     };
     let choices = 1 + quantized.len();
     let measured = allowance.map_or(MEASURED, |allowance| {

@@ -58,6 +58,14 @@ pub fn energies(matrix: &WeightMatrix, h: &[f64], g: &[f64]) -> Vec<f64> {
     rows.map(|(row, g)| g * row.iter().zip(h).map(|(w, h)| f64::from(*w).powi(2) * h).sum::<f64>()).collect()
 }
 
+/// Returns the predicted error of all rows.
+pub fn expected(rows: &[Rows], widths: &Widths) -> f64 {
+    let of_matrix = |(rows, widths): (&Rows, &Vec<Option<Width>>)| -> f64 {
+        widths.iter().enumerate().map(|(r, width)| rows.expected(r, *width)).sum()
+    };
+    rows.iter().zip(widths).map(of_matrix).sum()
+}
+
 /// Shares of time in the price, where both bytes and cycles are limited.
 const SHARES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
@@ -77,13 +85,7 @@ pub fn allocate(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
     };
     let shares = if limit.is_finite() { &SHARES[..] } else { &[1.0] };
     let tried = shares.iter().map(|share| of(*share)).collect::<Result<Vec<Widths>>>()?;
-    let error = |widths: &Widths| -> f64 {
-        let of_matrix = |(rows, widths): (&Rows, &Vec<Option<Width>>)| -> f64 {
-            widths.iter().enumerate().map(|(r, width)| rows.expected(r, *width)).sum()
-        };
-        rows.iter().zip(widths).map(of_matrix).sum()
-    };
-    let best = tried.into_iter().min_by(|a, b| error(a).total_cmp(&error(b)));
+    let best = tried.into_iter().min_by(|a, b| expected(rows, a).total_cmp(&expected(rows, b)));
     best.map_or_else(|| smallest(size, rows, limit), Ok)
 }
 

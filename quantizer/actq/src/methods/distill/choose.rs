@@ -9,7 +9,7 @@
 use nalgebra::DMatrix;
 
 use super::schedule::Bounds;
-use super::train::{Task, distill, loss};
+use super::train::{Task, distill, losses};
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{DAMPING_INPUT, drawn_moments};
 use crate::calibrate::widening::Widening;
@@ -117,7 +117,7 @@ fn errors(task: &Task<'_>, graph: &Graph, quantized: &[Quantized], windows: &Win
     [None, Some(Widening::WIDE)].map(|widening| {
         let mut random = Random::new(task.seed);
         let batches = (0..BATCHES).map(|_| windows.batch(size, widening, &mut random));
-        batches.map(|batch| f64::from(loss(&network, &weights, windows, batch))).sum::<f64>() / BATCHES as f64
+        losses(&network, &weights, windows, batches).map(f64::from).sum::<f64>() / BATCHES as f64
     })
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::dimension::{Dimension, Widths};
+use super::dimension::{Dimension, Widths, elementwise};
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::DAMPING_INPUT;
 use crate::graph::{Graph, NodeKind, WeightMatrix};
@@ -46,21 +46,15 @@ pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments
             linear.bias = order.iter().map(|&r| linear.bias[r]).collect();
         }
         // The functions after it take the new length.
-        let mut value = dimension.node;
-        loop {
-            graph.nodes[value].len = order.len();
-            match graph.readers(value + 1)[..] {
-                [next] if matches!(graph.nodes[next].kind, NodeKind::Pointwise(_)) => value = next,
-                _ => break,
-            }
-        }
+        let functions = elementwise(&graph, dimension.node).unwrap_or_default();
+        [dimension.node].into_iter().chain(functions).for_each(|node| graph.nodes[node].len = order.len());
     }
     Compacted { graph, widths, columns: kept, rows: kept_rows }
 }
 
 /// Distributes the least-squares estimate of the contribution of the columns `gone` to the columns `kept`. Returns its
 /// constant part, which is to be added to the biases. Without correlations, that is the contribution of their means.
-fn absorb(matrix: &mut WeightMatrix, gone: &[usize], kept: &[usize], moments: &Moments) -> Vec<f32> {
+pub(super) fn absorb(matrix: &mut WeightMatrix, gone: &[usize], kept: &[usize], moments: &Moments) -> Vec<f32> {
     let centred = moments.centred();
     let damping = (DAMPING_INPUT * centred.trace() / matrix.cols.max(1) as f64).max(1e-30);
     let among = |i: usize, j: usize| centred[(kept[i], kept[j])] + if i == j { damping } else { 0.0 };
@@ -82,12 +76,12 @@ fn absorb(matrix: &mut WeightMatrix, gone: &[usize], kept: &[usize], moments: &M
     .collect()
 }
 
-fn rows(matrix: &WeightMatrix, order: &[usize]) -> WeightMatrix {
+pub(super) fn rows(matrix: &WeightMatrix, order: &[usize]) -> WeightMatrix {
     let data = order.iter().flat_map(|&r| &matrix.data[r * matrix.cols..][..matrix.cols]).copied().collect();
     WeightMatrix { name: matrix.name.clone(), rows: order.len(), cols: matrix.cols, data }
 }
 
-fn columns(matrix: &WeightMatrix, order: &[usize]) -> WeightMatrix {
+pub(super) fn columns(matrix: &WeightMatrix, order: &[usize]) -> WeightMatrix {
     let data = matrix.data.chunks_exact(matrix.cols).flat_map(|row| order.iter().map(|&c| row[c])).collect();
     WeightMatrix { name: matrix.name.clone(), rows: matrix.rows, cols: order.len(), data }
 }

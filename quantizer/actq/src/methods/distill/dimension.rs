@@ -35,14 +35,11 @@ impl Dimension {
 
     /// Returns the functions that every element passes.
     pub fn functions(&self, graph: &Graph) -> Vec<Function> {
-        let mut functions = Vec::new();
-        let mut value = self.node + 1;
-        while let [next] = graph.readers(value)[..] {
-            let NodeKind::Pointwise(Pointwise(function)) = graph.nodes[next].kind else { break };
-            functions.push(function);
-            value = next + 1;
-        }
-        functions
+        let function = |node: usize| match graph.nodes[node].kind {
+            NodeKind::Pointwise(Pointwise(function)) => Some(function),
+            _ => None,
+        };
+        elementwise(graph, self.node).unwrap_or_default().into_iter().filter_map(function).collect()
     }
 
     /// Returns how many of its elements have bits.
@@ -66,24 +63,29 @@ pub fn dimensions(graph: &Graph) -> Vec<Dimension> {
     (0..graph.nodes.len())
         .filter_map(|node| {
             let maker = linear(node)?;
-            let mut value = node + 1;
-            // Follow the elementwise functions while the value has no other reader.
-            loop {
-                if value == graph.output() {
-                    return None;
-                }
-                let next = graph.readers(value);
-                match next[..] {
-                    [one] if matches!(graph.nodes[one].kind, NodeKind::Pointwise(_)) => value = one + 1,
-                    _ => {
-                        let consumers = next.into_iter().map(|n| consumers(graph, n)).collect::<Option<Vec<_>>>()?;
-                        let consumers = consumers.concat();
-                        return (!consumers.is_empty()).then_some(Dimension { maker, consumers, node });
-                    }
-                }
-            }
+            let value = elementwise(graph, node)?.last().map_or(node, |last| *last) + 1;
+            let readers = graph.readers(value).into_iter();
+            let consumers = readers.map(|reader| consumers(graph, reader)).collect::<Option<Vec<_>>>()?.concat();
+            (!consumers.is_empty()).then_some(Dimension { maker, consumers, node })
         })
         .collect()
+}
+
+/// Returns the functions that a node's output passes before anything else reads it; `None` if it becomes the network's
+/// output.
+pub(super) fn elementwise(graph: &Graph, node: usize) -> Option<Vec<usize>> {
+    let mut functions = Vec::new();
+    let mut value = node + 1;
+    while value != graph.output() {
+        match graph.readers(value)[..] {
+            [next] if matches!(graph.nodes[next].kind, NodeKind::Pointwise(_)) => {
+                functions.push(next);
+                value = next + 1;
+            }
+            _ => return Some(functions),
+        }
+    }
+    None
 }
 
 /// Returns how many nodes use a matrix.
@@ -93,7 +95,7 @@ fn uses(graph: &Graph, matrix: usize) -> usize {
 
 /// Returns the matrices through which a node reads its input, if it reads it in no other way and no other node uses
 /// them.
-fn consumers(graph: &Graph, node: usize) -> Option<Vec<usize>> {
+pub(super) fn consumers(graph: &Graph, node: usize) -> Option<Vec<usize>> {
     let of_input = |product: &Product| product.operand == Operand::Input;
     let products = graph.nodes[node].kind.products().into_iter().filter(of_input);
     let matrices: Vec<usize> = products.map(|product| product.matrix).collect();

@@ -3,9 +3,8 @@
 
 use ndarray::Array2;
 
-use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
-use crate::graph::{Network, State, Weights};
+use crate::graph::{Graph, Network, State, Weights};
 use crate::random::Random;
 
 /// Times that an answer is learned from, on average.
@@ -25,15 +24,10 @@ pub(super) struct Lesson {
 }
 
 impl Lesson {
-    /// Draws a lesson of `size` windows.
-    pub(super) fn draw(windows: &Windows, size: usize, widening: Option<Widening>, random: &mut Random) -> Self {
-        Self::of(windows, windows.batch(size, widening, random))
-    }
-
-    /// Asks the f32 network about a batch.
-    pub(super) fn of(windows: &Windows, batch: Batch) -> Self {
+    /// Asks the f32 network about a batch for the network `graph`, whose `states` are those of the episodes.
+    pub(super) fn of(windows: &Windows, batch: Batch, graph: &Graph, states: &[State]) -> Self {
         let target = windows.teach(&batch);
-        Self { frames: batch.frames, state: batch.state, target }
+        Self { state: batch.state_of(graph, states), frames: batch.frames, target }
     }
 
     /// Runs a network over the observations.

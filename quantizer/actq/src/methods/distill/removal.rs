@@ -13,7 +13,6 @@ use nalgebra::DMatrix;
 use ndarray::{Array1, Array2, ArrayView1};
 use rayon::prelude::*;
 
-use super::dimension::Dimension;
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{DAMPING_INPUT, Side, importance};
 use crate::gemm::{Panels, add_product_parallel};
@@ -33,21 +32,18 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// Measures the vector `dimension`. `moments` has the moments of every matrix's input, `g` the importance of every
-    /// matrix's rows.
-    pub fn of(graph: &Graph, dimension: &Dimension, moments: &[&Moments], g: &[Vec<f64>]) -> Self {
-        let n = graph.matrices[dimension.maker].rows;
+    /// Measures the vector that the matrices `consumers` read. `moments` has the moments of every matrix's input, `g` the
+    /// importance of every matrix's rows.
+    pub fn of(graph: &Graph, consumers: &[usize], moments: &[&Moments], g: &[Vec<f64>]) -> Self {
+        let centred = consumers.first().map_or_else(|| DMatrix::zeros(0, 0), |&first| moments[first].centred());
+        let n = centred.nrows();
         let mut effect = Array2::zeros((n, n));
-        for &consumer in &dimension.consumers {
+        for &consumer in consumers {
             let matrix = &graph.matrices[consumer];
             let w = Array2::from_shape_fn((matrix.rows, n), |(r, c)| f64::from(matrix.data[r * n + c]));
             let weighed = Array2::from_shape_fn(w.raw_dim(), |(r, c)| g[consumer][r] * w[[r, c]]);
             add_product_parallel(weighed.t(), &Panels::of(w.view()), effect.view_mut());
         }
-        let centred = match dimension.consumers.first() {
-            Some(&first) => moments[first].centred(),
-            None => DMatrix::zeros(n, n),
-        };
         Self { centred, effect }
     }
 

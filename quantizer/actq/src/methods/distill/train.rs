@@ -47,6 +47,9 @@ const WINDOWS: usize = 16;
 /// slower the products with a recurrent matrix, which have a row for each.
 const FRAME_SHARDS: usize = 4;
 const WINDOW_SHARDS: usize = 2;
+/// Least steps after which a recurrent network's own states are renewed, and frames of the recording for each step.
+const RENEWED: usize = 100;
+const FRAMES_A_STEP: usize = 50;
 /// Largest norm of a recurrent network's gradient.
 const CLIP: f32 = 1.0;
 
@@ -105,14 +108,18 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
     };
     let objective = Objective::new(&windows.output_variance, task.frames);
     let mut schedule = Schedule::new(task.bounds, most_steps(task.graph, Effort::Default));
+    let mut states = Vec::new();
     while let Some(rate) = schedule.rate() {
+        if windows.recurrent() && schedule.steps().is_multiple_of(RENEWED.max(windows.frames() / FRAMES_A_STEP)) {
+            states = windows.states_of(&network, &weights);
+        }
         let learned: Vec<(f32, Derivatives, Option<Lesson>)> = lessons
             .next(shards)
             .into_par_iter()
             .map(|source| match source {
                 Source::New(seed) => {
-                    let widening = Some(task.widening);
-                    let lesson = Lesson::draw(windows, size / shards, widening, &mut Random::new(seed));
+                    let batch = windows.batch(size / shards, Some(task.widening), &mut Random::new(seed));
+                    let lesson = Lesson::of(windows, batch, task.graph, &states);
                     let (loss, derivatives) = gradient(&network, &weights, &objective, &lesson);
                     (loss, derivatives, Some(lesson))
                 }
@@ -172,11 +179,19 @@ fn gradient(
     (loss, network.backward(weights, pass, error, &mut lesson.zero_state()))
 }
 
-/// Returns the mean over samples and outputs of squared error over variance, against the f32 network.
-pub fn loss(network: &Network<'_>, weights: &Weights, windows: &Windows, batch: Batch) -> f32 {
-    let lesson = Lesson::of(windows, batch);
-    let pass = lesson.pass(network, weights);
-    Objective::new(&windows.output_variance, Frames::Even).measure(pass.output(), &lesson.target).1
+/// Returns the mean of each batch over samples and outputs of squared error over variance, against the f32 network.
+pub fn losses<'b>(
+    network: &'b Network<'_>,
+    weights: &'b Weights,
+    windows: &'b Windows,
+    batches: impl IntoIterator<Item = Batch> + 'b,
+) -> impl Iterator<Item = f32> + 'b {
+    let objective = Objective::new(&windows.output_variance, Frames::Even);
+    let states = windows.states_of(network, weights);
+    batches.into_iter().map(move |batch| {
+        let lesson = Lesson::of(windows, batch, network.graph, &states);
+        objective.measure(lesson.pass(network, weights).output(), &lesson.target).1
+    })
 }
 
 /// Scales the derivatives so that their norm is at most [`CLIP`].

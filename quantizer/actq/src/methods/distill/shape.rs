@@ -1,0 +1,104 @@
+//! Shape of the network to learn: the units of its recurrent cells, and the width of every row.
+
+use actq_kernels::Width;
+use rayon::prelude::*;
+
+use super::activations::allocated;
+use super::allocate::{Rows, energies, expected};
+use super::dimension::{Dimension, Widths, dimensions};
+use super::size::Size;
+use super::statistics::RowStatistics;
+use super::units::Cut;
+use crate::budget::Rate;
+use crate::calibrate::moments::Moments;
+use crate::error::Result;
+use crate::graph::{Graph, WeightMatrix};
+use crate::methods::options::Options;
+
+/// Shape of the network to learn.
+#[derive(Debug)]
+pub(super) struct Shape {
+    /// The network with the units that it keeps.
+    pub(super) cut: Cut,
+    /// Hidden vectors of its graph.
+    pub(super) dimensions: Vec<Dimension>,
+    /// Reasons and widths of its rows.
+    pub(super) rows: Vec<Rows>,
+    pub(super) widths: Widths,
+    /// Activation magnitude of every matrix.
+    pub(super) limits: Vec<u16>,
+}
+
+/// Shares of the cells' units to choose from.
+const SHARES: [f64; 7] = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375, 0.25];
+
+/// Chooses the units of recurrent cells, and the widths of all rows. Units are removed together where something is
+/// learned and no width is forced: of several shares of them, the one with the lowest expected error stays.
+pub(super) fn shape(
+    statistics: &RowStatistics,
+    rate: Rate,
+    options: &Options,
+    forced: &[Option<Width>],
+    allowed: f64,
+) -> Result<Shape> {
+    let RowStatistics { inputs, outputs, moments, .. } = statistics;
+    let graph = statistics.graph();
+    let of_inputs: Vec<&Moments> = moments.iter().map(|(input, _)| input).collect();
+    let removals = statistics.removals(options.learns());
+    let of_cut = |cut: Cut| {
+        let pick = |values: &[f64], of: &[usize]| of.iter().map(|&i| values[i]).collect::<Vec<f64>>();
+        let of_matrix = |(m, matrix): (usize, &WeightMatrix)| {
+            let (input, output) = (pick(&inputs[m], &cut.columns[m]), pick(&outputs[m], &cut.rows[m]));
+            let energy = energies(matrix, &input, &output);
+            let removal = removals[m].as_ref().map_or_else(|| energy.clone(), |of| pick(of, &cut.rows[m]));
+            Rows { energy, removal, forced: forced[m] }
+        };
+        let rows: Vec<Rows> = cut.graph.matrices.iter().enumerate().map(of_matrix).collect();
+        let cycles = match rate {
+            Rate::Within { cycles, .. } => Some(cycles),
+            Rate::Width(_) | Rate::BitsPerWeight(_) | Rate::Bytes(_) => None,
+        };
+        let dimensions = dimensions(&cut.graph);
+        let size = Size { cycles, ..Size::new(&cut.graph, &dimensions, values(&cut.graph, rate, options)) };
+        let (widths, limits) = allocated(size, &rows, options, allowed)?;
+        Ok(Shape { cut, dimensions, rows, widths, limits })
+    };
+    if !options.learns() || forced.iter().any(Option::is_some) || statistics.cells().0.is_empty() {
+        return of_cut(Cut::nothing(graph));
+    }
+    let (cells, of_units) = statistics.cells();
+    let shapes: Vec<Result<Shape>> =
+        SHARES.par_iter().map(|share| of_cut(Cut::to(graph, cells, of_units, *share, &of_inputs))).collect();
+    // The first error says what no shape can keep.
+    let best = shapes.into_iter().reduce(|best, next| match (&best, &next) {
+        (Ok(a), Ok(b)) if b.error() < a.error() => next,
+        (Err(_), Ok(_)) => next,
+        _ => best,
+    });
+    best.unwrap_or_else(|| of_cut(Cut::nothing(graph)))
+}
+
+impl Shape {
+    /// Returns the expected error.
+    fn error(&self) -> f64 {
+        self.cut.error + expected(&self.rows, &self.widths)
+    }
+}
+
+/// Returns the width that is forced on every matrix, if any.
+pub(super) fn forced(graph: &Graph, rate: Rate, options: &Options) -> Vec<Option<Width>> {
+    let named = |matrix: &WeightMatrix| options.forced.iter().find(|(name, _)| *name == matrix.name).map(|(_, w)| *w);
+    let of_matrix = |matrix: &WeightMatrix| match rate {
+        Rate::Width(width) => Some(width),
+        Rate::BitsPerWeight(_) | Rate::Bytes(_) | Rate::Within { .. } => named(matrix),
+    };
+    graph.matrices.iter().map(of_matrix).collect()
+}
+
+/// Returns the number of values of the vectors that a rate counts.
+pub(super) fn values(graph: &Graph, rate: Rate, options: &Options) -> usize {
+    match rate {
+        Rate::Bytes(_) | Rate::Within { bytes: Some(_), .. } => graph.changed_values(options.learns()),
+        Rate::Width(_) | Rate::BitsPerWeight(_) | Rate::Within { bytes: None, .. } => 0,
+    }
+}

@@ -1,0 +1,127 @@
+//! Statistics of a network over the recorded observations, for any number of budgets.
+
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use nalgebra::DMatrix;
+
+use super::balance::{MixedUnits, balance, mixed_units};
+use super::dimension::{Dimension, dimensions};
+use super::removal::Effect;
+use super::schedule::{Bounds, most_steps};
+use super::units::{Cell, cells};
+use crate::calibrate::allowance::Allowance;
+use crate::calibrate::moments::Moments;
+use crate::calibrate::sensitivity::{Side, importance, output_moments};
+use crate::calibrate::windows::Windows;
+use crate::data::Dataset;
+use crate::error::{Result, ensure};
+use crate::graph::Graph;
+use crate::methods::options::Options;
+
+/// Least frames to learn from.
+const LEAST_FRAMES: usize = 200;
+/// Seed of the statistics, the same for every budget.
+const SEED: u64 = 1;
+
+/// Statistics of the recorded observations, for any number of budgets.
+#[derive(Debug)]
+pub struct RowStatistics {
+    /// The network with balanced columns, and the recorded observations.
+    pub(super) windows: Windows,
+    /// Importance of every matrix's columns; of its rows.
+    pub(super) inputs: Vec<Vec<f64>>,
+    pub(super) outputs: Vec<Vec<f64>>,
+    /// Errors of removing the rows of a matrix, one by one and, when needed, together; `None` if its rows cannot be
+    /// removed.
+    alone: Vec<Option<Vec<f64>>>,
+    together: OnceLock<Vec<Option<Vec<f64>>>>,
+    /// Recurrent cells, each with the errors of removing its units.
+    cells: OnceLock<(Vec<Cell>, Vec<Vec<f64>>)>,
+    /// Moments of every matrix's input, and `G`.
+    pub(super) moments: Vec<(Moments, DMatrix<f64>)>,
+    /// Frames or windows that `G` was taken over.
+    pub(in crate::methods) outputs_of: usize,
+    /// Matrices whose columns still have very different units.
+    pub(in crate::methods) mixed: Vec<MixedUnits>,
+}
+
+impl RowStatistics {
+    /// Runs the f32 network over `dataset`, forwards and backwards. `moments` holds the moments of the matrices' inputs
+    /// and the number of frames that they were taken over, as many as the allowance permits.
+    pub fn collect(
+        graph: &Graph,
+        dataset: &Dataset,
+        (mut moments, frames): (Vec<Moments>, usize),
+        allowance: Option<Allowance>,
+    ) -> Result<Self> {
+        dataset.require_frames(LEAST_FRAMES, "learning from fewer overfits")?;
+        let every = if allowance.is_some() { dataset.frames().div_ceil(frames.max(1)) } else { 1 };
+        let windows = Windows::new(graph.clone(), dataset, every);
+        ensure!(
+            windows.output_variance.iter().any(|v| *v > 0.0),
+            "{}: the policy gives the same action at every observation; record observations with different actions",
+            dataset.path.display()
+        );
+        let (output_moments, outputs_of) = output_moments(&windows, allowance, SEED);
+        let outputs: Vec<Vec<f64>> = output_moments.iter().map(|g| importance(g, Side::Output)).collect();
+        let balanced = balance(graph, &mut moments, &outputs)?;
+        let of_inputs: Vec<&Moments> = moments.iter().collect();
+        let alone =
+            effects(&balanced, &of_inputs, &outputs).map(|effect| effect.map(|effect| effect.alone())).collect();
+        Ok(Self {
+            mixed: mixed_units(&balanced, &moments),
+            windows: windows.with(balanced),
+            inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
+            outputs,
+            alone,
+            together: OnceLock::new(),
+            cells: OnceLock::new(),
+            moments: moments.into_iter().zip(output_moments).collect(),
+            outputs_of,
+        })
+    }
+
+    /// Returns the network with balanced columns.
+    pub fn graph(&self) -> &Graph {
+        &self.windows.graph
+    }
+
+    /// Returns the errors of removing each row of every matrix. Without learning those of single rows count: the gain of
+    /// the others is small then, and small networks get more uneven errors.
+    pub(super) fn removals(&self, learns: bool) -> &[Option<Vec<f64>>] {
+        let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
+        let together =
+            || effects(self.graph(), &of_inputs, &self.outputs).map(|effect| Some(effect?.together())).collect();
+        if learns { self.together.get_or_init(together) } else { &self.alone }
+    }
+
+    /// Returns the recurrent cells with the errors of removing their units.
+    pub(super) fn cells(&self) -> &(Vec<Cell>, Vec<Vec<f64>>) {
+        self.cells.get_or_init(|| {
+            let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
+            let cells = cells(self.graph());
+            let removals = cells.iter().map(|cell| cell.removals(self.graph(), &of_inputs, &self.outputs)).collect();
+            (cells, removals)
+        })
+    }
+
+    /// Returns the most steps of distillation with these options.
+    pub fn most_steps(&self, options: &Options) -> usize {
+        options.steps.unwrap_or_else(|| most_steps(&self.windows.graph, options.effort))
+    }
+
+    /// Returns the limits of learning.
+    pub(super) fn bounds(&self, options: &Options) -> Bounds {
+        let most = self.most_steps(options);
+        let steps = (options.steps.is_some() || options.minutes.is_none()).then_some(most);
+        Bounds { steps, time: options.minutes.map(|minutes| Duration::from_secs_f64(60.0 * minutes)) }
+    }
+}
+
+/// Returns the effect of every matrix's output; `None` if its rows cannot be removed.
+fn effects(graph: &Graph, moments: &[&Moments], g: &[Vec<f64>]) -> impl Iterator<Item = Option<Effect>> {
+    let dimensions = dimensions(graph);
+    (0..graph.matrices.len())
+        .map(move |m| Some(Effect::of(graph, &Dimension::made_by(&dimensions, m)?.consumers, moments, g)))
+}
