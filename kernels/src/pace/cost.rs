@@ -119,6 +119,13 @@ pub fn of_values(function: crate::math::Function, values: usize) -> Cost {
     total(|add| add(Feature::function(function), values))
 }
 
+/// Computes the cost of the units of a recurrent cell: an LSTM, or a GRU.
+#[cfg(feature = "writer")]
+pub fn of_units(lstm: bool, units: usize) -> Cost {
+    let cell = if lstm { op::LSTM_CELL } else { op::GRU_CELL };
+    total(|add| add(Feature::value(cell), units))
+}
+
 /// Computes the cost of a step that evaluates the network. A step that continues a chunk costs the same without the
 /// operations.
 pub fn of_step(image: &Image<'_>) -> Cost {

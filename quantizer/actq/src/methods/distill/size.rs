@@ -8,7 +8,7 @@ use actq_kernels::pace::cost;
 
 use super::balance::balance_bytes;
 use super::dimension::{Dimension, Widths};
-use crate::graph::Graph;
+use crate::graph::{Graph, Node, NodeKind};
 use crate::methods::packing::Packing;
 
 /// Properties that determine the bytes of a network beside its rows' widths.
@@ -59,7 +59,8 @@ impl<'a> Size<'a> {
         cycles + if bit > 0.0 { bit * 8.0 * self.bytes(widths) as f64 } else { 0.0 }
     }
 
-    /// Returns the modelled cycles of the matrices' rows in a step, with those of the functions after them.
+    /// Returns the modelled cycles of the matrices' rows in a step, with those of the functions after them and of
+    /// recurrent cells.
     pub fn cycles(&self, widths: &Widths) -> f64 {
         let of_matrix = |m: usize| {
             let Some(&packing) = self.packings[m].first() else { return 0.0 };
@@ -68,7 +69,12 @@ impl<'a> Size<'a> {
                 Dimension::made_by(self.dimensions, m).map_or(0.0, |d| self.of_functions(d, d.kept(widths)));
             self.runs[m] as f64 * (blocks.sum::<u64>() as f64 + functions)
         };
-        (0..self.packings.len()).map(of_matrix).sum()
+        let of_cell = |node: &Node| match &node.kind {
+            NodeKind::Lstm(cell) => cost::of_units(true, cell.hidden).cycles as f64,
+            NodeKind::Gru(cell) => cost::of_units(false, cell.hidden).cycles as f64,
+            _ => 0.0,
+        };
+        (0..self.packings.len()).map(of_matrix).sum::<f64>() + self.graph.nodes.iter().map(of_cell).sum::<f64>()
     }
 
     /// Returns the cycles of one more row of `cols` columns in every run of a matrix.
