@@ -138,7 +138,7 @@ impl Windows {
     /// Draws a batch of `size` windows, at the recorded observations or widened.
     pub fn batch(&self, size: usize, widening: Option<Widening>, random: &mut Random) -> Batch {
         let mut frames = Array2::zeros((size * self.window, self.graph.input_len()));
-        let mut starts = vec![None; size];
+        let mut starts = Vec::with_capacity(size);
         for sample in 0..size {
             let e = random.below(self.episodes.len());
             let start = random.below(self.episodes[e].nrows() + 1 - self.window);
@@ -150,7 +150,7 @@ impl Windows {
                 self.widen(widening, (0..self.window).map(|t| t * size + sample), &mut frames, random);
                 from_zero = random.share() < FROM_ZERO;
             }
-            starts[sample] = (self.recurrent() && !from_zero).then_some((e, start));
+            starts.push((self.recurrent() && !from_zero).then_some((e, start)));
         }
         let mut batch = Batch { frames, state: State::new(), starts };
         batch.state = batch.state_of(&self.graph, &self.states);

@@ -45,7 +45,7 @@ use feedback::feedback;
 use objective::Frames;
 use shape::{Shape, forced, shape, values};
 use size::Size;
-use train::{Learned, Task, distill};
+use train::{Learned, Present, Task, distill};
 
 /// Quantizes a network. The result lacks hidden elements without bits; its biases and norms have been learned.
 pub fn quantize(
@@ -91,6 +91,7 @@ pub fn quantize(
         x_max: &learned_with,
         widening: Widening::WIDE,
         frames: Frames::of(options, graph),
+        watched: statistics.watched.as_ref(),
         bounds,
         seed: options.seed,
     };
@@ -109,8 +110,8 @@ pub fn quantize(
         }
         Choice::Learning(widening) => {
             let Learned { quantized, graph, steps } =
-                distill(&Task { widening, bounds, ..task }, windows, &mut |share, error| {
-                    progress(Progress::Learning { share: from + (1.0 - from) * share, error });
+                distill(&Task { widening, bounds, ..task }, windows, &mut |Present { share, error, held_out }| {
+                    progress(Progress::Learning { share: from + (1.0 - from) * share, error, held_out });
                 });
             (quantized, graph, steps)
         }

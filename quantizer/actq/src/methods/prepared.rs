@@ -111,6 +111,13 @@ impl<'a> PreparedMethod<'a> {
         Ok(Self { graph, method, statistics, sampled: sampled.filter(|_| steps > 1) })
     }
 
+    /// Reports errors on some of a held-out recording while something is learned; nothing else depends on it.
+    pub fn watch(&mut self, held_out: &Dataset) {
+        if let Statistics::Distill(statistics) = &mut self.statistics {
+            statistics.watch(held_out);
+        }
+    }
+
     /// Returns the frames over which the statistics of an iterative head were taken; `None` for all.
     pub fn sampled(&self) -> Option<Sampled> {
         self.sampled
@@ -222,7 +229,7 @@ mod tests {
     use crate::budget::Budget;
     use crate::methods::scale::round_to_nearest;
     use crate::methods::{CustomMethod, Packing};
-    use crate::testing::{dataset, mlp};
+    use crate::testing::{dataset, lstm, mlp};
 
     /// Rounds the first so many matrices.
     #[derive(Clone, Copy, Debug)]
@@ -271,5 +278,26 @@ mod tests {
             "method first 1 must return an outcome for each matrix, of the matrix's shape"
         );
         assert_eq!(error(First(2), First(1)), "the quantizer is prepared for method first 2, not for first 1");
+    }
+    #[test]
+    fn the_held_out_error_is_reported_and_changes_nothing() {
+        for graph in [mlp(), lstm()] {
+            let (recording, held_out) = (dataset(&graph, 4, 100), dataset(&graph, 2, 90));
+            let options = Options { steps: Some(200), ..Options::new(Method::Distill, Budget::Width(Width::W4)) };
+            let quantized = |watched: Option<&Dataset>| {
+                let mut method = PreparedMethod::new(&graph, Method::Distill, Some(&recording), |_| {})?;
+                watched.into_iter().for_each(|held_out| method.watch(held_out));
+                let mut last = None;
+                let found = method.quantize(Rate::Width(Width::W4), &options, |progress| last = Some(progress))?;
+                let codes: Vec<Vec<u8>> = found.outcomes.into_iter().map(|outcome| outcome.quantized.codes).collect();
+                Ok::<_, crate::error::Error>((codes, last))
+            };
+            let (codes, unwatched) = quantized(None).expect("quantized");
+            let (of_watched, watched) = quantized(Some(&held_out)).expect("quantized");
+            assert_eq!(codes, of_watched);
+            assert!(matches!(unwatched, Some(Progress::Learning { held_out: None, .. })));
+            let Some(Progress::Learning { held_out: Some(error), .. }) = watched else { panic!("{watched:?}") };
+            assert!((1e-9..0.5).contains(&error), "{error}");
+        }
     }
 }

@@ -4,6 +4,7 @@ use std::fmt;
 
 /// The present work, and the share of the whole that is done. Errors are squared differences to the f32 network over
 /// the variance of its outputs, at the widened inputs of learning. They fall, but are not the errors on a recording.
+/// Only the held-out error is one.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
     /// Comparing widenings of the inputs.
@@ -19,6 +20,8 @@ pub enum Progress {
         share: f64,
         /// Present error.
         error: f64,
+        /// Error of late on some of the held-out recording, if there is one. Nothing goes by it.
+        held_out: Option<f64>,
     },
 }
 
@@ -34,6 +37,9 @@ impl fmt::Display for Progress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Choosing { error, .. } => write!(f, "choosing, error {error:.1e}"),
+            Self::Learning { error, held_out: Some(held_out), .. } => {
+                write!(f, "learning, error {error:.1e}, held-out {held_out:.1e}")
+            }
             Self::Learning { error, .. } => write!(f, "learning, error {error:.1e}"),
         }
     }

@@ -47,7 +47,8 @@ impl<'a> Quantizer<'a> {
         minutes: Option<f64>,
         progress: impl FnMut(f64),
     ) -> Result<Self> {
-        let method = PreparedMethod::before(&policy.graph, method, recordings.calib.as_ref(), minutes, progress)?;
+        let mut method = PreparedMethod::before(&policy.graph, method, recordings.calib.as_ref(), minutes, progress)?;
+        recordings.heldout.iter().for_each(|held_out| method.watch(held_out));
         Ok(Self { policy, recordings, method })
     }
 

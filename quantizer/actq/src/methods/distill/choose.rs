@@ -9,7 +9,7 @@
 use nalgebra::DMatrix;
 
 use super::schedule::Bounds;
-use super::train::{Task, distill, losses};
+use super::train::{Task, distill, recorded_error};
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{DAMPING_INPUT, drawn_moments};
 use crate::calibrate::widening::Widening;
@@ -17,7 +17,6 @@ use crate::calibrate::windows::Windows;
 use crate::graph::{Graph, Network};
 use crate::methods::learning::{Choice, Tried};
 use crate::methods::quantized::{Quantized, dequantized};
-use crate::random::Random;
 
 /// Least steps of which a part is spent on choices.
 const LEAST_STEPS: usize = 3000;
@@ -31,9 +30,6 @@ const ERROR_RATIO: f64 = 0.8;
 const CHANCE: f64 = 0.05;
 /// Dampings of feedback to try.
 const DAMPINGS: [f64; 2] = [DAMPING_INPUT, 0.03];
-/// Batches that an error is measured on, and frames in each.
-const BATCHES: usize = 16;
-const FRAMES: usize = 512;
 
 /// Feedback from moments and a damping.
 pub type Feedback<'f> = dyn Fn(&[(Moments, DMatrix<f64>)], f64) -> (Vec<Quantized>, Graph) + 'f;
@@ -87,9 +83,10 @@ pub fn choose(
     if learns {
         let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
         for (i, &widening) in choices.iter().enumerate() {
-            let learned = distill(&Task { widening, bounds, ..task.clone() }, &learned_from, &mut |share, error| {
-                progress((i as f64 + share) / choices.len() as f64, error);
-            });
+            let learned =
+                distill(&Task { widening, bounds, watched: None, ..task.clone() }, &learned_from, &mut |now| {
+                    progress((i as f64 + now.share) / choices.len() as f64, now.error);
+                });
             try_out(Choice::Learning(widening), (learned.quantized, learned.graph));
         }
     }
@@ -113,12 +110,7 @@ fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
 fn errors(task: &Task<'_>, graph: &Graph, quantized: &[Quantized], windows: &Windows) -> [f64; 2] {
     let network = Network::rounded(graph, task.x_max);
     let weights = dequantized(graph, quantized);
-    let size = (FRAMES / windows.window).max(1);
-    [None, Some(Widening::WIDE)].map(|widening| {
-        let mut random = Random::new(task.seed);
-        let batches = (0..BATCHES).map(|_| windows.batch(size, widening, &mut random));
-        losses(&network, &weights, windows, batches).map(f64::from).sum::<f64>() / BATCHES as f64
-    })
+    [None, Some(Widening::WIDE)].map(|widening| recorded_error(&network, &weights, windows, widening, task.seed))
 }
 
 #[cfg(test)]

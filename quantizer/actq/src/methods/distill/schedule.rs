@@ -93,6 +93,11 @@ impl Schedule {
         self.step
     }
 
+    /// Returns `true` if a part of the error's course has just ended.
+    pub fn is_at_part(&self) -> bool {
+        self.step.is_multiple_of(self.part)
+    }
+
     /// Returns the mean error of the last whole part, or of the first one so far.
     pub fn error(&self) -> Option<f64> {
         self.last.or_else(|| (self.step > 0).then(|| self.sum / self.step as f64))
@@ -117,7 +122,7 @@ impl Schedule {
     pub fn took(&mut self, error: f32) {
         self.step += 1;
         self.sum += f64::from(error);
-        if self.step.is_multiple_of(self.part) {
+        if self.is_at_part() {
             let mean = self.sum / self.part as f64;
             (self.sum, self.last) = (0.0, Some(mean));
             self.flat = if mean < (1.0 - FALLEN) * self.lowest { 0 } else { self.flat + 1 };

@@ -21,6 +21,8 @@ use crate::methods::options::Options;
 
 /// Least frames to learn from.
 const LEAST_FRAMES: usize = 200;
+/// Most held-out frames to watch.
+const WATCHED: usize = 2048;
 /// Seed of the statistics, the same for every budget.
 const SEED: u64 = 1;
 
@@ -40,6 +42,8 @@ pub struct RowStatistics {
     cells: OnceLock<(Vec<Cell>, Vec<Vec<f64>>)>,
     /// Moments of every matrix's input, and `G`.
     pub(super) moments: Vec<(Moments, DMatrix<f64>)>,
+    /// Held-out observations, to report the error on while something is learned.
+    pub(super) watched: Option<Windows>,
     /// Frames or windows that `G` was taken over.
     pub(in crate::methods) outputs_of: usize,
     /// Matrices whose columns still have very different units.
@@ -77,9 +81,17 @@ impl RowStatistics {
             alone,
             together: OnceLock::new(),
             cells: OnceLock::new(),
+            watched: None,
             moments: moments.into_iter().zip(output_moments).collect(),
             outputs_of,
         })
+    }
+
+    /// Reports errors on some of a held-out recording while something is learned.
+    pub fn watch(&mut self, held_out: &Dataset) {
+        let graph = self.graph().clone();
+        let some = held_out.thinned(WATCHED / graph.denoising_steps(), graph.state_len() > 0);
+        self.watched = (some.frames() > 0).then(|| Windows::new(graph, &some, 1));
     }
 
     /// Returns the network with balanced columns.

@@ -50,6 +50,9 @@ const WINDOW_SHARDS: usize = 2;
 /// Least steps after which a recurrent network's own states are renewed, and frames of the recording for each step.
 const RENEWED: usize = 100;
 const FRAMES_A_STEP: usize = 50;
+/// Batches that an error is measured on, and frames in each.
+const MEASURED: usize = 16;
+const MEASURED_FRAMES: usize = 512;
 /// Largest norm of a recurrent network's gradient.
 const CLIP: f32 = 1.0;
 
@@ -70,6 +73,8 @@ pub struct Task<'a> {
     pub widening: Widening,
     /// Weighting of frames.
     pub frames: Frames,
+    /// Held-out observations, to report the error on.
+    pub watched: Option<&'a Windows>,
     /// Limits of learning.
     pub bounds: Bounds,
     /// Seed of the batches.
@@ -87,9 +92,19 @@ pub struct Learned {
     pub steps: usize,
 }
 
-/// Learns codes, scales, biases and norms. `progress` is called after each step with the share done and the error on
-/// the widened inputs.
-pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64, f64)) -> Learned {
+/// State of learning after a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Present {
+    /// Share done.
+    pub share: f64,
+    /// Error on the widened inputs.
+    pub error: f64,
+    /// Error on the watched observations, of late.
+    pub held_out: Option<f64>,
+}
+
+/// Learns codes, scales, biases and norms. `progress` is called after each step.
+pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Present)) -> Learned {
     let network = Network::rounded(task.graph, task.x_max);
     let mut weights = Weights::of(task.graph);
     let matrices = task.graph.matrices.iter().zip(task.widths).zip(task.importance);
@@ -109,6 +124,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
     let objective = Objective::new(&windows.output_variance, task.frames);
     let mut schedule = Schedule::new(task.bounds, most_steps(task.graph, Effort::Default));
     let mut states = Vec::new();
+    let mut held_out = None;
     while let Some(rate) = schedule.rate() {
         if windows.recurrent() && schedule.steps().is_multiple_of(RENEWED.max(windows.frames() / FRAMES_A_STEP)) {
             states = windows.states_of(&network, &weights);
@@ -148,7 +164,10 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(f64,
         for (adam, (vector, grads)) in adam_vectors.iter_mut().zip(vectors) {
             adam.step(vector, grads, by_vector);
         }
-        progress(schedule.share(), schedule.error().unwrap_or_default());
+        if let Some(watched) = task.watched.filter(|_| schedule.is_at_part()) {
+            held_out = Some(recorded_error(&network, &weights, watched, None, task.seed));
+        }
+        progress(Present { share: schedule.share(), error: schedule.error().unwrap_or_default(), held_out });
     }
     let mut graph = task.graph.clone();
     weights.store_vectors(&mut graph);
@@ -192,6 +211,20 @@ pub fn losses<'b>(
         let lesson = Lesson::of(windows, batch, network.graph, &states);
         objective.measure(lesson.pass(network, weights).output(), &lesson.target).1
     })
+}
+
+/// Returns the mean error on batches of recorded or widened observations, the same ones for every network.
+pub fn recorded_error(
+    network: &Network<'_>,
+    weights: &Weights,
+    windows: &Windows,
+    widening: Option<Widening>,
+    seed: u64,
+) -> f64 {
+    let size = (MEASURED_FRAMES / windows.window).max(1);
+    let mut random = Random::new(seed);
+    let batches = (0..MEASURED).map(|_| windows.batch(size, widening, &mut random));
+    losses(network, weights, windows, batches).map(f64::from).sum::<f64>() / MEASURED as f64
 }
 
 /// Scales the derivatives so that their norm is at most [`CLIP`].
