@@ -45,9 +45,9 @@ pub struct RowStatistics {
     /// Held-out observations, to report the error on while something is learned.
     pub(super) watched: Option<Windows>,
     /// Frames or windows that `G` was taken over.
-    pub(in crate::methods) outputs_of: usize,
+    pub(crate) outputs_of: usize,
     /// Matrices whose columns still have very different units.
-    pub(in crate::methods) mixed: Vec<MixedUnits>,
+    pub(crate) mixed: Vec<MixedUnits>,
 }
 
 impl RowStatistics {
