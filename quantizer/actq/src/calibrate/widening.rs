@@ -24,21 +24,16 @@ pub struct Widening {
 pub const MEMORY: f32 = 0.97;
 
 impl Widening {
-    /// The widening of recurrent policies, and of others without episodes to choose by; it also measures errors off the
-    /// path. A policy that balances needs as many windows far from the path as near it
-    /// (docs/records/2026-11-22-choice.md and 2026-11-23-balance.md).
+    /// The widening of recurrent policies; it also measures errors off the path. A policy that balances needs as many
+    /// windows far from the path as near it (docs/records/2026-11-22-choice.md and 2026-11-23-balance.md).
     pub const WIDE: Self = Self { noise: 0.8, power: 1, mix: 0.0 };
+    /// The widening of other policies. Narrower ones have no lower error on the path, and twice as high ones off it
+    /// (docs/records/2026-11-26-cells.md).
+    pub const OF_FRAMES: Self = Self { noise: 0.8, power: 3, mix: 0.5 };
 
-    /// Returns the widenings to choose from. The first one of a feed-forward policy has lower errors than
-    /// [`Self::WIDE`] on its path and hardly higher ones off it. A recurrent policy has no choice, since nothing
-    /// narrower has the lowest error off the path.
-    pub fn choices(recurrent: bool) -> &'static [Self] {
-        const OF_FRAMES: [Widening; 3] = [
-            Widening { noise: 0.8, power: 3, mix: 0.5 },
-            Widening { noise: 0.1, power: 1, mix: 0.5 },
-            Widening { noise: 0.1, power: 1, mix: 1.0 },
-        ];
-        if recurrent { &[Self::WIDE] } else { &OF_FRAMES }
+    /// Returns the widening of a policy.
+    pub fn of(recurrent: bool) -> Self {
+        if recurrent { Self::WIDE } else { Self::OF_FRAMES }
     }
 }
 

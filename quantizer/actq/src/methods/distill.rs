@@ -38,7 +38,7 @@ use crate::error::{Result, ensure};
 use crate::graph::Graph;
 use activations::choose_activations;
 use allocate::Rows;
-use choose::{Chosen, choose, choosing};
+use choose::{CHOOSING, Chosen, choose};
 use compact::{Compacted, add_to_bias, compact};
 use dimension::dimensions;
 use feedback::feedback;
@@ -89,7 +89,7 @@ pub fn quantize(
         group: options.group,
         importance: &importance,
         x_max: &learned_with,
-        widening: Widening::WIDE,
+        widening: Widening::of(windows.recurrent()),
         frames: Frames::of(options, graph),
         watched: statistics.watched.as_ref(),
         bounds,
@@ -98,19 +98,19 @@ pub fn quantize(
     let feedback = |moments: &[(Moments, DMatrix<f64>)], damping: f64| {
         feed_back(&compacted, options.group, &importance, moments, damping)
     };
-    let work = choosing(windows.recurrent());
     let Chosen { choice, bounds, tried } = choose(&task, windows, &feedback, &mut |share, error| {
-        progress(Progress::Choosing { share: work * share, error });
+        progress(Progress::Choosing { share: CHOOSING * share, error });
     });
-    let from = if tried.is_empty() { 0.0 } else { work };
+    let from = if tried.is_empty() { 0.0 } else { CHOOSING };
     let (quantized, learned, steps) = match choice {
         Choice::Feedback { damping } => {
             let (quantized, graph) = feedback(moments, damping);
             (quantized, graph, 0)
         }
-        Choice::Learning(widening) => {
+        Choice::Learning(_) => {
+            let task = Task { bounds, ..task };
             let Learned { quantized, graph, steps } =
-                distill(&Task { widening, bounds, ..task }, windows, &mut |Present { share, error, held_out }| {
+                distill(&task, windows, &mut |Present { share, error, held_out }| {
                     progress(Progress::Learning { share: from + (1.0 - from) * share, error, held_out });
                 });
             (quantized, graph, steps)

@@ -7,7 +7,7 @@ use std::fmt;
 /// Only the held-out error is one.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
-    /// Comparing widenings of the inputs.
+    /// Comparing learning with feedback.
     Choosing {
         /// Share of the whole that is done.
         share: f64,
