@@ -47,8 +47,9 @@ pub struct Chosen {
 /// Approximate share of the choice in all the work.
 pub const CHOOSING: f64 = 1.0 / (STEPS + 1) as f64;
 
-/// Tries all choices. If no episode can be held out, or few steps are to be learned, it tries nothing. It does not try
-/// feedback for an iterative head, since moments over all denoising steps take longer than the result is worth.
+/// Tries all choices. If no episode can be held out, few steps are to be learned, or most weights are gone, it tries
+/// nothing: feedback makes up for rounding, and not for rows that were removed. It does not try feedback for an
+/// iterative head, since moments over all denoising steps take longer than the result is worth.
 pub fn choose(
     task: &Task<'_>,
     windows: &Windows,
@@ -60,7 +61,8 @@ pub fn choose(
     let untried = if learns { Choice::Learning(task.widening) } else { Choice::Feedback { damping: DAMPING_INPUT } };
     let untried = Chosen { choice: untried, bounds: task.bounds, tried: Vec::new() };
     let iterative = task.graph.denoising_steps() > 1;
-    if learns && steps.is_some_and(|steps| steps < LEAST_STEPS) || !learns && iterative {
+    let learns_anyway = learns && (task.is_rest_of(windows) || steps.is_some_and(|steps| steps < LEAST_STEPS));
+    if learns_anyway || !learns && iterative {
         return untried;
     }
     let Some((learned_from, left_out)) = windows.split() else { return untried };

@@ -35,7 +35,7 @@ struct Rates {
 
 /// Rates of feed-forward networks. With higher ones, they fit the recording better and held-out episodes worse.
 const OF_FRAMES: Rates = Rates { latent: 4e-3, scale: 3e-3, vector: 1e-3, strides: Strides::Equal };
-/// Rates of those that have lost more than half of their weights: they do not have to adapt only, but to learn anew.
+/// Rates of those that [`Task::is_rest_of`] the trained one.
 const OF_REST: Rates = Rates { latent: 8e-3, scale: 6e-3, vector: 2e-3, strides: Strides::ByWidth };
 /// Rates of recurrent networks, which take fewer steps: with the rates above, g1_lstm64 ends at 1.6 times the error
 /// (docs/records).
@@ -81,6 +81,14 @@ pub struct Task<'a> {
     pub seed: u64,
 }
 
+impl Task<'_> {
+    /// Returns `true` if the network has lost more than half of the weights. Then it does not have to adapt only, but to
+    /// learn anew.
+    pub fn is_rest_of(&self, windows: &Windows) -> bool {
+        2 * self.graph.weights() < windows.graph.weights()
+    }
+}
+
 /// Result of a distillation.
 #[derive(Debug)]
 pub struct Learned {
@@ -117,7 +125,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Pres
         true => (WINDOWS, WINDOW_SHARDS, OF_WINDOWS),
         // A frame of an iterative head is one frame per denoising step.
         false => {
-            let rates = if 2 * task.graph.weights() < windows.graph.weights() { OF_REST } else { OF_FRAMES };
+            let rates = if task.is_rest_of(windows) { OF_REST } else { OF_FRAMES };
             ((FRAMES / task.graph.denoising_steps().isqrt()).max(4 * FRAME_SHARDS), FRAME_SHARDS, rates)
         }
     };
