@@ -4,7 +4,7 @@ use super::contract::{ARRAY_BINARISE, CONTRACT_ARRAYS};
 use super::header::{self as h, Words};
 use super::info::check_whole;
 use super::matrix::{matrix, row_block};
-use super::op::{Form, Op, OpKind, Uses};
+use super::op::{Op, OpKind, Uses};
 use super::ports::PortKind;
 use super::proof::fits_i32;
 use super::region::Region;
@@ -171,7 +171,9 @@ impl<'a> Image<'a> {
                 return Err(ImageError::Binarise);
             }
         }
-        if !(0..horizon).flat_map(|count| self.ensemble(count)).all(is_positive) {
+        // The ensemble's weights and the reciprocals of their sums follow the arrays.
+        let ensemble = self.section(self.header.contract().wrapping_add(arrays), 2 * horizon);
+        if !ensemble.iter().all(|word| is_positive(f32::from_bits(u32::from_le(*word)))) {
             return Err(ImageError::Constant);
         }
         Ok(())
@@ -183,10 +185,10 @@ impl<'a> Image<'a> {
     fn check_op(&self, i: usize, front: &mut Front<'a>, written: usize) -> Result<usize, ImageError> {
         let op = self.op(i);
         let op = op.as_ref().map_err(|e| *e)?;
-        let Form { uses: Uses { max_detail, constants, arrays, .. }, unused, .. } = op.form;
-        let [head, places, lengths, data] = op.record.map(u32::from_le);
+        let Uses { max_detail, constants, arrays, .. } = &op.form.uses;
+        let [head, rest @ ..] = op.record.map(u32::from_le);
         let n = op.dst().len;
-        if (places & unused[0] | lengths & unused[1] | data & unused[2]) != 0 || (head >> 8) as u8 > *max_detail {
+        if op.form.has_unused(rest) || (head >> 8) as u8 > *max_detail {
             return Err(ImageError::Reserved);
         }
         if n == 0 {

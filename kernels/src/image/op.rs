@@ -133,8 +133,9 @@ impl OpKind {
     }
 }
 
-/// An operation's entry in the table.
-#[derive(Debug)]
+/// An operation's entry in the table. Its alignment makes it three words, which are quick to index and to read.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(4))]
 pub(super) struct Form {
     /// Operation code.
     code: u8,
@@ -143,12 +144,10 @@ pub(super) struct Form {
     pub(super) uses: Uses,
     /// `false` if the build leaves the operation out.
     built: bool,
-    /// Bits of the record's last three words that the operation does not use.
-    pub(super) unused: [u32; 3],
 }
 
 /// The data of an operation, in lengths of `dst`.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Uses {
     /// Highest detail. (For a function, [`Function::from_code`] decides.)
     pub(super) max_detail: u8,
@@ -170,17 +169,13 @@ impl Uses {
 }
 
 impl Form {
-    const fn new(code: u8, kind: OpKind, uses: Uses, built: bool) -> Self {
-        const fn unless(used: bool, bits: u32) -> u32 {
-            if used { 0 } else { bits }
-        }
-        let linear = matches!(kind, OpKind::Linear { .. });
-        let unused = [
-            unless(uses.src > 0, !0xffff),
-            unless(linear, 0xffff) | unless(linear || uses.third > 0, !0xffff),
-            unless(linear || uses.constants > 0 || uses.arrays > 0, !0),
-        ];
-        Self { code, kind, uses, built, unused }
+    /// Returns `true` if a record's last three words have bits that the operation does not use.
+    pub(super) fn has_unused(&self, [places, lengths, data]: [u32; 3]) -> bool {
+        let uses = &self.uses;
+        let is_linear = matches!(self.kind, OpKind::Linear { .. });
+        uses.src == 0 && high(places) != 0
+            || !is_linear && (low(lengths) != 0 || uses.third == 0 && high(lengths) != 0)
+            || !is_linear && uses.constants | uses.arrays == 0 && data != 0
     }
 }
 
@@ -195,8 +190,21 @@ macro_rules! operations {
         #[cfg(feature = "writer")]
         static TEXTS: [[&str; 3]; NAMES.len()] = [$([$text, concat!($($label)?), concat!($($feature)?)]),*];
 
-        /// By operation code, from 1 on.
-        static FORMS: [Form; NAMES.len()] = [$(Form::new($NAME, $kind, $uses, true $(&& cfg!(feature = $feature))?)),*];
+        /// By operation code, from 1 up to the last that the build has.
+        static FORMS: [Form; BUILT] = {
+            let all = [$(Form { code: $NAME, kind: $kind, uses: $uses, built: true $(&& cfg!(feature = $feature))? }),*];
+            *all.split_at(BUILT).0.first_chunk().expect("all of them are more")
+        };
+
+        /// The last code of an operation that the build has.
+        const BUILT: usize = {
+            let built = [$(true $(&& cfg!(feature = $feature))?),*];
+            let mut last = built.len();
+            while !built[last - 1] {
+                last -= 1;
+            }
+            last
+        };
 
         /// `true` if the build leaves an operation out.
         const IS_PARTIAL: bool = !(true $($(&& cfg!(feature = $feature))?)*);
@@ -437,12 +445,14 @@ impl<'a> Image<'a> {
         let op = record(self.words, self.header.ops().wrapping_add(i * OP_WORDS))?;
         let [head, places, lengths, data] = op.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
-        let form = FORMS.get(usize::from(code).wrapping_sub(1)).ok_or(ImageError::Op)?;
+        let index = usize::from(code).wrapping_sub(1);
+        let unknown = if index < NAMES.len() { ImageError::LeftOut } else { ImageError::Op };
+        let form = FORMS.get(index).ok_or(unknown)?;
         if IS_PARTIAL && !form.built {
             return Err(ImageError::LeftOut);
         }
-        let [mut src, third] = [form.uses.src, form.uses.third].map(|times| len * usize::from(times));
-        let mut third = Region { offset: high(lengths), len: third };
+        let mut src = len * usize::from(form.uses.src);
+        let mut third = Region { offset: high(lengths), len: len * usize::from(form.uses.third) };
         let kind = match form.kind {
             OpKind::Linear { .. } => {
                 (src, third) = (high(self.word(data as usize)), self.work());
