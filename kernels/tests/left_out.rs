@@ -15,6 +15,9 @@ fn an_image_that_needs_more_than_the_build_has_is_refused() {
         feature = "w3",
         feature = "w4",
         feature = "w8",
+        feature = "single",
+        feature = "paired",
+        feature = "groups",
         feature = "norm",
         feature = "recurrent",
         feature = "chunks"

@@ -1,9 +1,24 @@
 //! The features of this crate that an image needs.
 
 use super::view::Image;
+use crate::layout::BlockShape;
 
 /// The features that leave something out when they are off, in the order of Cargo.toml.
-const FEATURES: [&str; 10] = ["w2", "w3", "w4", "w8", "functions", "norm", "recurrent", "flow", "chunks", "around"];
+const FEATURES: [&str; 13] = [
+    "w2",
+    "w3",
+    "w4",
+    "w8",
+    "single",
+    "paired",
+    "groups",
+    "functions",
+    "norm",
+    "recurrent",
+    "flow",
+    "chunks",
+    "around",
+];
 
 impl Image<'_> {
     /// Returns the features with which a build runs this image, and without which it refuses it with
@@ -17,10 +32,13 @@ impl Image<'_> {
         match feature {
             "chunks" => self.chunk() > 1,
             "around" => self.header.kind() >> 8 != 0,
+            "groups" => matrices().any(|matrix| matrix.group != 0),
             _ => {
                 self.ops().any(|op| op.kind.feature() == Some(feature))
-                    || matrices()
-                        .any(|matrix| matrix.blocks().any(|rows| rows.block.shape().width.feature() == feature))
+                    || matrices().flat_map(|matrix| matrix.blocks()).any(|rows| {
+                        let BlockShape { width, lanes, .. } = rows.block.shape();
+                        width.feature() == feature || lanes.feature() == feature
+                    })
             }
         }
     }

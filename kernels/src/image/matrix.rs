@@ -36,6 +36,9 @@ impl MatrixRecord {
         if !is_group(group) {
             return Err(ImageError::Group);
         }
+        if !cfg!(feature = "groups") && group != 0 {
+            return Err(ImageError::LeftOut);
+        }
         if x_max == 0 || x_max > i16::MAX as u16 {
             return Err(ImageError::Constant);
         }
@@ -80,7 +83,7 @@ impl BlockRecord {
     pub fn parse(record: &[u32; BLOCK_WORDS], lanes: Lanes) -> Result<Self, ImageError> {
         let [head, weights, scales, steps] = record.map(u32::from_le);
         let width = Width::from_bits(head & 0xff).ok_or(ImageError::Width)?;
-        if !width.is_built() {
+        if !width.is_built() || !lanes.is_built() {
             return Err(ImageError::LeftOut);
         }
         if (head >> 8) as u8 != lanes.code() {

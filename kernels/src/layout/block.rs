@@ -37,9 +37,10 @@ impl BlockShape {
         self.rows >= 1 && self.rows <= 0xffff && self.cols >= 1 && self.cols <= cols && group
     }
 
+    /// Returns the layout, of a width and lanes that the build has.
     #[inline(always)]
     pub(crate) const fn layout(self) -> &'static Layout {
-        &LAYOUTS[self.width as usize][self.lanes as usize]
+        &LAYOUTS[self.width.index()][self.lanes.index()]
     }
 
     /// Returns the rows of a strip: [`QUAD`] or [`STRIP`](super::STRIP).

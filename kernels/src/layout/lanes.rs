@@ -43,6 +43,37 @@ impl Lanes {
         if x_max <= Self::PAIRED_X_MAX && matches!(group, 0 | PAIRED_GROUP) { Self::Paired } else { Self::Single }
     }
 
+    /// Returns the feature of this crate with the kernels of these lanes.
+    #[cfg(feature = "writer")]
+    pub const fn feature(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Paired => "paired",
+        }
+    }
+
+    /// Returns `true` if this build has the kernels of these lanes.
+    pub(crate) const fn is_built(self) -> bool {
+        match self {
+            Self::Single => cfg!(feature = "single"),
+            Self::Paired => cfg!(feature = "paired"),
+        }
+    }
+
+    /// The lanes with entries in tables: the only ones of this build, otherwise all. (A writer packs others, too.)
+    pub(crate) const IN_TABLES: &'static [Self] = match (Self::Single.is_built(), Self::Paired.is_built()) {
+        _ if cfg!(feature = "writer") => &Self::ALL,
+        (true, false) => &[Self::Single],
+        (false, true) => &[Self::Paired],
+        _ => &Self::ALL,
+    };
+
+    /// Returns the lanes' index in a table. (No block has lanes that the build does not: `image::matrix` refuses it.)
+    #[inline(always)]
+    pub(crate) const fn index(self) -> usize {
+        if Self::IN_TABLES.len() == 1 { 0 } else { self as usize }
+    }
+
     /// Returns the code in a block record: 0 or 1.
     pub const fn code(self) -> u8 {
         match self {

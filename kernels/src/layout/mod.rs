@@ -91,11 +91,11 @@ pub use lanes::{Lanes, MAX_GROUP, is_group};
 #[cfg(feature = "writer")]
 pub use pack::{PackError, pack};
 pub(crate) use pow2::{div_down, div_up, round_up};
-#[cfg(any(feature = "writer", actq_fpu))]
-pub use table::LAYOUTS;
 pub use table::Layout;
 #[cfg(feature = "writer")]
 pub use table::StripLog;
+#[cfg(actq_fpu)]
+pub(crate) use table::layout;
 #[cfg(any(feature = "writer", not(actq_armv7em)))]
 pub(crate) use table::with_format;
 pub use width::Width;

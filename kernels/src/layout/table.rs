@@ -63,9 +63,13 @@ impl Layout {
 
 macro_rules! table {
     (() $($(#[$doc:meta])* $width:ident = $bits:literal if $feature:literal, $grid:ident: $single:path, $paired:path;)*) => {
-        /// Layouts by width and lanes. A table in memory takes fewer instructions than a branch for every constant.
-        pub static LAYOUTS: [[Layout; Lanes::ALL.len()]; Width::ALL.len()] =
-            [$([Layout::of::<$single>(), Layout::of::<$paired>()]),*];
+        /// Returns the layout of a width and lanes.
+        pub(crate) const fn layout(width: Width, lanes: Lanes) -> Layout {
+            match (width, lanes) {
+                $((Width::$width, Lanes::Single) => Layout::of::<$single>(),
+                (Width::$width, Lanes::Paired) => Layout::of::<$paired>(),)*
+            }
+        }
 
         /// Calls a function that is generic over the layout of `$shape`.
         #[cfg(any(feature = "writer", not(actq_armv7em)))]
@@ -84,3 +88,16 @@ macro_rules! table {
     };
 }
 registry!(table());
+
+/// Layouts by width and lanes. A table in memory takes fewer instructions than a branch for every constant.
+pub(super) static LAYOUTS: [[Layout; Lanes::IN_TABLES.len()]; Width::IN_TABLES.len()] = {
+    let mut layouts =
+        [[layout(Width::IN_TABLES[0], Lanes::IN_TABLES[0]); Lanes::IN_TABLES.len()]; Width::IN_TABLES.len()];
+    let mut i = 0;
+    while i < layouts.as_flattened().len() {
+        let (width, lanes) = (i / Lanes::IN_TABLES.len(), i % Lanes::IN_TABLES.len());
+        layouts[width][lanes] = layout(Width::IN_TABLES[width], Lanes::IN_TABLES[lanes]);
+        i += 1;
+    }
+    layouts
+};

@@ -63,6 +63,24 @@ enum Grid {
 }
 
 impl Width {
+    /// The widths with entries in tables: the only one of this build, otherwise all. (A writer packs others, too.)
+    pub(crate) const IN_TABLES: &'static [Self] = {
+        let (mut built, mut only, mut i) = (0, 0, 0);
+        while i < Self::ALL.len() {
+            if Self::ALL[i].is_built() {
+                (built, only) = (built + 1, i);
+            }
+            i += 1;
+        }
+        if built == 1 && !cfg!(feature = "writer") { Self::ALL.split_at(only).1.split_at(1).0 } else { &Self::ALL }
+    };
+
+    /// Returns the width's index in a table. (No block has a width that the build does not: `image::matrix` refuses it.)
+    #[inline(always)]
+    pub(crate) const fn index(self) -> usize {
+        if Self::IN_TABLES.len() == 1 { 0 } else { self as usize }
+    }
+
     /// Returns the level (weight divided by its scale) of `code`. Bits of `code` above the width are ignored.
     #[cfg(feature = "writer")]
     pub const fn level(self, code: u8) -> i32 {

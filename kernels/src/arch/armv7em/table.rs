@@ -44,30 +44,43 @@ pub(super) type Kernels = [Kernel; 2];
 /// A layout's kernels for row scales and for group scales.
 type Both = [Kernels; 2];
 
-/// Stands for the kernels of a width that the build leaves out. It does nothing: `image::matrix` refuses such blocks.
+/// Stands for the kernels that the build leaves out. It does nothing: `image::matrix` refuses such blocks.
 unsafe extern "C" fn left_out(_: *const u32, _: *const u32, _: *mut i32, _: usize, _: *const u32, _: usize, _: usize) {}
 
-/// Returns a width's kernels if the build has them.
-const fn built(width: Width, kernels: [Both; Lanes::ALL.len()]) -> [Both; Lanes::ALL.len()] {
-    if width.is_built() { kernels } else { [[[left_out; 2]; 2]; Lanes::ALL.len()] }
+/// Returns the kernels of a width and lanes that the build has.
+const fn built(width: Width, lanes: Lanes) -> Both {
+    let both: Both = match (width, lanes) {
+        _ if !width.is_built() || !lanes.is_built() => [[left_out; 2]; 2],
+        (Width::W2, Lanes::Single) => [[actq_w2; 2]; 2],
+        (Width::W2, Lanes::Paired) => {
+            [[actq_w2_paired_row, actq_w2_paired_row4], [actq_w2_paired_group, actq_w2_paired_group4]]
+        }
+        (Width::W3, Lanes::Single) => [[actq_w3; 2]; 2],
+        (Width::W3, Lanes::Paired) => [[actq_w3_paired_row; 2], [actq_w3_paired_group; 2]],
+        (Width::W4, Lanes::Single) => [[actq_w4; 2]; 2],
+        (Width::W4, Lanes::Paired) => {
+            [[actq_w4_paired_row, actq_w4_paired_row4], [actq_w4_paired_group, actq_w4_paired_group4]]
+        }
+        (Width::W8, Lanes::Single) => [[actq_w8; 2]; 2],
+        (Width::W8, Lanes::Paired) => [[actq_w8_paired_row; 2], [actq_w8_paired_group; 2]],
+    };
+    if cfg!(feature = "groups") { both } else { [both[0], [left_out; 2]] }
 }
 
 /// Kernels by width and lanes.
-static KERNELS: [[Both; Lanes::ALL.len()]; Width::ALL.len()] = [
-    built(
-        Width::W2,
-        [[[actq_w2; 2]; 2], [[actq_w2_paired_row, actq_w2_paired_row4], [actq_w2_paired_group, actq_w2_paired_group4]]],
-    ),
-    built(Width::W3, [[[actq_w3; 2]; 2], [[actq_w3_paired_row; 2], [actq_w3_paired_group; 2]]]),
-    built(
-        Width::W4,
-        [[[actq_w4; 2]; 2], [[actq_w4_paired_row, actq_w4_paired_row4], [actq_w4_paired_group, actq_w4_paired_group4]]],
-    ),
-    built(Width::W8, [[[actq_w8; 2]; 2], [[actq_w8_paired_row; 2], [actq_w8_paired_group; 2]]]),
-];
+static KERNELS: [[Both; Lanes::IN_TABLES.len()]; Width::IN_TABLES.len()] = {
+    let mut kernels = [[[[left_out as Kernel; 2]; 2]; Lanes::IN_TABLES.len()]; Width::IN_TABLES.len()];
+    let mut i = 0;
+    while i < Width::IN_TABLES.len() * Lanes::IN_TABLES.len() {
+        let (width, lanes) = (i / Lanes::IN_TABLES.len(), i % Lanes::IN_TABLES.len());
+        kernels[width][lanes] = built(Width::IN_TABLES[width], Lanes::IN_TABLES[lanes]);
+        i += 1;
+    }
+    kernels
+};
 
 /// Returns the kernels for blocks of this shape.
 #[inline(always)]
 pub(super) fn kernels(shape: BlockShape) -> Kernels {
-    KERNELS[shape.width as usize][shape.lanes as usize][usize::from(shape.group != 0)]
+    KERNELS[shape.width.index()][shape.lanes.index()][usize::from(shape.group != 0)]
 }

@@ -1,6 +1,6 @@
 //! The quantizer of every layout.
 
-use crate::layout::{LAYOUTS, Width, XLayout};
+use crate::layout::{Lanes, Width, XLayout, layout};
 
 macro_rules! quantize_kernels {
     ($($name:ident)*) => {
@@ -24,29 +24,31 @@ quantize_kernels!(actq_quantize0 actq_quantize1 actq_quantize2 actq_quantize3);
 
 /// Quantizers by the shift of the layout's activations.
 static QUANTIZERS: [Quantize; 4] = {
-    let mut quantizers: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
+    let all: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
+    // No layout of the build has the other shifts: any quantizer that it needs stands for them.
+    let mut quantizers = [all[shift_from(0)]; 4];
     let mut shift = 0;
     while shift < quantizers.len() {
-        if !is_used(shift as u8) {
-            // No layout of the build has this shift; single lanes always have a quantizer.
-            quantizers[shift] = actq_quantize0;
+        if shift_from(shift) == shift {
+            quantizers[shift] = all[shift];
         }
         shift += 1;
     }
     quantizers
 };
 
-/// Returns `true` if the build has a width with a layout of this shift.
-const fn is_used(shift: u8) -> bool {
-    let mut i = 0;
-    while i < Width::ALL.len() {
-        let [single, paired] = &LAYOUTS[i];
-        if Width::ALL[i].is_built() && (single.x.shift == shift || paired.x.shift == shift) {
-            return true;
+/// Returns the least shift, from `least` on, of a layout of this build; 0 if there is none.
+const fn shift_from(least: usize) -> usize {
+    let (mut found, mut i) = (usize::MAX, 0);
+    while i < Width::ALL.len() * Lanes::ALL.len() {
+        let (width, lanes) = (Width::ALL[i / Lanes::ALL.len()], Lanes::ALL[i % Lanes::ALL.len()]);
+        let shift = layout(width, lanes).x.shift as usize;
+        if width.is_built() && lanes.is_built() && shift >= least && shift < found {
+            found = shift;
         }
         i += 1;
     }
-    false
+    if found == usize::MAX { 0 } else { found }
 }
 
 /// Returns the quantizer for a layout with this shift.
@@ -65,10 +67,9 @@ const fn suits(x: &XLayout) -> bool {
 }
 
 const _: () = {
-    let layouts = LAYOUTS.as_flattened();
     let mut i = 0;
-    while i < layouts.len() {
-        assert!(suits(&layouts[i].x));
+    while i < Width::ALL.len() * Lanes::ALL.len() {
+        assert!(suits(&layout(Width::ALL[i / Lanes::ALL.len()], Lanes::ALL[i % Lanes::ALL.len()]).x));
         i += 1;
     }
 };
