@@ -7,7 +7,7 @@ use actq_kernels::{Head, StepError};
 
 use crate::image::{ActqImage, opened};
 use crate::memory::{addresses, all_apart, apart, check, put, seal, slice, slice_mut};
-use crate::status::{ActqStatus, Code, status};
+use crate::status::{ActqStatus, Code, Failure, status};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTH");
 
@@ -23,18 +23,18 @@ pub struct ActqHead {
 #[repr(C)]
 struct Running {
     seal: usize,
-    /// `true` from the begin of a step until its action is ready.
-    polling: bool,
     /// Addresses of the scratch memory and of the image.
     memory: [Range<usize>; 2],
     head: Head<'static, 'static>,
+    /// `true` from the begin of a step until its action is ready.
+    polling: bool,
 }
 
 const _: () = assert!(size_of::<Running>() <= size_of::<ActqHead>() && align_of::<Running>() <= align_of::<ActqHead>());
 
 impl Running {
     /// Requires that the caller's buffer shares no byte with this head, its scratch memory and its image.
-    fn apart_from<T>(&self, buffer: *const T, len: usize) -> Result<(), Code> {
+    fn apart_from<T>(&self, buffer: *const T, len: usize) -> Result<(), Failure> {
         if len > 0 {
             check(buffer, len)?;
         }
@@ -44,9 +44,9 @@ impl Running {
     }
 
     /// Checks an action's buffer. It is borrowed only when the action is ready: it may be the observation's, too.
-    fn check_action(&self, action: *mut f32, len: usize) -> Result<(), Code> {
+    fn check_action(&self, action: *mut f32, len: usize) -> Result<(), Failure> {
         if len != self.head.image().act_len() {
-            return Err(Code::Length);
+            return Err(Code::Length.into());
         }
         self.apart_from(action, len)
     }
@@ -56,9 +56,9 @@ impl Running {
     /// # Safety
     ///
     /// As [`slice`].
-    unsafe fn observation<'b>(&self, observation: *const f32, len: usize) -> Result<&'b [f32], Code> {
+    unsafe fn observation<'b>(&self, observation: *const f32, len: usize) -> Result<&'b [f32], Failure> {
         if len != self.head.image().obs_len() {
-            return Err(Code::ObservationLength);
+            return Err(Code::ObservationLength.into());
         }
         self.apart_from(observation, len)?;
         // SAFETY: as the caller promises.
@@ -71,7 +71,7 @@ impl Running {
 /// # Safety
 ///
 /// As [`slice_mut`].
-unsafe fn write(to: *mut f32, len: usize, action: &[f32]) -> Result<(), Code> {
+unsafe fn write(to: *mut f32, len: usize, action: &[f32]) -> Result<(), Failure> {
     // SAFETY: as the caller promises.
     let to = unsafe { slice_mut(to, len) }?;
     // The lengths are equal, which `copy_from_slice` would check again, with a panic.
@@ -85,13 +85,13 @@ unsafe fn write(to: *mut f32, len: usize, action: &[f32]) -> Result<(), Code> {
 ///
 /// `head` is null, misaligned, or valid for reads and writes, and nothing else uses it meanwhile; if it was initialized,
 /// the image's bytes and the scratch memory are still its own.
-unsafe fn with(head: *mut ActqHead, run: impl FnOnce(&mut Running) -> Result<(), Code>) -> ActqStatus {
+unsafe fn with(head: *mut ActqHead, run: impl FnOnce(&mut Running) -> Result<(), Failure>) -> ActqStatus {
     let place = head.cast::<Running>();
     // SAFETY: as the caller promises; a word is any bits.
     let found = unsafe { slice(place.cast::<usize>(), 1) };
     status(found.and_then(|found| {
         if found.first() != Some(&seal(place, MAGIC)) {
-            return Err(Code::NotInitialized);
+            return Err(Code::NotInitialized.into());
         }
         // SAFETY: only `actq_head_init` writes this seal, with a head after it, at this address.
         run(unsafe { &mut *place })
@@ -120,7 +120,7 @@ pub unsafe extern "C" fn actq_head_init(
         let new = Head::new(opened.image, unsafe { slice_mut(scratch, words) }?)?;
         let place = head.cast::<Running>();
         // SAFETY: valid as the words above.
-        unsafe { put(place, Running { seal: seal(place, MAGIC), polling: false, memory, head: new }) }
+        unsafe { put(place, Running { seal: seal(place, MAGIC), memory, head: new, polling: false }) }
     };
     status(init())
 }
@@ -169,7 +169,7 @@ pub unsafe extern "C" fn actq_step(
     unsafe {
         with(head, |running| {
             if running.polling {
-                return Err(Code::Polling);
+                return Err(Code::Polling.into());
             }
             running.check_action(action, action_len)?;
             let computed = running.head.step(running.observation(observation, observation_len)?)?;
@@ -213,7 +213,7 @@ pub unsafe extern "C" fn actq_poll(
         with(head, |running| {
             running.check_action(action, action_len)?;
             match running.head.poll(budget) {
-                Ok(Poll::Pending) => Err(Code::Pending),
+                Ok(Poll::Pending) => Err(Code::Pending.into()),
                 Ok(Poll::Ready(computed)) => {
                     write(action, action_len, computed)?;
                     running.polling = false;

@@ -6,7 +6,7 @@ use core::ops::Range;
 use actq_kernels::{Image, Port};
 
 use crate::memory::{addresses, all_apart, apart, check, put, seal, slice, slice_mut};
-use crate::status::{ActqStatus, Code, status};
+use crate::status::{ActqStatus, Code, Failure, status};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTI");
 
@@ -108,12 +108,12 @@ pub struct CCost {
 /// # Safety
 ///
 /// `image` is null, misaligned, or valid for reads; if it was opened, the image's bytes are as they were.
-pub(crate) unsafe fn opened(image: *const ActqImage) -> Result<Opened, Code> {
+pub(crate) unsafe fn opened(image: *const ActqImage) -> Result<Opened, Failure> {
     let image = image.cast::<Opened>();
     // SAFETY: as the caller promises; a word is any bits.
     let sealed = unsafe { slice(image.cast::<usize>(), 1) }?;
     if sealed.first() != Some(&seal(image, MAGIC)) {
-        return Err(Code::NotInitialized);
+        return Err(Code::NotInitialized.into());
     }
     // SAFETY: only `actq_image_open` writes this seal, after the image beside it.
     Ok(unsafe { *image })
@@ -145,7 +145,7 @@ pub unsafe extern "C" fn actq_image_open(image: *mut ActqImage, bytes: *const u8
 unsafe fn query<T>(
     image: *const ActqImage,
     out: *mut T,
-    get: impl FnOnce(Image<'static>) -> Result<T, Code>,
+    get: impl FnOnce(Image<'static>) -> Result<T, Failure>,
 ) -> ActqStatus {
     let query = || {
         // SAFETY: as the caller promises.
@@ -225,7 +225,7 @@ pub unsafe extern "C" fn actq_set_input(
         let opened = unsafe { opened(image) }?;
         let (structure, image) = (image, opened.image);
         if name.is_null() {
-            return Err(Code::Null);
+            return Err(Code::Null.into());
         }
         // SAFETY: it is not null; the caller promises a zero at its end.
         let name = unsafe { CStr::from_ptr(name) };
@@ -234,7 +234,7 @@ pub unsafe extern "C" fn actq_set_input(
             .find(|(_, port)| port.name.as_bytes() == name.to_bytes())
             .ok_or(Code::NoSuchPort)?;
         if count != port.len || len != image.obs_len() {
-            return Err(Code::Length);
+            return Err(Code::Length.into());
         }
         check(observation, len)?;
         let to = addresses(observation, len);

@@ -34,6 +34,10 @@ pub extern "C" fn actq_abi() -> u32 {
     ACTQ_ABI
 }
 
+// In the library for microcontrollers only: a host has its own.
+#[cfg(all(target_arch = "arm", feature = "panic-handler"))]
+core::arch::global_asm!(include_str!("memory.s"), options(raw));
+
 /// The kernels do not panic after an image's check, and nothing here does: this is never called, and stops the program
 /// if it is.
 #[cfg(feature = "panic-handler")]

@@ -3,21 +3,21 @@
 use core::mem::{align_of, size_of};
 use core::ops::Range;
 
-use crate::status::Code;
+use crate::status::{Code, Failure};
 
 /// Checks a pointer to `len` values.
-pub(crate) fn check<T>(pointer: *const T, len: usize) -> Result<(), Code> {
+pub(crate) fn check<T>(pointer: *const T, len: usize) -> Result<(), Failure> {
     if pointer.is_null() {
-        return Err(Code::Null);
+        return Err(Code::Null.into());
     }
     if !pointer.is_aligned() {
-        return Err(Code::Alignment);
+        return Err(Code::Alignment.into());
     }
     // The longest slice that Rust allows.
     let bytes = len.checked_mul(size_of::<T>()).filter(|bytes| isize::try_from(*bytes).is_ok());
     match bytes.and_then(|bytes| (pointer as usize).checked_add(bytes)) {
         Some(_) => Ok(()),
-        None => Err(Code::Length),
+        None => Err(Code::Length.into()),
     }
 }
 
@@ -26,7 +26,7 @@ pub(crate) fn check<T>(pointer: *const T, len: usize) -> Result<(), Code> {
 /// # Safety
 ///
 /// `pointer` is null, misaligned, or valid for reads of `len` initialized values that nothing writes while `'a` lasts.
-pub(crate) unsafe fn slice<'a, T: Copy>(pointer: *const T, len: usize) -> Result<&'a [T], Code> {
+pub(crate) unsafe fn slice<'a, T: Copy>(pointer: *const T, len: usize) -> Result<&'a [T], Failure> {
     if len == 0 {
         return Ok(&[]);
     }
@@ -41,7 +41,7 @@ pub(crate) unsafe fn slice<'a, T: Copy>(pointer: *const T, len: usize) -> Result
 ///
 /// `pointer` is null, misaligned, or valid for reads and writes of `len` values that nothing else uses while `'a`
 /// lasts. Any bits are a value of `T`.
-pub(crate) unsafe fn slice_mut<'a, T: Copy>(pointer: *mut T, len: usize) -> Result<&'a mut [T], Code> {
+pub(crate) unsafe fn slice_mut<'a, T: Copy>(pointer: *mut T, len: usize) -> Result<&'a mut [T], Failure> {
     if len == 0 {
         return Ok(&mut []);
     }
@@ -55,7 +55,7 @@ pub(crate) unsafe fn slice_mut<'a, T: Copy>(pointer: *mut T, len: usize) -> Resu
 /// # Safety
 ///
 /// `pointer` is null, misaligned, or valid for a write.
-pub(crate) unsafe fn put<T>(pointer: *mut T, value: T) -> Result<(), Code> {
+pub(crate) unsafe fn put<T>(pointer: *mut T, value: T) -> Result<(), Failure> {
     check(pointer, 1)?;
     // SAFETY: it is not null and aligned; the caller promises the rest.
     unsafe { pointer.write(value) };
@@ -69,12 +69,12 @@ pub(crate) fn addresses<T>(pointer: *const T, len: usize) -> Range<usize> {
 }
 
 /// Requires that two ranges share no byte.
-pub(crate) fn apart(one: &Range<usize>, other: &Range<usize>) -> Result<(), Code> {
-    if one.start < other.end && other.start < one.end { Err(Code::Overlap) } else { Ok(()) }
+pub(crate) fn apart(one: &Range<usize>, other: &Range<usize>) -> Result<(), Failure> {
+    if one.start < other.end && other.start < one.end { Err(Code::Overlap.into()) } else { Ok(()) }
 }
 
 /// Requires that no two of these ranges share a byte.
-pub(crate) fn all_apart(ranges: &[&Range<usize>]) -> Result<(), Code> {
+pub(crate) fn all_apart(ranges: &[&Range<usize>]) -> Result<(), Failure> {
     let mut rest = ranges;
     while let Some((one, others)) = rest.split_first() {
         others.iter().try_for_each(|other| apart(one, other))?;

@@ -1,6 +1,7 @@
 //! The codes that functions return.
 
 use core::ffi::{CStr, c_char};
+use core::num::NonZero;
 
 use actq_kernels::{HeadError, ImageError, SavedError, StepError};
 
@@ -147,40 +148,53 @@ codes! {
     NoSuchPort = 134, c"the image has no raw input or target of this name or number";
 }
 
-impl From<ImageError> for Code {
+/// The status of a call that failed: a [`Code`], or the number of the kernels' error, which a code has, too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Failure(NonZero<ActqStatus>);
+
+impl Failure {
+    const fn of(status: ActqStatus) -> Self {
+        match NonZero::new(status) {
+            Some(status) => Self(status),
+            // No error has this number.
+            None => Self(NonZero::<ActqStatus>::MIN),
+        }
+    }
+}
+
+impl From<Code> for Failure {
+    fn from(code: Code) -> Self {
+        Self::of(code as ActqStatus)
+    }
+}
+
+impl From<ImageError> for Failure {
     fn from(error: ImageError) -> Self {
-        Self::of(error.code())
+        Self::of(error.code().into())
     }
 }
 
-impl From<HeadError> for Code {
+impl From<HeadError> for Failure {
     fn from(error: HeadError) -> Self {
-        Self::of(error.code())
+        Self::of(error.code().into())
     }
 }
 
-impl From<SavedError> for Code {
+impl From<SavedError> for Failure {
     fn from(error: SavedError) -> Self {
-        Self::of(error.code())
+        Self::of(error.code().into())
     }
 }
 
-impl From<StepError> for Code {
+impl From<StepError> for Failure {
     fn from(error: StepError) -> Self {
-        Self::of(error.code())
-    }
-}
-
-impl Code {
-    /// Returns the code of an error of the kernels. A test asserts that each has one.
-    fn of(number: u8) -> Self {
-        Self::ALL.iter().copied().find(|code| *code as ActqStatus == number.into()).unwrap_or(Self::Damaged)
+        Self::of(error.code().into())
     }
 }
 
 /// Returns the status of an outcome.
-pub(crate) fn status(outcome: Result<(), Code>) -> ActqStatus {
-    outcome.err().unwrap_or(Code::Ok) as ActqStatus
+pub(crate) fn status(outcome: Result<(), Failure>) -> ActqStatus {
+    outcome.err().map_or(0, |failure| failure.0.get())
 }
 
 /// Returns a text for a status, as a string that ends in a zero; "unknown status" for any other number.

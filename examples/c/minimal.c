@@ -5,10 +5,10 @@
 static actq_image image;
 static actq_head head;
 static uint32_t scratch[POLICY_SCRATCH_WORDS];
+static float observation[POLICY_OBSERVATION_LEN];
+static float action[POLICY_ACTION_LEN];
 
 int main(void) {
-    float observation[POLICY_OBSERVATION_LEN] = {0};
-    float action[POLICY_ACTION_LEN];
     actq_status status = actq_image_open(&image, (const uint8_t *)policy_image, POLICY_IMAGE_BYTES);
     if (status == ACTQ_OK) {
         status = actq_head_init(&head, &image, scratch, POLICY_SCRATCH_WORDS);

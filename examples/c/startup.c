@@ -22,11 +22,12 @@ void reset(void) {
     *(volatile uint32_t *)0xe000ed88 |= 0xfu << 20;
     __asm__ volatile("dsb\n isb" ::: "memory");
 #endif
+    /* Volatile: otherwise the compiler makes calls of memcpy and memset of these loops. */
     const uint32_t *from = &data_load;
-    for (uint32_t *to = &data_start; to < &data_end;) {
+    for (volatile uint32_t *to = &data_start; to < &data_end;) {
         *to++ = *from++;
     }
-    for (uint32_t *to = &bss_start; to < &bss_end;) {
+    for (volatile uint32_t *to = &bss_start; to < &bss_end;) {
         *to++ = 0;
     }
     end(main());

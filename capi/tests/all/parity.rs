@@ -102,9 +102,10 @@ fn every_error_of_the_kernels_has_a_code() {
         // SAFETY: it returns a string that ends in a zero.
         unsafe { std::ffi::CStr::from_ptr(actq_status_text(status)) }.to_str().expect("text")
     };
+    let has_code = |number: u8| Code::ALL.iter().any(|code| *code as i32 == i32::from(number));
     for error in ImageError::ALL {
-        let code = Code::from(*error);
-        assert_eq!((code as i32, text(code as i32)), (error.code().into(), error.text()));
+        assert!(has_code(error.code()), "{error}");
+        assert_eq!(text(error.code().into()), error.text());
     }
     let steps = [
         StepError::ObservationLength { expected: 1, given: 0 },
@@ -117,7 +118,7 @@ fn every_error_of_the_kernels_has_a_code() {
         StepError::Stale,
         StepError::ObservationRange { index: 0 },
     ];
-    assert!(steps.iter().all(|error| Code::from(*error) as i32 == i32::from(error.code())));
+    assert!(steps.iter().all(|error| has_code(error.code())));
     let saved = [
         SavedError::Length { needed: 1, given: 0 },
         SavedError::Version,
@@ -125,9 +126,8 @@ fn every_error_of_the_kernels_has_a_code() {
         SavedError::Damaged,
         SavedError::Begun,
     ];
-    assert!(saved.iter().all(|error| Code::from(*error) as i32 == i32::from(error.code())));
-    let scratch = HeadError::ScratchTooSmall { needed: 1, given: 0 };
-    assert_eq!(Code::from(scratch) as i32, i32::from(scratch.code()));
+    assert!(saved.iter().all(|error| has_code(error.code())));
+    assert!(has_code(HeadError::ScratchTooSmall { needed: 1, given: 0 }.code()));
     assert_eq!([text(127), text(-2), text(i32::MIN)], ["unknown status"; 3]);
     assert!(Code::ALL.iter().all(|code| text(*code as i32) == code.text().to_str().expect("text")));
 }
