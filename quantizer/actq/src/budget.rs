@@ -21,6 +21,22 @@ pub enum Budget {
     Time(TimeLimit),
 }
 
+/// Shows the budget with its unit, as in "2.5 bits".
+impl fmt::Display for Budget {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Width(width) => write!(f, "width {}", width.bits()),
+            Self::BitsPerWeight(bits) => write!(f, "{bits} bits"),
+            Self::ImageBytes(bytes) => write!(f, "{bytes} bytes"),
+            Self::MaxNmse(nmse) => write!(f, "NMSE {nmse}"),
+            Self::Time(TimeLimit { milliseconds, image_bytes: None, .. }) => write!(f, "{milliseconds} ms"),
+            Self::Time(TimeLimit { milliseconds, image_bytes: Some(bytes), .. }) => {
+                write!(f, "{milliseconds} ms, {bytes} bytes")
+            }
+        }
+    }
+}
+
 /// The longest step, in milliseconds at a clock.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeLimit {

@@ -34,3 +34,4 @@ mod strict_json;
 #[cfg(test)]
 mod testing;
 pub mod text;
+pub mod units;

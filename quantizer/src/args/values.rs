@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use actq::methods::Effort;
+use actq::units;
 use actq_kernels::Width;
 use actq_kernels::layout::is_group;
 
@@ -40,13 +41,7 @@ pub(super) fn forced(text: &str) -> Result<(String, Width), String> {
 }
 
 pub(super) fn size(text: &str) -> Result<usize, String> {
-    let (digits, unit) = match text.char_indices().next_back() {
-        Some((at, 'M' | 'm')) => (&text[..at], 1024 * 1024),
-        Some((at, 'K' | 'k')) => (&text[..at], 1024),
-        _ => (text, 1),
-    };
-    let bytes = digits.parse().ok().and_then(|n: usize| n.checked_mul(unit)).filter(|n| *n > 0);
-    bytes.ok_or_else(|| "use a number of bytes, or of KiB followed by K, or of MiB followed by M".to_owned())
+    units::bytes(text).map_err(|error| error.to_string())
 }
 
 pub(super) fn group(text: &str) -> Result<usize, String> {
@@ -70,13 +65,6 @@ pub(super) fn minutes(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "use a number above 0 and at most 10080, a week".to_owned())
 }
 
-/// Parses a clock in Hz, as `168M`, `84000K` or `168000000`.
 pub(super) fn clock(text: &str) -> Result<f64, String> {
-    let (digits, unit) = match text.char_indices().next_back() {
-        Some((at, 'M' | 'm')) => (&text[..at], 1e6),
-        Some((at, 'K' | 'k')) => (&text[..at], 1e3),
-        _ => (text, 1.0),
-    };
-    let hertz = digits.parse().ok().map(|n: f64| n * unit).filter(|n| n.is_finite() && *n >= 1.0);
-    hertz.ok_or_else(|| "use a number of Hz, or of MHz followed by M".to_owned())
+    units::hertz(text).map_err(|error| error.to_string())
 }

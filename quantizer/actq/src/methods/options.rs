@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use actq_kernels::Width;
 use actq_kernels::layout::{GROUPS, is_group};
+use serde::{Deserialize, Serialize};
 
 use super::packing::{Activations, Packing};
 use super::quantized::Outcome;
@@ -113,7 +114,8 @@ impl PartialEq for dyn CustomMethod {
 }
 
 /// How long to learn, in units of the steps that a network of its size gets by default.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Effort {
     /// An eighth.
     Quick,
