@@ -1,10 +1,10 @@
 //! The command line.
 
-pub(crate) mod jobs;
+pub mod jobs;
 pub(crate) mod link;
 mod values;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use actq::methods::{Effort, Method};
 use actq_kernels::Width;
@@ -130,14 +130,16 @@ pub(crate) enum Command {
     Tune(TuneArgs),
     /// Compare methods at several budgets on held-out observations
     ///
-    /// A cell of the table holds the error (NMSE: mean squared error / variance of the actions, mean over dimensions)
-    /// and the true bits per weight, with scales and padding; "-" if even 2 bits exceed the budget. Every method uses
-    /// its default group size. Activations are int8; method distill takes int16 for matrices that profit from it. A
-    /// star marks the knee of the policy's best method.
+    /// A row of the table has an image's bytes, predicted milliseconds, error (NMSE: mean squared error / variance of the
+    /// actions, mean over dimensions) and true bits per weight, with scales and padding; "-" if no image is within the
+    /// budget. A star marks images of the frontier: no other image has fewer bytes and a smaller error. Every method uses
+    /// its default group size. Activations are int8; method distill takes int16 for matrices that profit from it.
     ///
-    /// With --store, the only POLICY_DIR is a spec (SPEC.toml) or a plan (the output of `actq plan`). Its jobs run on this
-    /// machine, as many at a time as there are cores. Results go into the store, and jobs whose results are there do not
-    /// run again: the same command resumes after any interruption. docs/SCALE.md documents specs and stores.
+    /// Images and measurements are jobs. They run on this machine, each in a process, as many at a time as there are
+    /// cores. With --store, results stay in that folder, and jobs whose results are there do not run again: the same
+    /// command resumes after any interruption. Instead of policies, it takes one spec (SPEC.toml) or plan (the output of
+    /// `actq plan`), which may have more: other budgets, seeds, closed-loop episodes. docs/SCALE.md documents specs and
+    /// stores.
     ///
     /// Example: actq sweep policies/ur3 policies/go1 --bpw 2.5,3,4 --svg errors.svg
     ///
@@ -145,8 +147,8 @@ pub(crate) enum Command {
     Sweep {
         #[command(flatten)]
         args: SweepArgs,
-        /// Methods to compare
-        #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,distill")]
+        /// Methods to compare [default: rtn,gptq,distill]
+        #[arg(long, value_name = "LIST", value_delimiter = ',')]
         methods: Vec<MethodArg>,
     },
     /// Print the jobs of a sweep, one JSON object a line
@@ -482,11 +484,11 @@ pub(crate) struct TuneArgs {
 /// Arguments of `actq sweep`, without the methods.
 #[derive(clap::Args, Debug)]
 pub struct SweepArgs {
-    /// The policy folders; with --store, one spec or plan
+    /// The policy folders; or one spec or plan, with --store
     #[arg(required = true)]
     pub(crate) policy_dirs: Vec<PathBuf>,
-    /// Budgets, in bits per weight of all weights
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "2,2.5,3,4", value_parser = positive)]
+    /// Budgets, in bits per weight of all weights [default: 2,2.5,3,4]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive)]
     pub(crate) bpw: Vec<f64>,
     /// A calibration recording: .npz, .npy or .safetensors, or a folder of them; may be repeated [default: calib.* in
     /// POLICY_DIR]
@@ -495,37 +497,74 @@ pub struct SweepArgs {
     /// The held-out recording to measure on [default: heldout.* in POLICY_DIR]
     #[arg(long, value_name = "FILE")]
     pub(crate) heldout: Option<PathBuf>,
-    /// The processor's clock for predicted times, in Hz or as 168M
-    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = clock)]
-    pub(crate) clock: f64,
-    /// Draw the error over bytes and over predicted milliseconds as SVG, and mark the knee of the best method
+    /// The processor's clock for predicted times, in Hz or as 168M [default: 168M]
+    #[arg(long, value_name = "HZ", value_parser = clock)]
+    pub(crate) clock: Option<f64>,
+    /// Draw errors, success and the frontiers over bytes and over predicted milliseconds as SVG, and mark the knee of the
+    /// best method
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
-    /// Write bytes, milliseconds, errors, bits and allocations as JSON: an array with one object for each policy
+    /// Write bytes, cycles, errors, bits, allocations and scores as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
     #[command(flatten)]
-    pub(crate) learn: LearnArgs,
+    pub(crate) distill: DistillArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
     #[command(flatten)]
     pub(crate) pool: PoolArgs,
 }
 
+impl SweepArgs {
+    /// Returns `true` if a spec or plan is given instead of policies.
+    pub fn has_spec(&self) -> bool {
+        self.spec().is_some()
+    }
+
+    /// Returns the spec or plan that is given instead of policies.
+    pub(crate) fn spec(&self) -> Option<&Path> {
+        let is_spec = |path: &&PathBuf| path.extension().is_some_and(|ending| ending == "toml" || ending == "jsonl");
+        self.policy_dirs.iter().find(is_spec).map(PathBuf::as_path)
+    }
+
+    /// Names the given options that a spec has keys for.
+    pub(crate) fn of_a_spec(&self) -> Vec<&'static str> {
+        let Self { bpw, calib, heldout, clock, distill: DistillArgs { effort, steps, relative }, run, .. } = self;
+        let given = [
+            ("--bpw", !bpw.is_empty()),
+            ("--calib", !calib.is_empty()),
+            ("--heldout", heldout.is_some()),
+            ("--clock", clock.is_some()),
+            ("--effort", *effort != Effort::Default),
+            ("--steps", steps.is_some()),
+            ("--relative", *relative),
+            ("--seed", run.seed != 1),
+        ];
+        given.into_iter().filter(|(_, is_given)| *is_given).map(|(name, _)| name).collect()
+    }
+}
+
 /// Options of distillation, which also ends when the error no longer falls.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct LearnArgs {
+    #[command(flatten)]
+    pub(crate) distill: DistillArgs,
+    /// The most minutes of distillation, instead of the default steps; the image then depends on the machine's speed
+    #[arg(long, value_name = "X", value_parser = minutes, conflicts_with = "effort")]
+    pub(crate) minutes: Option<f64>,
+}
+
+/// Options of distillation by which an image does not depend on the machine.
+#[derive(clap::Args, Clone, Debug)]
+pub(crate) struct DistillArgs {
     /// How long to learn: quick (an eighth of the steps), default, or thorough (2.5 times the steps)
-    #[arg(long, value_name = "E", default_value = "default", value_parser = effort, conflicts_with_all = ["steps", "minutes"])]
+    #[arg(long, value_name = "E", default_value = "default", value_parser = effort, conflicts_with = "steps")]
     pub(crate) effort: Effort,
     /// The most steps of distillation; 0 = two-sided error feedback instead, which takes seconds and gives a larger
     /// error at few bits [default: by the number of weights, 8000 for 200 thousand, recurrent policies 4000, heads
     /// with denoising steps 5000]
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<usize>,
-    /// The most minutes of distillation, instead of the default steps; the image then depends on the machine's speed
-    #[arg(long, value_name = "X", value_parser = minutes)]
-    pub(crate) minutes: Option<f64>,
     /// Weigh errors relative to the action's size, more than is the default for feed-forward policies. Use it for a
     /// robot that holds its goal by small actions: it gets closer to the goal. The held-out error rises, as wide
     /// movements count most in it

@@ -10,7 +10,7 @@ pub(crate) mod eval;
 pub mod export_c;
 pub(crate) mod import;
 pub(crate) mod inspect;
-pub(crate) mod jobs;
+pub mod jobs;
 pub(crate) mod link;
 pub mod quantize;
 pub(crate) mod serve;

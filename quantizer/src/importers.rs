@@ -39,9 +39,14 @@ pub fn learned(policy: &Policy, files: &[PathBuf]) -> Result<Option<Learned>> {
     if files.is_empty() {
         return Ok(Learned::load(policy, files)?);
     }
-    let sizes = recorded_sizes(policy);
-    let parts = files.iter().map(|file| Dataset::load(file, sizes)).collect::<actq::error::Result<Vec<_>>>()?;
-    learned_from(policy, parts).map(Some)
+    let mut parts = files.iter().map(|file| recorded(policy, file)).collect::<actq::error::Result<Vec<_>>>()?;
+    Ok(Some(Learned::join(&mut parts, &policy.graph)?))
+}
+
+/// Reads a recording that a user made for a policy, as what its networks read.
+pub(crate) fn recorded(policy: &Policy, file: &Path) -> actq::error::Result<Dataset> {
+    let recording = Dataset::load(file, recorded_sizes(policy))?;
+    if policy.around.is_some() { observed(&policy.dir, &recording) } else { Ok(recording) }
 }
 
 /// Returns the sizes of recordings that a user makes for a policy: those of raw values, if it has a description.

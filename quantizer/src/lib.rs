@@ -25,6 +25,7 @@ use actq_jobs::error::{AGAIN, JobError};
 use anyhow::Result;
 
 use args::{Command, MethodArg};
+use commands::jobs::host::Command as Host;
 use commands::{bundle, eval, import, inspect, jobs, link, quantize, sign, sweep, tune};
 use outputs::unfinished;
 
@@ -69,11 +70,11 @@ fn run_command(command: &Command) -> Result<()> {
         Command::Deploy(args) => commands::deploy::run(args),
         Command::Tune(args) => tune::run(args),
         Command::Plan(args) => jobs::plan::run(args),
-        Command::Job(args) => jobs::job::run(args),
+        Command::Job(args) => jobs::job::run(args, &Host),
         Command::Merge(args) => jobs::merge::run(args),
-        Command::Sweep { args, .. } if args.pool.store.is_some() => jobs::pool::run(args),
         Command::Sweep { args, methods } => {
-            sweep::run(args, &methods.iter().map(|method| method.method()).collect::<Result<Vec<_>>>()?)
+            let name = |method: &MethodArg| Ok(method.method()?.to_string());
+            sweep::run(args, &methods.iter().map(name).collect::<Result<Vec<_>>>()?, &Host)
         }
         Command::Serve(args) => commands::serve::run(args),
         Command::Link(args) => link::run(args),

@@ -3,6 +3,7 @@
 pub mod constants;
 pub mod deployment;
 pub mod export;
+pub mod frontiers;
 pub mod imported;
 pub mod inspect;
 pub mod learned;
@@ -12,7 +13,6 @@ pub mod notes;
 pub mod plot;
 pub mod progress;
 pub mod quantized;
-pub mod sweep;
 pub mod table;
 pub mod time;
 pub mod tuned;

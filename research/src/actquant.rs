@@ -156,8 +156,9 @@ fn floored(importance: &Array2<f32>) -> Vec<f64> {
 mod tests {
     use actq::budget::Budget;
     use actq::data::Recordings;
-    use actq::methods::{Effort, Method, scale};
-    use actq::pipeline::sweep::{SweepPlan, run};
+    use actq::measure::eval;
+    use actq::methods::{Method, scale};
+    use actq::pipeline::Quantizer;
     use actq::policy::Policy;
 
     use super::*;
@@ -176,20 +177,18 @@ mod tests {
         let with_actions = [5, 6].map(|seed| testing::dataset(&policy.graph, seed, 20));
         let without = with_actions.clone().map(|recording| Dataset { action: None, ..recording });
         let nmse = |[calib, heldout]: [Dataset; 2]| {
-            let plan = SweepPlan {
-                policy: &policy,
-                recordings: Recordings { calib: Some(calib), heldout: Some(heldout) },
-                methods: &[Method::custom(ActQuant(Choices::default()))],
-                budgets: &[50.0, 100.0],
-                effort: Effort::Default,
-                clock_hz: 168e6,
-                steps: None,
-                minutes: None,
-                relative: false,
-                seed: 1,
+            let method = Method::custom(ActQuant(Choices::default()));
+            let mut recordings = Recordings { calib: Some(calib), heldout: Some(heldout) };
+            recordings.fill_actions(&policy.graph);
+            let quantizer = Quantizer::new(&policy, &recordings, method.clone(), None, |_| {}).expect("statistics");
+            let measured = |bits| {
+                let options = Options { group: 32, ..Options::new(method.clone(), Budget::BitsPerWeight(bits)) };
+                let made = quantizer.quantize(&options, ()).ok()?;
+                let (buffer, heldout) = (made.buffer(), recordings.heldout.as_ref()?);
+                let image = buffer.image(std::path::Path::new("image in memory")).expect("an image");
+                Some(eval::evaluate(image, heldout).expect("an error").nmse)
             };
-            let points = run(plan, ()).expect("a sweep").curves.remove(0).points;
-            points.into_iter().map(|point| point.map(|point| point.report.nmse)).collect::<Vec<_>>()
+            [50.0, 100.0].map(measured)
         };
         let measured = nmse(with_actions);
         assert!(measured.iter().any(Option::is_some), "{measured:?}");

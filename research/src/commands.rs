@@ -3,7 +3,9 @@
 use actq::budget::Rate;
 use actq::methods::Method;
 use actq::pipeline::{QuantizedPolicy, Quantizer};
+use actq_cli::args::jobs::JobArgs;
 use actq_cli::args::{QuantizeArgs, SweepArgs};
+use actq_cli::commands::jobs::job;
 use actq_cli::commands::{quantize, sweep};
 use actq_cli::report::table::table;
 use anyhow::{Result, ensure};
@@ -11,6 +13,7 @@ use clap::{Args, ValueEnum};
 
 use crate::actquant::choices::Choices;
 use crate::actquant::{ActQuant, ActionStatistics};
+use crate::host::Research;
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum MethodArg {
@@ -25,6 +28,9 @@ enum MethodArg {
     #[value(alias = "best")]
     Distill,
 }
+
+/// The methods that a sweep compares by default.
+const ALL: [MethodArg; 4] = [MethodArg::Rtn, MethodArg::Gptq, MethodArg::Actquant, MethodArg::Distill];
 
 /// The choices that the paper of ActQuant leaves open.
 #[derive(Args, Debug)]
@@ -108,8 +114,8 @@ impl Quantize {
 pub struct Sweep {
     #[command(flatten)]
     sweep: SweepArgs,
-    /// Methods to compare
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "rtn,gptq,actquant,distill")]
+    /// Methods to compare [default: rtn,gptq,actquant,distill]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
     methods: Vec<MethodArg>,
     #[command(flatten)]
     choices: ActQuantArgs,
@@ -118,7 +124,27 @@ pub struct Sweep {
 impl Sweep {
     /// Quantizes policies by several methods at several budgets and compares the errors.
     pub fn run(&self) -> Result<()> {
-        sweep::run(&self.sweep, &self.choices.methods(&self.methods)?)
+        // A spec names its methods itself.
+        let methods = match (&self.methods[..], self.sweep.has_spec()) {
+            ([], true) => Vec::new(),
+            ([], false) => self.choices.methods(&ALL)?,
+            (named, _) => self.choices.methods(named)?,
+        };
+        sweep::run(&self.sweep, &methods.iter().map(Method::to_string).collect::<Vec<_>>(), &Research)
+    }
+}
+
+/// `actq job` with the methods and comparisons of this crate.
+#[derive(Args, Debug)]
+pub struct Job {
+    #[command(flatten)]
+    job: JobArgs,
+}
+
+impl Job {
+    /// Runs one job, and puts its result into a store.
+    pub fn run(&self) -> Result<()> {
+        job::run(&self.job, &Research)
     }
 }
 

@@ -4,6 +4,7 @@
 pub mod actquant;
 pub mod commands;
 pub mod compare;
+pub mod host;
 pub mod kquants;
 // The library's own, which it compiles for its unit tests alone.
 #[cfg(test)]

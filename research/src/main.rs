@@ -4,7 +4,7 @@
 
 use std::process::ExitCode;
 
-use actq_research::commands::{Quantize, Sweep};
+use actq_research::commands::{Job, Quantize, Sweep};
 use actq_research::compare::{self, Plan};
 use clap::Parser;
 
@@ -16,6 +16,8 @@ enum Command {
     Quantize(Quantize),
     /// Compare methods at several budgets, as `actq sweep` does, with actquant among the methods
     Sweep(Sweep),
+    /// Run one job of a sweep, as `actq job` does; `sweep` starts it
+    Job(Job),
     /// Compare the methods at equal budgets: held-out error, true bits, closed-loop success
     ///
     /// The policies are the UR3 policy and, if ACTQ_SHARED names their folder, the shared ones. Their tasks run in
@@ -30,6 +32,7 @@ fn main() -> ExitCode {
     let plan = match Command::parse() {
         Command::Quantize(command) => return actq_cli::run_work(|| command.run()),
         Command::Sweep(command) => return actq_cli::run_work(|| command.run()),
+        Command::Job(command) => return actq_cli::run_work(|| command.run()),
         Command::Compare(plan) => plan,
     };
     match compare::run(&plan) {

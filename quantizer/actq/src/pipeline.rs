@@ -8,7 +8,6 @@ mod quantizer;
 mod revision;
 mod search;
 pub mod stats;
-pub mod sweep;
 mod time;
 mod tries;
 pub mod tune;

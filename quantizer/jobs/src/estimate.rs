@@ -5,8 +5,6 @@ use actq::graph::Graph;
 use actq::methods::distill::schedule::most_steps;
 use actq::methods::{Effort, Method};
 
-use crate::spec::Spec;
-
 /// Seconds of a job that does almost nothing: the start of the process, and reading.
 const LEAST_SECONDS: f64 = 0.02;
 /// Seconds of a weight: rounding and packing it; with a recording also its statistics; with two-sided error feedback.
@@ -25,12 +23,12 @@ const WEIGHT: u64 = 160;
 const RECORDINGS: u64 = 4;
 
 /// Returns the seconds of a job that makes an image.
-pub(crate) fn making(graph: &Graph, method: &Method, spec: &Spec) -> f64 {
+pub fn making(graph: &Graph, method: &Method, steps: Option<usize>, effort: Effort) -> f64 {
     let weights = graph.weights() as f64;
     let work = match method {
         Method::Rtn => ROUNDING,
         Method::Distill => {
-            let steps = spec.steps.unwrap_or_else(|| most_steps(graph, Effort::Default));
+            let steps = steps.unwrap_or_else(|| most_steps(graph, effort));
             if steps == 0 { FEEDBACK } else { STATISTICS + steps as f64 * STEP }
         }
         Method::Gptq | Method::Custom(_) => STATISTICS,
@@ -39,16 +37,16 @@ pub(crate) fn making(graph: &Graph, method: &Method, spec: &Spec) -> f64 {
 }
 
 /// Returns the seconds of a measurement on this many observations.
-pub(crate) fn evaluating(graph: &Graph, observations: usize) -> f64 {
+pub fn evaluating(graph: &Graph, observations: usize) -> f64 {
     LEAST_SECONDS + graph.weights() as f64 * graph.denoising_steps().max(1) as f64 * observations as f64 * OBSERVATION
 }
 
 /// Returns the memory of a job, in MiB, with `recordings` bytes of recordings.
-pub(crate) fn memory_mib(graph: &Graph, recordings: u64) -> u64 {
+pub fn memory_mib(graph: &Graph, recordings: u64) -> u64 {
     (PROCESS + WEIGHT * graph.weights() as u64 + RECORDINGS * recordings) >> 20
 }
 
 /// Seconds of a job that merges this many results.
-pub(crate) fn merging(results: usize) -> f64 {
+pub fn merging(results: usize) -> f64 {
     LEAST_SECONDS + 1e-4 * results as f64
 }

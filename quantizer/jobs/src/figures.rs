@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use actq::measure::eval::ErrorSums;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use crate::job::Episodes;
+use crate::work::Episodes;
 
 /// An image.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -53,6 +54,26 @@ pub struct Driven {
     pub numbers: BTreeMap<String, f64>,
     /// SHA-256 of the observations, in `ADDRESS.npz`, if they were to be kept.
     pub recording: Option<String>,
+}
+
+/// What a job of kind custom has found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CustomResult {
+    /// The result.
+    pub value: Value,
+    /// The file beside it.
+    pub file: Option<KeptFile>,
+}
+
+/// A file beside the result of a job of kind custom.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KeptFile {
+    /// Ending of its name.
+    pub ending: String,
+    /// SHA-256 of its content.
+    pub sha256: String,
 }
 
 impl Driven {

@@ -3,12 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use actq::data::{Dataset, Sizes};
-use actq::error::Result;
+use actq::error::{Error, Result};
 use actq::methods::Method;
 use actq::pipeline::driven::DriveOutcome;
 use actq::policy::Policy;
+use serde_json::Value;
 
 use crate::error::JobError;
+use crate::job::Job;
+use crate::work::Custom;
 
 /// The program that runs the jobs.
 pub trait Host {
@@ -21,6 +24,13 @@ pub trait Host {
 
     /// Lists the files that a policy may be read from, without recordings. They need not exist.
     fn files(&self, policy: &Path) -> Vec<PathBuf>;
+
+    /// Reads a recording that a user made for a policy, as what its networks read.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be read, or does not fit the policy.
+    fn recorded(&self, policy: &Policy, recording: &Path) -> Result<Dataset>;
 
     /// Returns a method by its name.
     ///
@@ -42,6 +52,42 @@ pub trait Host {
     ///
     /// If the command cannot be started or fails.
     fn drive(&self, rollout: &Rollout<'_>) -> Result<Rolled, JobError>;
+
+    /// Does the work of a job of kind custom, with the results that it needs, in its order. The last argument receives
+    /// the present work and the share of it that is done.
+    ///
+    /// # Errors
+    ///
+    /// If this program has no work of that name, as by default; if it fails.
+    fn custom(
+        &self,
+        job: &Job,
+        work: &Custom,
+        _needs: &[Needed],
+        _watch: &mut dyn FnMut(&str, f64),
+    ) -> Result<Found, JobError> {
+        let text =
+            format!("{:?} is no work of this command; run {:?} by the command that planned it", work.name, job.title);
+        Err(JobError::never(Error::input(text)))
+    }
+}
+
+/// The result of a job of kind custom, for one that needs it.
+#[derive(Debug)]
+pub struct Needed {
+    /// The result.
+    pub value: Value,
+    /// The file beside it, if it has one.
+    pub file: Option<PathBuf>,
+}
+
+/// The result of a job of kind custom.
+#[derive(Debug)]
+pub struct Found {
+    /// The result: the same for every try, on every machine.
+    pub value: Value,
+    /// A file that is kept beside it, with the ending of its name.
+    pub file: Option<(&'static str, Vec<u8>)>,
 }
 
 /// Closed-loop episodes of an image.

@@ -3,13 +3,17 @@
 use std::path::PathBuf;
 
 use actq::error::{Context as _, Result, ensure};
+use actq::pipeline::REVISION;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::digest::{is_digest, of_bytes, of_file};
+use crate::work::Work;
 
-/// The version that results depend on: that of this package.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// Returns the version that results depend on: that of this package, and the revision of its images.
+pub fn version() -> String {
+    format!("{}+{REVISION}", env!("CARGO_PKG_VERSION"))
+}
 
 /// A job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,175 +74,14 @@ pub struct Input {
 pub enum Role {
     /// A file that the policy is read from.
     Policy,
-    /// The recording that is learned from.
+    /// The recording beside the policy, which is learned from.
     Calib,
+    /// A recording that a user made, which is learned from.
+    Recorded,
     /// The recording that errors are measured on.
     Heldout,
     /// A file that the drive command depends on.
     Command,
-}
-
-/// The work of a job.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", content = "options", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Work {
-    /// Makes an image.
-    Quantize(Make),
-    /// Measures an image on episodes of the held-out recording.
-    Evaluate(Evaluate),
-    /// Runs closed-loop episodes of an image.
-    Drive(Drive),
-    /// Makes an image that also learns from earlier images' rollouts.
-    Learn(Learn),
-    /// Puts the results of a plan into one.
-    Merge(Merge),
-}
-
-/// An image to make.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Make {
-    /// The policy's path, as importers read it; only its last part is part of the address.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub policy: Option<PathBuf>,
-    /// The method's name.
-    pub method: String,
-    /// Budget in bits per weight.
-    pub bpw: f64,
-    /// Most steps of distillation; `None`: chosen for the network.
-    pub steps: Option<usize>,
-    /// `true` if errors are weighed relative to the action's size.
-    pub relative: bool,
-    /// Seed of all random numbers.
-    pub seed: u64,
-}
-
-/// A range of episodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Episodes {
-    /// Seed of the first episode; of a recording, its number.
-    pub first: u64,
-    /// Number of episodes.
-    pub count: u64,
-}
-
-/// A measurement on the held-out recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Evaluate {
-    /// Address of the image's job.
-    pub image: String,
-    /// The policy's path; see [`Make::policy`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub policy: Option<PathBuf>,
-    /// Episodes of the recording.
-    pub episodes: Episodes,
-}
-
-/// Closed-loop episodes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Drive {
-    /// Address of the image's job.
-    pub image: String,
-    /// The policy's path; see [`Make::policy`].
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub policy: Option<PathBuf>,
-    /// Folder that the command runs in; not part of the address.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub folder: Option<PathBuf>,
-    /// Command line for `sh -c`.
-    pub command: String,
-    /// Seeds of the episodes.
-    pub seeds: Episodes,
-    /// `true` if the observations are kept to learn from.
-    pub record: bool,
-}
-
-/// An image of an on-policy round.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Learn {
-    /// The image.
-    pub make: Make,
-    /// The round, from 1.
-    pub round: usize,
-    /// Addresses of the drive jobs whose recordings are learned from, in order.
-    pub recordings: Vec<String>,
-}
-
-/// Results to merge.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Merge {
-    /// Names of the policies.
-    pub policies: Vec<String>,
-    /// Images, in the order of the tables.
-    pub rows: Vec<Row>,
-}
-
-/// One image's jobs.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Row {
-    /// Index of its policy in [`Merge::policies`].
-    pub policy: usize,
-    /// The method's name.
-    pub method: String,
-    /// Budget in bits per weight.
-    pub bpw: f64,
-    /// Seed.
-    pub seed: u64,
-    /// The on-policy round; 0 without.
-    pub round: usize,
-    /// Address of the job that makes the image.
-    pub image: String,
-    /// Addresses of its evaluations.
-    pub evaluations: Vec<String>,
-    /// Addresses of its closed-loop episodes.
-    pub drives: Vec<String>,
-}
-
-impl Work {
-    /// Returns the name of the kind.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            Self::Quantize(_) => "quantize",
-            Self::Evaluate(_) => "evaluate",
-            Self::Drive(_) => "drive",
-            Self::Learn(_) => "learn",
-            Self::Merge(_) => "merge",
-        }
-    }
-
-    /// Returns the addresses of the jobs whose results are read, each one time.
-    pub fn deps(&self) -> Vec<String> {
-        let mut deps: Vec<String> = match self {
-            Self::Quantize(_) => Vec::new(),
-            Self::Evaluate(Evaluate { image, .. }) | Self::Drive(Drive { image, .. }) => vec![image.clone()],
-            Self::Learn(learn) => learn.recordings.clone(),
-            Self::Merge(merge) => {
-                let of_row = |row: &Row| [&[row.image.clone()][..], &row.evaluations, &row.drives].concat();
-                merge.rows.iter().flat_map(of_row).collect()
-            }
-        };
-        deps.sort_unstable();
-        deps.dedup();
-        deps
-    }
-
-    /// Returns the work without paths, which may differ between machines.
-    fn without_paths(&self) -> Self {
-        let mut work = self.clone();
-        match &mut work {
-            Self::Quantize(make) | Self::Learn(Learn { make, .. }) => make.policy = None,
-            Self::Evaluate(evaluate) => evaluate.policy = None,
-            Self::Drive(drive) => (drive.policy, drive.folder) = (None, None),
-            Self::Merge(_) => (),
-        }
-        work
-    }
 }
 
 impl Input {
@@ -261,7 +104,7 @@ pub(crate) fn address(work: &Work, inputs: &[Input]) -> Result<String> {
         files.push((input.role, name, &input.sha256));
     }
     // The fields are serialized in the order of their declaration.
-    Ok(of_bytes(serde_json::to_string(&("actq-job-1", VERSION, work.without_paths(), files))?.as_bytes()))
+    Ok(of_bytes(serde_json::to_string(&("actq-job-1", version(), work.without_paths(), files))?.as_bytes()))
 }
 
 impl From<Job> for Line {
@@ -269,7 +112,7 @@ impl From<Job> for Line {
         let Job { address, title, work, inputs, deps, stage, cpus, memory_mib, seconds } = job;
         let mut value = serde_json::to_value(&work).unwrap_or_default();
         let options = value.get_mut("options").map(Value::take).unwrap_or_default();
-        let (kind, version) = (work.kind().to_owned(), VERSION.to_owned());
+        let (kind, version) = (work.kind().to_owned(), self::version());
         Self { kind, title, address, version, stage, options, inputs, deps, cpus, memory_mib, seconds }
     }
 }
@@ -287,8 +130,9 @@ impl Job {
     fn of_line(line: Line) -> Result<Self> {
         let Line { kind, title, address, version, stage, options, inputs, deps, cpus, memory_mib, seconds } = line;
         ensure!(
-            version == VERSION,
-            "job {title:?} was planned by version {version} of actq, and this is {VERSION}; plan again, or use that version"
+            version == self::version(),
+            "job {title:?} was planned by version {version} of actq, and this is {}; plan again, or use that version",
+            self::version()
         );
         let minutes = options.get("minutes").or(options.get("make").and_then(|make| make.get("minutes")));
         ensure!(

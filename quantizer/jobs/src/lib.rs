@@ -9,8 +9,9 @@
 
 mod digest;
 pub mod error;
-mod estimate;
+pub mod estimate;
 pub mod figures;
+pub mod frontier;
 pub mod host;
 pub mod job;
 pub mod merged;
@@ -19,5 +20,7 @@ pub mod plan;
 pub mod record;
 pub mod run;
 pub mod schedule;
+mod source;
 pub mod spec;
 pub mod store;
+pub mod work;

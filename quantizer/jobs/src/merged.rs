@@ -1,16 +1,18 @@
 //! The results of a plan as one.
 
+use actq::budget::Budget;
 use actq::measure::eval::ErrorReport;
-use actq::measure::time::CLOCK;
-use actq::pipeline::sweep::{Curve, Point, Sweep, knee};
 use serde::{Deserialize, Serialize};
 
 use crate::figures::{Driven, Made};
+use crate::frontier::{Curve, frontier, knee};
 
 /// The results of a plan.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Merged {
+    /// Clock of all predicted times in Hz, of a Cortex-M4 with FPU and memory that never waits.
+    pub clock_hz: f64,
     /// The policies, in the order of the spec.
     pub policies: Vec<MergedPolicy>,
 }
@@ -27,6 +29,9 @@ pub struct MergedPolicy {
     pub frontier: Vec<usize>,
     /// The same for bytes and the share of successful episodes; empty without.
     pub success_frontier: Vec<usize>,
+    /// Index of the image after which a further byte gains least, of the curve that has the lowest error at most
+    /// budgets.
+    pub knee: Option<usize>,
 }
 
 /// One image.
@@ -35,8 +40,8 @@ pub struct MergedPolicy {
 pub struct MergedImage {
     /// The method's name.
     pub method: String,
-    /// Allowed bits per weight.
-    pub budget: f64,
+    /// What the image may take.
+    pub budget: Budget,
     /// Seed.
     pub seed: u64,
     /// The on-policy round; 0 without.
@@ -76,6 +81,11 @@ impl Figures {
         Self { image, nmse, worst_nmse, max_abs, observations, driven, interval }
     }
 
+    /// Returns the predicted milliseconds of a step.
+    pub fn milliseconds(&self, clock_hz: f64) -> f64 {
+        1e3 * self.image.cycles as f64 / clock_hz
+    }
+
     /// Returns the share of successful episodes.
     pub fn success(&self) -> Option<f64> {
         let driven = self.driven.as_ref()?;
@@ -95,59 +105,33 @@ fn wilson(successes: f64, trials: f64) -> [f64; 2] {
 }
 
 impl MergedPolicy {
-    /// Begins without images.
-    pub(crate) fn of(name: &str) -> Self {
-        Self { policy: name.to_owned(), images: Vec::new(), frontier: Vec::new(), success_frontier: Vec::new() }
+    /// Takes the images of a policy.
+    pub(crate) fn new(policy: &str, images: Vec<MergedImage>) -> Self {
+        let frontier = frontier_of(&images, |figures| Some(figures.nmse));
+        let success_frontier = frontier_of(&images, |figures| figures.success().map(|share| -share));
+        let mut merged = Self { policy: policy.to_owned(), images, frontier, success_frontier, knee: None };
+        merged.knee = merged.find_knee();
+        merged
     }
 
-    /// Finds both frontiers of the images.
-    pub(crate) fn find_frontiers(&mut self) {
-        self.frontier = self.frontier_of(|figures| Some(figures.nmse));
-        self.success_frontier = self.frontier_of(|figures| figures.success().map(|share| -share));
+    /// Returns the images of each curve, by its name, in the order of the plan: one curve for each method, seed and
+    /// on-policy round.
+    pub fn curves(&self) -> Vec<(String, Vec<&MergedImage>)> {
+        let named = self.named().into_iter();
+        named.map(|(name, images)| (name, images.into_iter().map(|i| &self.images[i]).collect())).collect()
     }
 
-    /// Returns the images that no other one beats in bytes and `cost`. Of equal ones, the first counts.
-    fn frontier_of(&self, cost: impl Fn(&Figures) -> Option<f64>) -> Vec<usize> {
-        let of = |(i, image): (usize, &MergedImage)| {
-            let figures = image.made.as_ref()?;
-            Some((figures.image.bytes, cost(figures)?, i))
-        };
-        let mut points: Vec<(usize, f64, usize)> = self.images.iter().enumerate().filter_map(of).collect();
-        points.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-        let mut least = f64::INFINITY;
-        points.retain(|&(_, cost, _)| {
-            let better = cost < least;
-            least = least.min(cost);
-            better
-        });
-        points.into_iter().map(|(_, _, i)| i).collect()
-    }
-
-    /// Returns the errors as a [`Sweep`], with one curve for each method, seed and on-policy round.
-    pub fn sweep(&self) -> Sweep {
-        let mut budgets: Vec<f64> = Vec::new();
-        self.images.iter().map(|image| image.budget).for_each(|budget| {
-            if !budgets.contains(&budget) {
-                budgets.push(budget);
-            }
-        });
-        let mut curves: Vec<Curve> = Vec::new();
-        for image in &self.images {
-            let method = self.curve(image);
-            let i = curves.iter().position(|curve| curve.method == method).unwrap_or(curves.len());
-            if i == curves.len() {
-                curves.push(Curve { method, points: vec![None; budgets.len()], scores: Vec::new() });
-            }
-            let points = budgets.iter().zip(&mut curves[i].points);
-            points.filter(|(budget, _)| **budget == image.budget).for_each(|(_, point)| *point = image.point());
-            if let Some(made) = image.made.as_ref().filter(|_| curves[i].scores.is_empty()) {
-                curves[i].scores.clone_from(&made.image.scores);
+    /// Returns the indices of the images of each curve.
+    fn named(&self) -> Vec<(String, Vec<usize>)> {
+        let mut curves: Vec<(String, Vec<usize>)> = Vec::new();
+        for (i, image) in self.images.iter().enumerate() {
+            let name = self.curve(image);
+            match curves.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, images)) => images.push(i),
+                None => curves.push((name, vec![i])),
             }
         }
-        let matrices = self.images.iter().find_map(|image| Some(image.made.as_ref()?.image.matrices.clone()));
-        let knee = knee(&curves);
-        let (policy, matrices) = (self.policy.clone(), matrices.unwrap_or_default());
-        Sweep { policy, matrices, budgets, clock_hz: CLOCK, curves, knee }
+        curves
     }
 
     /// Returns the name of an image's curve: its method, and the seed and round if they differ.
@@ -161,21 +145,23 @@ impl MergedPolicy {
         }
         name
     }
+
+    fn find_knee(&self) -> Option<usize> {
+        // Every curve has each budget one time, in the same order.
+        let curves = self.named();
+        let point = |&i: &usize| self.images[i].made.as_ref().map(|made| (made.image.bytes as f64, made.nmse));
+        let points: Vec<Curve> = curves.iter().map(|(_, images)| images.iter().map(point).collect()).collect();
+        let (curve, budget) = knee(&points)?;
+        Some(curves[curve].1[budget])
+    }
 }
 
-impl MergedImage {
-    fn point(&self) -> Option<Point> {
-        let Figures { image, nmse, worst_nmse, max_abs, observations, .. } = self.made.as_ref()?;
-        let report = ErrorReport {
-            nmse: *nmse,
-            worst_nmse: *worst_nmse,
-            max_abs: *max_abs,
-            steps: *observations,
-            bpw: image.bpw,
-            bytes: image.bytes,
-            worst_dimension: 0,
-        };
-        let milliseconds = 1e3 * image.cycles as f64 / CLOCK;
-        Some(Point { budget: self.budget, report, milliseconds, rows: image.rows.clone() })
-    }
+/// Returns the images that no other one beats in bytes and `cost`.
+fn frontier_of(images: &[MergedImage], cost: impl Fn(&Figures) -> Option<f64>) -> Vec<usize> {
+    let point = |(i, image): (usize, &MergedImage)| {
+        let figures = image.made.as_ref()?;
+        Some((i, (figures.image.bytes as f64, cost(figures)?)))
+    };
+    let (of, points): (Vec<usize>, Vec<(f64, f64)>) = images.iter().enumerate().filter_map(point).unzip();
+    frontier(&points).into_iter().map(|point| of[point]).collect()
 }

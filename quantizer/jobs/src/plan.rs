@@ -1,16 +1,17 @@
 //! The jobs of a spec.
 
-use std::path::{Path, PathBuf};
-
-use actq::data::{Dataset, Recording, Sizes};
-use actq::error::{Context as _, Result, ensure};
-use actq::policy::Policy;
+use actq::budget::Budget;
+use actq::data::Recording;
+use actq::error::{Context as _, Result, bail, ensure};
+use actq::methods::{Effort, Method};
 
 use crate::estimate;
 use crate::host::Host;
-use crate::job::{Drive, Episodes, Evaluate, Input, Job, Learn, Make, Merge, Role, Row, Work, address};
+use crate::job::{Input, Job, Role, address};
 use crate::order;
+use crate::source::Source;
 use crate::spec::{self, MOST_JOBS, Spec};
+use crate::work::{Drive, Episodes, Evaluate, Learn, Make, Merge, Row, Work};
 
 /// Returns the jobs of a spec, each after those that it depends on; the last one merges the results.
 ///
@@ -19,61 +20,78 @@ use crate::spec::{self, MOST_JOBS, Spec};
 /// If a policy, a recording or another file is missing or damaged; if a method is unknown; if two jobs would have one
 /// address.
 pub fn jobs(spec: &Spec, host: &dyn Host) -> Result<Vec<Job>> {
+    spec.check()?;
     let mut plan = Plan { spec, jobs: Vec::new(), rows: Vec::new() };
-    let mut names: Vec<String> = Vec::new();
+    // Policies by their names, and their numbers among those of one name.
+    let mut names: Vec<(String, usize)> = Vec::new();
     for path in &spec.policies {
-        let source = Source::read(path, host).with_context(|| path.display().to_string())?;
+        let source = Source::read(path, spec, host).with_context(|| path.display().to_string())?;
         let name = &source.policy.name;
-        ensure!(!names.contains(name), "two policies are named {name:?}; change the name in one of them");
-        names.push(name.clone());
-        for method in &spec.methods {
-            for &bpw in &spec.bpw {
+        let same = names.iter().filter(|(known, _)| known == name).count();
+        names.push((name.clone(), same + 1));
+        for budget in spec.budgets() {
+            for method in &spec.methods {
                 for &seed in &spec.seeds {
-                    plan.image(names.len() - 1, &source, method, bpw, seed, host)?;
+                    plan.image(names.len() - 1, &source, make(spec, &source, method, budget, seed)?, host)?;
                 }
             }
             ensure!(plan.jobs.len() < MOST_JOBS, "the spec has more than {MOST_JOBS} jobs; divide it");
         }
     }
     let deps = plan.jobs.len();
-    let merge = Work::Merge(Merge { policies: names, rows: std::mem::take(&mut plan.rows) });
+    let rows = std::mem::take(&mut plan.rows);
+    let named = |(name, number)| if number == 1 { name } else { format!("{name} ({number})") };
+    let policies = names.into_iter().map(named).collect();
+    let merge = Work::Merge(Merge { clock_hz: spec.clock, policies, rows });
     plan.add("merge".to_owned(), merge, Vec::new(), (1, 64, estimate::merging(deps)))?;
     order::check(&plan.jobs)?;
     Ok(plan.jobs)
 }
 
-/// A policy with its files.
-struct Source {
-    policy: Policy,
-    path: PathBuf,
-    files: Vec<Input>,
-    calib: Option<(Input, u64)>,
-    heldout: Input,
-    /// Observations of each episode of the held-out recording.
-    lengths: Vec<usize>,
+/// Returns the first image of a combination.
+fn make(spec: &Spec, source: &Source, name: &str, budget: Budget, seed: u64) -> Result<Make> {
+    let matrices = &source.policy.graph.matrices;
+    if let Some(name) = spec.widths.keys().find(|name| matrices.iter().all(|matrix| matrix.name != **name)) {
+        let names: Vec<&str> = matrices.iter().map(|matrix| matrix.name.as_str()).collect();
+        bail!("widths: {name}: {} has no such matrix; it has {}", source.policy.name, names.join(", "));
+    }
+    // The options of learning apply to distill alone.
+    let learns = name == "distill";
+    Ok(Make {
+        policy: Some(source.path.clone()),
+        method: name.to_owned(),
+        budget,
+        group: spec.group,
+        activations: spec.activations,
+        widths: if learns { spec.widths.clone() } else { Default::default() },
+        steps: spec.steps.filter(|_| learns),
+        effort: if learns { spec.effort } else { Effort::Default },
+        relative: spec.relative && learns,
+        seed,
+    })
 }
 
-impl Source {
-    fn read(path: &Path, host: &dyn Host) -> Result<Self> {
-        let policy = host.load(path)?;
-        let files: Vec<PathBuf> = host.files(path).into_iter().filter(|file| file.is_file()).collect();
-        let files = files.into_iter().map(|file| Input::of(Role::Policy, file)).collect::<Result<_>>()?;
-        let calib = match Recording::Calib.find(path)? {
-            Some(file) => {
-                let bytes = std::fs::metadata(&file).map_or(0, |file| file.len());
-                Some((Input::of(Role::Calib, file)?, bytes))
-            }
-            None => None,
-        };
-        let heldout = Recording::Heldout.find(path)?.with_context(|| Recording::Heldout.missing("a sweep"))?;
-        let lengths = Dataset::load(&heldout, Sizes::of(&policy))?.length;
-        Ok(Self { policy, path: path.to_owned(), files, calib, heldout: Input::of(Role::Heldout, heldout)?, lengths })
-    }
+/// What a job takes, by estimate: cores, memory in MiB, seconds.
+pub type Size = (usize, u64, f64);
 
-    /// Returns the policy's files with a recording.
-    fn with(&self, recording: impl IntoIterator<Item = Input>) -> Vec<Input> {
-        self.files.iter().cloned().chain(recording).collect()
-    }
+/// Adds a job after those that it depends on, and returns its address.
+///
+/// # Errors
+///
+/// If the job cannot be formatted.
+pub fn add(jobs: &mut Vec<Job>, title: String, work: Work, inputs: Vec<Input>, size: Size) -> Result<String> {
+    let address = address(&work, &inputs)?;
+    let deps = work.deps();
+    // Look from the last one backwards: dependencies are near.
+    let of = |dep: &String| jobs.iter().rev().find(|job| job.address == *dep).map_or(0, |job| job.stage + 1);
+    let stage = match work {
+        // The merge depends on all.
+        Work::Merge(_) => jobs.iter().map(|job| job.stage + 1).max().unwrap_or(0),
+        _ => deps.iter().map(of).max().unwrap_or(0),
+    };
+    let (cpus, memory_mib, seconds) = size;
+    jobs.push(Job { address: address.clone(), title, work, inputs, deps, stage, cpus, memory_mib, seconds });
+    Ok(address)
 }
 
 /// A plan in the making.
@@ -84,66 +102,40 @@ struct Plan<'a> {
 }
 
 impl Plan<'_> {
-    /// Adds a job and returns its address. `size` has its cores, memory in MiB and seconds.
-    fn add(&mut self, title: String, work: Work, inputs: Vec<Input>, size: (usize, u64, f64)) -> Result<String> {
-        let address = address(&work, &inputs)?;
-        let deps = work.deps();
-        // Look from the last one backwards: dependencies are near.
-        let of = |dep: &String| self.jobs.iter().rev().find(|job| job.address == *dep).map_or(0, |job| job.stage + 1);
-        let stage = match work {
-            // The merge depends on all.
-            Work::Merge(_) => self.jobs.iter().map(|job| job.stage + 1).max().unwrap_or(0),
-            _ => deps.iter().map(of).max().unwrap_or(0),
-        };
-        let (cpus, memory_mib, seconds) = size;
-        let job = Job { address: address.clone(), title, work, inputs, deps, stage, cpus, memory_mib, seconds };
-        self.jobs.push(job);
-        Ok(address)
+    fn add(&mut self, title: String, work: Work, inputs: Vec<Input>, size: Size) -> Result<String> {
+        add(&mut self.jobs, title, work, inputs, size)
     }
 
     /// Adds an image with its measurements, and those of its on-policy rounds.
-    fn image(
-        &mut self,
-        policy: usize,
-        source: &Source,
-        name: &str,
-        bpw: f64,
-        seed: u64,
-        host: &dyn Host,
-    ) -> Result<()> {
+    fn image(&mut self, policy: usize, source: &Source, make: Make, host: &dyn Host) -> Result<()> {
         let (spec, graph) = (self.spec, &source.policy.graph);
-        let method = host.method(name)?;
-        // The options of learning apply to distill alone.
-        let learns = name == "distill";
-        let needs_calib = name != "rtn";
-        let calib = source.calib.as_ref().filter(|_| needs_calib);
-        ensure!(!needs_calib || calib.is_some(), "{}", Recording::Calib.missing(&format!("method {name}")));
-        let make = Make {
-            policy: Some(source.path.clone()),
-            method: name.to_owned(),
-            bpw,
-            steps: spec.steps.filter(|_| learns),
-            relative: spec.relative && learns,
-            seed,
-        };
-        let title = format!("{}, {name} at {bpw} bits, seed {seed}", source.policy.name);
-        let seconds = estimate::making(graph, &method, spec);
-        let recordings = calib.map_or(0, |(_, bytes)| *bytes);
+        let method = host.method(&make.method)?;
+        let name = make.method.clone();
+        make.options(method.clone()).with_context(|| format!("method {name}"))?;
+        let needs_calib = method != Method::Rtn;
+        let calib: &[Input] = if needs_calib { &source.calib } else { &[] };
+        ensure!(!needs_calib || !calib.is_empty(), "{}", Recording::Calib.missing(&name));
+        let title = format!("{}, {name} at {}, seed {}", source.policy.name, make.budget, make.seed);
+        let seconds = estimate::making(graph, &method, make.steps, make.effort);
+        let recordings = if needs_calib { source.calib_bytes } else { 0 };
         let size = (spec.cpus, estimate::memory_mib(graph, recordings), seconds);
-        let inputs = source.with(calib.map(|(input, _)| input.clone()));
+        // A search for an error measures it.
+        let measured = Some(&source.heldout).filter(|_| matches!(make.budget, Budget::MaxNmse(_)));
+        let inputs = source.with(calib.iter().chain(measured));
         let first = self.add(format!("{title}: quantize"), Work::Quantize(make.clone()), inputs.clone(), size)?;
         let row = |image: String, round| Row {
             policy,
-            method: name.to_owned(),
-            bpw,
-            seed,
+            method: name.clone(),
+            budget: make.budget,
+            seed: make.seed,
             round,
             image,
             evaluations: Vec::new(),
             drives: Vec::new(),
         };
         self.measure(source, &title, row(first.clone(), 0))?;
-        let Some((learn, drive)) = spec.learn.as_ref().zip(spec.drive.as_ref()).filter(|_| learns) else {
+        let Some((learn, drive)) = spec.learn.as_ref().zip(spec.drive.as_ref()).filter(|_| method == Method::Distill)
+        else {
             return Ok(());
         };
         let (mut image, mut recordings) = (first, Vec::new());
@@ -170,7 +162,7 @@ impl Plan<'_> {
             let part = &source.lengths[episodes.first as usize..][..episodes.count as usize];
             let seconds = estimate::evaluating(&source.policy.graph, part.iter().sum());
             let memory = estimate::memory_mib(&source.policy.graph, 0);
-            let inputs = source.with([source.heldout.clone()]);
+            let inputs = source.with([&source.heldout]);
             row.evaluations.push(self.add(title, Work::Evaluate(evaluate), inputs, (1, memory, seconds))?);
         }
         if let Some(drive) = &self.spec.drive {
@@ -205,7 +197,7 @@ impl Plan<'_> {
             record,
         });
         let files = drive.files.iter().map(|file| Input::of(Role::Command, file.clone()));
-        let inputs = source.with(files.collect::<Result<Vec<_>>>()?);
+        let inputs = source.with(&files.collect::<Result<Vec<_>>>()?);
         self.add(title, work, inputs, (drive.cpus, drive.memory_mib, drive.seconds * seeds.count as f64))
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::figures::{Driven, Evaluated, Made};
+use crate::figures::{CustomResult, Driven, Evaluated, Made};
 use crate::merged::Merged;
 
 /// The version of the files.
@@ -36,4 +36,6 @@ pub enum Outcome {
     Driven(Driven),
     /// The results of a plan.
     Merged(Merged),
+    /// What a job of kind custom has found.
+    Custom(CustomResult),
 }

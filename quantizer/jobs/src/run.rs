@@ -1,5 +1,6 @@
 //! Runs one job.
 
+mod custom;
 mod drive;
 mod images;
 mod inputs;
@@ -7,17 +8,18 @@ mod merge;
 
 use std::path::Path;
 
-use actq::data::{Dataset, Sizes};
-use actq::error::{Context as _, ensure};
+use actq::data::Sizes;
+use actq::error::ensure;
 use actq::measure::eval::ErrorSums;
 
 use crate::error::JobError;
 use crate::figures::Evaluated;
 use crate::host::Host;
-use crate::job::{self, Job, VERSION, Work};
+use crate::job::{Job, version};
 use crate::record::{FORMAT, Outcome, Record};
 use crate::store::Store;
-use inputs::{Kept, check_inputs, image, path_of};
+use crate::work::{self, Work};
+use inputs::{Kept, check_inputs, heldout, image, path_of};
 
 /// Runs a job and writes its result into the store. Returns `false` if the store has the result already. `watch`
 /// receives the present work and the share of it that is done.
@@ -39,8 +41,9 @@ pub fn run(job: &Job, store: &Store, host: &dyn Host, watch: &mut dyn FnMut(&str
             Work::Evaluate(evaluate) => (self::evaluate(job, evaluate, store, host)?, None),
             Work::Drive(drive) => drive::drive(job, drive, store, host)?,
             Work::Merge(merge) => (Outcome::Merged(merge::merge(merge, store)?), None),
+            Work::Custom(work) => custom::custom(job, work, store, host, watch)?,
         };
-        let record = Record { format: FORMAT, address: job.address.clone(), version: VERSION.to_owned(), result };
+        let record = Record { format: FORMAT, address: job.address.clone(), version: version(), result };
         let blob = kept.as_ref().map(|Kept { path, bytes }| (path.as_path(), &bytes[..]));
         store.write_result(&record, blob, host)
     };
@@ -48,7 +51,7 @@ pub fn run(job: &Job, store: &Store, host: &dyn Host, watch: &mut dyn FnMut(&str
     Ok(true)
 }
 
-fn evaluate(job: &Job, evaluate: &job::Evaluate, store: &Store, host: &dyn Host) -> Result<Outcome, JobError> {
+fn evaluate(job: &Job, evaluate: &work::Evaluate, store: &Store, host: &dyn Host) -> Result<Outcome, JobError> {
     let buffer = match image(&evaluate.image, store)? {
         Ok((_, buffer)) => buffer,
         Err(why) => return Ok(Outcome::Impossible(why)),
@@ -64,9 +67,4 @@ fn evaluate(job: &Job, evaluate: &job::Evaluate, store: &Store, host: &dyn Host)
         Ok(Outcome::Evaluated(Evaluated { episodes: evaluate.episodes, sums }))
     };
     Ok(measure()?)
-}
-
-fn heldout(job: &Job, sizes: Sizes) -> actq::error::Result<Dataset> {
-    let input = job.inputs.iter().find(|input| input.role == job::Role::Heldout);
-    Dataset::load(&input.context("the job has no held-out recording")?.path, sizes)
 }

@@ -1,11 +1,21 @@
 //! The spec of a sweep, a TOML file.
 
-use std::collections::BTreeSet;
+mod drive;
+mod quantities;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use actq::budget::{Budget, TimeLimit};
 use actq::error::{Context as _, Error, Result, ensure};
+use actq::measure::time::CLOCK;
+use actq::methods::Effort;
+use actq_kernels::Width;
 use serde::Deserialize;
+
+pub use drive::{Drive, Learn};
+use quantities::{clock, sizes, widths};
 
 /// The most jobs of a plan.
 pub const MOST_JOBS: usize = 1_000_000;
@@ -16,16 +26,47 @@ pub const MOST_JOBS: usize = 1_000_000;
 pub struct Spec {
     /// Policy folders or ONNX files; paths in the spec are relative to its folder.
     pub policies: Vec<PathBuf>,
+    /// Recordings that a user made, to learn from instead of those beside the policy.
+    #[serde(default)]
+    pub calib: Vec<PathBuf>,
+    /// The recording that errors are measured on, instead of the one beside the policy.
+    pub heldout: Option<PathBuf>,
     /// Methods by name.
     #[serde(default = "methods")]
     pub methods: Vec<String>,
+    /// Budgets: one width for every matrix.
+    #[serde(default, deserialize_with = "widths")]
+    pub bits: Vec<Width>,
     /// Budgets, in bits per weight.
+    #[serde(default)]
     pub bpw: Vec<f64>,
+    /// Budgets: the largest errors on the held-out recording.
+    #[serde(default)]
+    pub max_nmse: Vec<f64>,
+    /// Budgets, in bytes of the image. With [`Self::ms`], every image keeps one of each.
+    #[serde(default, deserialize_with = "sizes")]
+    pub flash: Vec<usize>,
+    /// Budgets, in predicted milliseconds of a step.
+    #[serde(default)]
+    pub ms: Vec<f64>,
+    /// The processor's clock in Hz, for predicted times.
+    #[serde(default = "clock_hz", deserialize_with = "clock")]
+    pub clock: f64,
     /// Seeds of the quantizer.
     #[serde(default = "seeds")]
     pub seeds: Vec<u64>,
+    /// Columns per u8 scale; without it, the method's default.
+    pub group: Option<usize>,
+    /// Bits of the activations; without it, chosen by the method.
+    pub activations: Option<u32>,
+    /// Widths in bits of all rows of a matrix, by its tensor's name (method distill).
+    #[serde(default)]
+    pub widths: BTreeMap<String, u32>,
     /// Most steps of distillation; without it, chosen for the network.
     pub steps: Option<usize>,
+    /// Effort of distillation, if the steps are not given.
+    #[serde(default)]
+    pub effort: Effort,
     /// Refused: learning that time limits depends on the machine.
     minutes: Option<toml::Value>,
     /// `true` if method distill weighs errors relative to the action's size.
@@ -51,47 +92,6 @@ pub struct Evaluate {
     pub per_job: Option<usize>,
 }
 
-/// Closed-loop episodes.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Drive {
-    /// Command line for `sh -c`, run in the spec's folder.
-    pub command: String,
-    /// Files that the command depends on. A change of one changes the jobs' addresses.
-    #[serde(default)]
-    pub files: Vec<PathBuf>,
-    /// The spec's folder, in which the command runs.
-    #[serde(skip)]
-    pub folder: Option<PathBuf>,
-    /// Episodes of each image.
-    pub episodes: u64,
-    /// Seed of the first episode.
-    pub first_seed: u64,
-    /// Episodes in one job; without it, all.
-    pub per_job: Option<u64>,
-    /// Cores of a job.
-    #[serde(default = "one")]
-    pub cpus: usize,
-    /// Estimated seconds of an episode.
-    #[serde(default = "second")]
-    pub seconds: f64,
-    /// Estimated memory of a job, in MiB.
-    #[serde(default = "drive_memory")]
-    pub memory_mib: u64,
-}
-
-/// On-policy rounds: the image of a round is rolled out, and the next one also learns from that.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Learn {
-    /// Rounds after the first image.
-    pub rounds: usize,
-    /// Episodes of each round.
-    pub episodes: u64,
-    /// Seed of the first round's first episode; later rounds continue the sequence.
-    pub first_seed: u64,
-}
-
 fn methods() -> Vec<String> {
     ["rtn", "gptq", "distill"].map(str::to_owned).into()
 }
@@ -104,15 +104,39 @@ fn one() -> usize {
     1
 }
 
-fn second() -> f64 {
-    1.0
-}
-
-fn drive_memory() -> u64 {
-    1024
+fn clock_hz() -> f64 {
+    CLOCK
 }
 
 impl Spec {
+    /// Makes a spec of these policies, with defaults and without budgets.
+    pub fn new(policies: Vec<PathBuf>) -> Self {
+        Self {
+            policies,
+            calib: Vec::new(),
+            heldout: None,
+            methods: methods(),
+            bits: Vec::new(),
+            bpw: Vec::new(),
+            max_nmse: Vec::new(),
+            flash: Vec::new(),
+            ms: Vec::new(),
+            clock: CLOCK,
+            seeds: seeds(),
+            group: None,
+            activations: None,
+            widths: BTreeMap::new(),
+            steps: None,
+            effort: Effort::Default,
+            minutes: None,
+            relative: false,
+            cpus: 1,
+            evaluate: Evaluate::default(),
+            drive: None,
+            learn: None,
+        }
+    }
+
     /// Reads a spec, and makes its paths absolute.
     ///
     /// # Errors
@@ -124,13 +148,30 @@ impl Spec {
             let mut spec: Self = toml::from_str(&text).map_err(Error::other)?;
             let file = std::path::absolute(path)?;
             let folder = file.parent().context("the path has no folder")?;
+            let recordings = spec.calib.iter_mut().chain(&mut spec.heldout);
             let files = spec.drive.iter_mut().flat_map(|drive| &mut drive.files);
-            spec.policies.iter_mut().chain(files).for_each(|path| *path = folder.join(&*path));
+            spec.policies.iter_mut().chain(recordings).chain(files).for_each(|path| *path = folder.join(&*path));
             spec.drive.iter_mut().for_each(|drive| drive.folder = Some(folder.to_owned()));
             spec.check()?;
             Ok(spec)
         };
         read().map_err(|error: Error| error.context(path.display().to_string()))
+    }
+
+    /// Returns what each image may take: widths, bits per weight, errors, and every size with every time.
+    pub fn budgets(&self) -> Vec<Budget> {
+        let widths = self.bits.iter().map(|width| Budget::Width(*width));
+        let bits = self.bpw.iter().map(|bits| Budget::BitsPerWeight(*bits));
+        let errors = self.max_nmse.iter().map(|nmse| Budget::MaxNmse(*nmse));
+        let sizes = self.flash.iter().filter(|_| self.ms.is_empty()).map(|bytes| Budget::ImageBytes(*bytes));
+        let time = |milliseconds: f64, image_bytes: Option<usize>| {
+            Budget::Time(TimeLimit { milliseconds, clock_hz: self.clock, image_bytes })
+        };
+        let of_time = |ms: &f64| match &self.flash[..] {
+            [] => vec![time(*ms, None)],
+            sizes => sizes.iter().map(|bytes| time(*ms, Some(*bytes))).collect(),
+        };
+        widths.chain(bits).chain(errors).chain(sizes).chain(self.ms.iter().flat_map(of_time)).collect()
     }
 
     /// Checks all values.
@@ -141,23 +182,41 @@ impl Spec {
     pub fn check(&self) -> Result<()> {
         ensure!(
             self.minutes.is_none(),
-            "minutes: learning that time limits gives other images on another machine; use steps instead"
+            "minutes: learning that time limits gives other images on another machine; use steps or effort instead"
         );
         let empty = [
             ("policies", self.policies.is_empty()),
             ("methods", self.methods.is_empty()),
-            ("bpw", self.bpw.is_empty()),
             ("seeds", self.seeds.is_empty()),
         ];
         for (key, is_empty) in empty {
             ensure!(!is_empty, "{key}: the list is empty; name at least one");
         }
-        let bits = |bpw: &f64| bpw.is_finite() && *bpw > 0.0;
-        ensure!(self.bpw.iter().all(bits), "bpw: {:?}: budgets are numbers above 0", self.bpw);
+        ensure!(!self.budgets().is_empty(), "no budget: name at least one with bpw, bits, flash, ms or max_nmse");
+        for (key, values) in [("bpw", &self.bpw), ("max_nmse", &self.max_nmse), ("ms", &self.ms)] {
+            let is_above = |value: &f64| value.is_finite() && *value > 0.0;
+            ensure!(values.iter().all(is_above), "{key}: {values:?}: budgets are numbers above 0");
+            distinct(key, values.iter().map(f64::to_string))?;
+        }
+        distinct("bits", self.bits.iter().map(|width| width.bits().to_string()))?;
+        distinct("flash", self.flash.iter().map(usize::to_string))?;
         distinct("policies", self.policies.iter().map(|path| path.display().to_string()))?;
         distinct("methods", self.methods.iter().cloned())?;
-        distinct("bpw", self.bpw.iter().map(f64::to_string))?;
         distinct("seeds", self.seeds.iter().map(u64::to_string))?;
+        ensure!(
+            self.policies.len() == 1 || (self.calib.is_empty() && self.heldout.is_none()),
+            "calib and heldout apply to one policy, and {} are given; sweep each policy of its own",
+            self.policies.len()
+        );
+        ensure!(
+            self.steps.is_none() || self.effort == Effort::Default,
+            "steps and effort: both say how long to learn; remove one"
+        );
+        let distills = self.methods.iter().any(|method| method == "distill");
+        ensure!(
+            self.widths.is_empty() || distills,
+            "widths: only method distill has them; add \"distill\" to methods, or remove widths"
+        );
         ensure!(self.cpus > 0, "cpus: 0; a job takes at least 1");
         ensure!(self.evaluate.per_job != Some(0), "evaluate.per_job: 0; use 1 or more episodes");
         if let Some(drive) = &self.drive {
@@ -166,45 +225,6 @@ impl Spec {
         if let Some(learn) = &self.learn {
             learn.check(self)?;
         }
-        Ok(())
-    }
-}
-
-impl Drive {
-    fn check(&self) -> Result<()> {
-        ensure!(!self.command.trim().is_empty(), "drive.command: is empty; name the command that runs the episodes");
-        ensure!(self.episodes > 0, "drive.episodes: 0; use 1 or more");
-        ensure!(self.per_job != Some(0), "drive.per_job: 0; use 1 or more episodes");
-        ensure!(self.cpus > 0, "drive.cpus: 0; a job takes at least 1");
-        ensure!(self.seconds.is_finite() && self.seconds > 0.0, "drive.seconds: use a number above 0");
-        ensure!(
-            self.first_seed.checked_add(self.episodes).is_some(),
-            "drive.first_seed: the last episode's seed is too large; use a smaller one"
-        );
-        Ok(())
-    }
-}
-
-impl Learn {
-    fn check(&self, spec: &Spec) -> Result<()> {
-        let drive = spec.drive.as_ref().context("learn: needs [drive], whose command rolls the images out")?;
-        ensure!((1..=100).contains(&self.rounds), "learn.rounds: {}; use 1 to 100", self.rounds);
-        ensure!(self.episodes > 0, "learn.episodes: 0; use 1 or more");
-        ensure!(
-            spec.methods.iter().any(|method| method == "distill"),
-            "learn: only method distill learns; add \"distill\" to methods, or remove [learn]"
-        );
-        let seeds = (self.rounds as u64).checked_mul(self.episodes).and_then(|n| self.first_seed.checked_add(n));
-        let end = seeds.context("learn.first_seed: the last episode's seed is too large; use a smaller one")?;
-        let (first, drive_end) = (self.first_seed, drive.first_seed + drive.episodes);
-        ensure!(
-            end <= drive.first_seed || drive_end <= first,
-            "learn: seeds {first} to {} are also seeds of [drive], {} to {}; an image must not be measured on episodes that it has \
-             learned from",
-            end - 1,
-            drive.first_seed,
-            drive_end - 1
-        );
         Ok(())
     }
 }

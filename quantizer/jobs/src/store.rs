@@ -93,16 +93,21 @@ impl Store {
 
     /// Returns the place of an image.
     pub fn image(&self, address: &str) -> PathBuf {
-        self.folder.join(format!("{address}.actq"))
+        self.file(address, "actq")
     }
 
     /// Returns the place of a recording.
     pub fn recording(&self, address: &str) -> PathBuf {
-        self.folder.join(format!("{address}.npz"))
+        self.file(address, "npz")
+    }
+
+    /// Returns the place of a file beside a result, by the ending of its name.
+    pub fn file(&self, address: &str, ending: &str) -> PathBuf {
+        self.folder.join(format!("{address}.{ending}"))
     }
 
     fn result(&self, address: &str) -> PathBuf {
-        self.folder.join(format!("{address}.json"))
+        self.file(address, "json")
     }
 
     /// Returns `true` if the store has the result of a job.

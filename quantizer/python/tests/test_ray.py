@@ -176,6 +176,6 @@ def test_failed_jobs_are_reported(sweep, capfd):
     Path("spec.toml").write_text(SPEC.replace(json.dumps(sys.executable + " simulator.py"), '"exit 3"'))
     assert start("broken").wait() == 1
     assert "failed with status 1" in capfd.readouterr().err
-    Path("spec.toml").write_text("bits = 3\n")
+    Path("spec.toml").write_text("bit = 3\n")
     assert start("broken").wait() == 1
-    assert "unknown field `bits`" in capfd.readouterr().err
+    assert "unknown field `bit`" in capfd.readouterr().err

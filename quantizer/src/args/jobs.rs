@@ -16,8 +16,9 @@ pub(crate) struct PlanArgs {
     pub(crate) missing: Option<PathBuf>,
 }
 
-#[derive(clap::Args)]
-pub(crate) struct JobArgs {
+/// Arguments of `actq job`.
+#[derive(clap::Args, Debug)]
+pub struct JobArgs {
     /// A file with one job; - for standard input
     pub(crate) job: PathBuf,
     /// The folder of the results
@@ -51,17 +52,13 @@ pub(crate) struct MergeArgs {
 /// Options of a sweep by jobs.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct PoolArgs {
-    /// Run the jobs of a spec, and keep their results in this folder
-    #[arg(
-        long,
-        value_name = "DIR",
-        conflicts_with_all = ["bpw", "calib", "heldout", "steps", "minutes", "relative", "seed", "methods"]
-    )]
+    /// Keep the results of the jobs in this folder, and use those that are there [default: a temporary one]
+    #[arg(long, value_name = "DIR")]
     pub(crate) store: Option<PathBuf>,
     /// Most tries of a job that may succeed later
-    #[arg(long, value_name = "N", default_value_t = 3, requires = "store", value_parser = value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = value_parser!(u16).range(1..))]
     pub(crate) tries: u16,
     /// Append a line to this file for each job that has run, as JSON: address, title, kind, seconds, status
-    #[arg(long, value_name = "FILE", requires = "store")]
+    #[arg(long, value_name = "FILE")]
     pub(crate) log: Option<PathBuf>,
 }

@@ -92,7 +92,9 @@ fn step(number: usize, what: &str) -> Result<()> {
 }
 
 fn quantization(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs {
-    let own = args.learn.steps.is_some() || args.learn.minutes.is_some() || args.learn.effort != Effort::Default;
+    let own = args.learn.distill.steps.is_some()
+        || args.learn.minutes.is_some()
+        || args.learn.distill.effort != Effort::Default;
     QuantizeArgs {
         policy_dir: policy.to_owned(),
         out: image.to_owned(),

@@ -1,7 +1,7 @@
 //! The commands for sweeps as jobs.
 
-mod host;
-pub(crate) mod job;
+pub mod host;
+pub mod job;
 pub(crate) mod merge;
 pub(crate) mod plan;
-pub(crate) mod pool;
+pub mod pool;

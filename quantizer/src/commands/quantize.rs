@@ -125,10 +125,10 @@ fn options(args: &QuantizeArgs, method: Method) -> Options {
             Some(ActivationArg::Int16) => Activations::Int16,
             None => Activations::Auto,
         },
-        steps: args.learn.steps,
-        effort: args.learn.effort,
+        steps: args.learn.distill.steps,
+        effort: args.learn.distill.effort,
         minutes: args.learn.minutes,
-        relative: args.learn.relative,
+        relative: args.learn.distill.relative,
         seed: args.run.seed,
         forced: args.width.iter().cloned().chain(protected).collect(),
         ..Options::new(method, limits.into_iter().flatten().next().unwrap_or(Budget::Width(width)))

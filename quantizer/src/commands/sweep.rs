@@ -1,63 +1,105 @@
 //! `actq sweep`
 
-use std::path::PathBuf;
+use std::env;
+use std::path::Path;
 
 use actq::data::{Recording, Recordings, Sizes, files_of};
-use actq::methods::Method;
-use actq::pipeline::sweep::{self, SweepPlan};
-use anyhow::{Result, bail, ensure};
+use actq_jobs::host::Host;
+use actq_jobs::job::Job;
+use actq_jobs::plan;
+use actq_jobs::spec::Spec;
+use actq_jobs::store::Store;
+use anyhow::{Context as _, Result, ensure};
 
+use super::jobs::pool::{Pool, complete};
+use super::jobs::{merge, plan as plans};
 use crate::args::SweepArgs;
 use crate::importers::{learned, load, policy_files};
-use crate::report::{self, notes};
-use crate::terminal::{Progress, note, print, reserve};
-use crate::threads::start_threads;
+use crate::outputs::unfinished::Scratch;
+use crate::report::notes;
+use crate::terminal::{Progress, note, reserve};
+use crate::threads::allocation;
 
-/// Quantizes policies by several methods at several budgets and compares the errors.
-pub fn run(args: &SweepArgs, methods: &[Method]) -> Result<()> {
-    let is_spec = |path: &&PathBuf| path.extension().is_some_and(|ending| ending == "toml" || ending == "jsonl");
-    if let Some(spec) = args.policy_dirs.iter().find(is_spec) {
-        bail!("{}: is a spec; add --store DIR, the folder of its results", spec.display());
-    }
-    let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
+/// Budgets without `--bpw`, in bits per weight.
+const BPW: [f64; 4] = [2.0, 2.5, 3.0, 4.0];
+
+/// Quantizes policies by several methods at several budgets, and prints bytes, times and errors. `methods` are names
+/// that `host` knows; without any, the defaults of a spec.
+pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> {
+    let spec = spec_of(args, methods)?;
     let calib = files_of(&args.calib)?;
-    let inputs = folders.chain(calib.iter().chain(&args.heldout).cloned());
+    let inputs = match spec {
+        Some(spec) => vec![spec.to_owned()],
+        None => {
+            let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
+            folders.chain(calib).chain(args.heldout.clone()).collect()
+        }
+    };
     let outputs = reserve(args.svg.iter().chain(&args.json), inputs)?;
-    let progress = Progress::new(args.run.quiet, "reading")?;
-    start_threads(args.run.threads)?;
-    let policies = args.policy_dirs.iter().map(|dir| load(dir)).collect::<Result<Vec<_>>>()?;
-    let named = !calib.is_empty() || args.heldout.is_some();
-    ensure!(
-        policies.len() == 1 || !named,
-        "--calib and --heldout apply to one policy, and {} are given; sweep each policy in its own command",
-        policies.len()
-    );
-    let mut sweeps = Vec::new();
-    for (p, policy) in policies.iter().enumerate() {
-        let (dir, sizes) = (Some(policy.dir.as_path()), Sizes::of(policy));
-        let calib = learned(policy, &calib)?.map(|learned| learned.dataset);
-        let heldout = Recording::Heldout.require(dir, args.heldout.as_deref(), sizes, "actq sweep")?;
-        let recordings = Recordings { calib, heldout: Some(heldout) };
-        note(notes::of_recordings(&recordings));
-        let plan = SweepPlan {
-            policy,
-            recordings,
-            methods,
-            budgets: &args.bpw,
-            clock_hz: args.clock,
-            steps: args.learn.steps,
-            effort: args.learn.effort,
-            minutes: args.learn.minutes,
-            relative: args.learn.relative,
-            seed: args.run.seed,
-        };
-        sweeps.push(sweep::run(plan, |work: &str, share: f64| {
-            progress.set(&format!("{}: {work}", policy.name), (p as f64 + share) / policies.len() as f64);
-        })?);
-    }
+    let cores = if args.run.threads == 0 { allocation() } else { args.run.threads.into() };
+    let progress = Progress::new(args.run.quiet, "planning")?;
+    let jobs = match spec {
+        Some(spec) => plans::read(spec, host)?,
+        None => planned(args, methods, cores, host)?,
+    };
     drop(progress);
-    print(&report::sweep::report(&sweeps))?;
-    let (svg, json) = (report::sweep::svg(&sweeps), serde_json::to_string_pretty(&sweeps)? + "\n");
-    let contents = [args.svg.is_some().then_some(svg), args.json.is_some().then_some(json)];
-    outputs.write(&contents.into_iter().flatten().collect::<Vec<_>>())
+    let temporary = match &args.pool.store {
+        Some(_) => None,
+        None => Some(Scratch::new().context("cannot create a temporary folder")?),
+    };
+    let folder = args.pool.store.as_deref().or(temporary.as_ref().map(Scratch::path));
+    let store = Store::open(folder.context("no folder for the results")?, host)?;
+    let actq = env::current_exe().context("cannot find the running executable")?;
+    let pool = Pool {
+        program: &actq,
+        cores,
+        tries: args.pool.tries.into(),
+        log: args.pool.log.as_deref(),
+        quiet: args.run.quiet,
+        is_kept: temporary.is_none(),
+    };
+    complete(&jobs, &store, &pool)?;
+    merge::report(&jobs, &store, host, outputs, args.svg.is_some(), args.json.is_some())
+}
+
+/// Returns the spec or plan that is given instead of policies.
+fn spec_of<'a>(args: &'a SweepArgs, methods: &[String]) -> Result<Option<&'a Path>> {
+    let Some(spec) = args.spec() else { return Ok(None) };
+    let name = spec.display();
+    ensure!(args.policy_dirs.len() == 1, "{name}: is a spec; sweep it alone");
+    ensure!(args.pool.store.is_some(), "{name}: is a spec; add --store DIR, the folder of its results");
+    let given = args.of_a_spec().into_iter().chain(Some("--methods").filter(|_| !methods.is_empty()));
+    let given: Vec<&str> = given.collect();
+    ensure!(given.is_empty(), "{name}: is a spec, which has keys for {}; change them there", given.join(", "));
+    Ok(Some(spec))
+}
+
+/// Plans the options of the command line.
+fn planned(args: &SweepArgs, methods: &[String], cores: usize, host: &dyn Host) -> Result<Vec<Job>> {
+    let mut spec = Spec::new(args.policy_dirs.clone());
+    spec.calib.clone_from(&args.calib);
+    spec.heldout.clone_from(&args.heldout);
+    if !methods.is_empty() {
+        spec.methods = methods.to_vec();
+    }
+    spec.bpw = if args.bpw.is_empty() { BPW.to_vec() } else { args.bpw.clone() };
+    spec.clock = args.clock.unwrap_or(spec.clock);
+    spec.seeds = vec![args.run.seed];
+    (spec.steps, spec.effort, spec.relative) = (args.distill.steps, args.distill.effort, args.distill.relative);
+    // Fewer images than cores: several cores an image. Results do not depend on it.
+    spec.cpus = (cores / (spec.policies.len() * spec.bpw.len() * spec.methods.len())).max(1);
+    let jobs = plan::jobs(&spec, host)?;
+    for dir in &args.policy_dirs {
+        note_recordings(args, dir)?;
+    }
+    Ok(jobs)
+}
+
+/// Prints notes on the recordings of a policy.
+fn note_recordings(args: &SweepArgs, dir: &Path) -> Result<()> {
+    let policy = load(dir)?;
+    let calib = learned(&policy, &files_of(&args.calib)?)?.map(|learned| learned.dataset);
+    let heldout = Recording::Heldout.load(Some(dir), args.heldout.as_deref(), Sizes::of(&policy))?;
+    note(notes::of_recordings(&Recordings { calib, heldout }));
+    Ok(())
 }

@@ -12,7 +12,7 @@ use actq_kernels::Width;
 use anyhow::{Context as _, Result, ensure};
 
 use super::drive::Drive;
-use crate::args::{LearnArgs, TuneArgs};
+use crate::args::{DistillArgs, LearnArgs, TuneArgs};
 use crate::importers::{load, policy_files};
 use crate::outputs::unfinished::Scratch;
 use crate::report;
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
         Some(bits) => Budget::BitsPerWeight(bits),
         None => Budget::Width(args.bits.unwrap_or(Width::W3)),
     };
-    let LearnArgs { effort, steps, minutes, relative } = args.learn;
+    let LearnArgs { distill: DistillArgs { effort, steps, relative }, minutes } = args.learn;
     let options =
         Options { effort, steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Distill, budget) };
     let plan = TunePlan { policy: &policy, calib, heldout, options: &options, rounds: args.rounds };

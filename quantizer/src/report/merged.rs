@@ -1,43 +1,48 @@
-//! The tables and the plots of `actq merge`.
+//! The table of a sweep.
 
-use actq::measure::time::CLOCK;
-use actq::pipeline::sweep::frontier;
 use actq_jobs::merged::{Figures, Merged, MergedImage, MergedPolicy};
 
-use super::plot::{Plot, Series, Vertical, stacked};
-use super::sweep::{plot, x_labels};
 use super::{table, time};
 
 /// Columns of the table that are always present.
-const HEADER: [&str; 7] = ["policy", "image", "limit", "bytes", "ms", "NMSE", "bits"];
+const HEADER: [&str; 7] = ["policy", "method", "limit", "bytes", "ms", "NMSE ", "bits"];
 
 /// Formats a row for each image, and the knee of each policy. A star marks images of the frontiers.
 pub fn report(merged: &Merged) -> String {
     let is_driven = figures(merged).any(|figures| figures.driven.is_some());
     let mut header = HEADER.to_vec();
     if is_driven {
-        header.extend(["episodes", "success", "95% interval"]);
+        header.extend(["episodes", "success ", "95% interval"]);
     }
     let mut rows = table::table(&header);
     for policy in &merged.policies {
         for (i, image) in policy.images.iter().enumerate() {
             let name = if i == 0 { policy.policy.clone() } else { String::new() };
-            let mut row = vec![name, policy.curve(image), format!("{} bits", image.budget)];
-            row.extend(cells(policy, i, image, is_driven));
+            let mut row = vec![name, policy.curve(image), image.budget.to_string()];
+            row.extend(cells(policy, i, image, merged.clock_hz, is_driven));
             rows.add_row(row);
         }
     }
     let mut text = format!("{rows}\n\n* on the frontier: no other image has fewer bytes and a smaller error");
     text += if is_driven { ", or more success\n" } else { "\n" };
     for policy in &merged.policies {
-        if let Some(knee) = policy.sweep().knee {
+        let knee = policy.knee.map(|image| &policy.images[image]);
+        if let Some((image, made)) = knee.and_then(|image| Some((image, image.made.as_ref()?))) {
             text += &format!(
                 "knee of {}: {} at {} bytes and {:.3} ms, NMSE {:.2e}\n",
-                policy.policy, knee.method, knee.bytes, knee.milliseconds, knee.nmse
+                policy.policy,
+                policy.curve(image),
+                made.image.bytes,
+                made.milliseconds(merged.clock_hz),
+                made.nmse
             );
         }
     }
-    text + &format!("ms: predicted time of a step, {}\n", time::conditions(CLOCK))
+    text + &format!(
+        "bytes: the whole image in flash. ms: predicted time of a step, {}. bits: per weight, with scales and padding. -: no \
+         image is within the limit.\n",
+        time::conditions(merged.clock_hz)
+    )
 }
 
 fn figures(merged: &Merged) -> impl Iterator<Item = &Figures> {
@@ -45,13 +50,13 @@ fn figures(merged: &Merged) -> impl Iterator<Item = &Figures> {
 }
 
 /// Returns the cells of an image from its bytes on.
-fn cells(policy: &MergedPolicy, i: usize, image: &MergedImage, is_driven: bool) -> Vec<String> {
+fn cells(policy: &MergedPolicy, i: usize, image: &MergedImage, clock_hz: f64, is_driven: bool) -> Vec<String> {
     let star = |frontier: &[usize]| if frontier.contains(&i) { "*" } else { " " };
-    let Some(made) = &image.made else { return vec!["-".to_owned(); if is_driven { 7 } else { 4 }] };
+    let Some(made) = &image.made else { return vec!["- ".to_owned(); if is_driven { 7 } else { 4 }] };
     let mut cells = vec![
         made.image.bytes.to_string(),
-        format!("{:.3}", milliseconds(made)),
-        format!("{:.3e}{}", made.nmse, star(&policy.frontier)),
+        format!("{:.3}", made.milliseconds(clock_hz)),
+        format!("{:.2e}{}", made.nmse, star(&policy.frontier)),
         format!("{:.3}", made.image.bpw),
     ];
     if is_driven {
@@ -63,41 +68,55 @@ fn cells(policy: &MergedPolicy, i: usize, image: &MergedImage, is_driven: bool) 
     cells
 }
 
-fn milliseconds(made: &Figures) -> f64 {
-    1e3 * made.image.cycles as f64 / CLOCK
-}
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
 
-/// Draws the error of each policy over bytes and over predicted milliseconds; and the success, if there is one.
-pub fn svg(merged: &Merged) -> String {
-    let errors = merged.policies.iter().map(|policy| plot(&policy.sweep()));
-    let success = merged.policies.iter().filter(|policy| !policy.success_frontier.is_empty()).map(success_plot);
-    stacked(&errors.chain(success).collect::<Vec<_>>())
-}
+    use actq::budget::Budget;
+    use actq_jobs::figures::Made;
 
-fn success_plot(policy: &MergedPolicy) -> Plot {
-    let mut series: Vec<Series> = Vec::new();
-    for image in &policy.images {
-        let name = policy.curve(image);
-        let Some(made) = &image.made else { continue };
-        let Some(percent) = made.success().map(|share| 100.0 * share) else { continue };
-        let points = [(made.image.bytes as f64 / 1e3, percent), (milliseconds(made), percent)];
-        match series.iter_mut().find(|series| series.name == name) {
-            Some(series) => series.points.iter_mut().zip(points).for_each(|(panel, point)| panel.push(point)),
-            None => series.push(Series { name, points: points.map(|point| vec![point]).into_iter().collect() }),
-        }
+    use super::*;
+    use crate::report::frontiers;
+
+    fn image(bits: f64, bytes: usize, nmse: f64) -> MergedImage {
+        let image = Made {
+            image: String::new(),
+            bytes,
+            cycles: 84 * bytes as u64,
+            bpw: bits,
+            steps: 0,
+            frames: 0,
+            matrices: Vec::new(),
+            rows: vec![BTreeMap::new()],
+            scores: Vec::new(),
+        };
+        let made =
+            Figures { image, nmse, worst_nmse: nmse, max_abs: 0.0, observations: 1, driven: None, interval: None };
+        let made = (nmse > 0.0).then_some(made);
+        let (method, budget) = ("distill".to_owned(), Budget::BitsPerWeight(bits));
+        MergedImage { method, budget, seed: 1, round: 0, address: String::new(), made }
     }
-    let failures = |panel: usize| {
-        let points = series.iter().flat_map(|series| &series.points[panel]);
-        let least = frontier(points.map(|(x, percent)| (*x, 100.0 - percent)).collect());
-        least.into_iter().map(|(x, failed)| (x, 100.0 - failed)).collect()
-    };
-    Plot {
-        title: format!("{}: success over flash and over time", policy.policy),
-        x_labels: x_labels(CLOCK),
-        y_label: "successful episodes, percent".to_owned(),
-        vertical: Vertical::Percent,
-        frontier: [0, 1].map(failures).into_iter().collect(),
-        series,
-        mark: None,
+
+    #[test]
+    fn rows_have_bytes_time_and_error_and_knees_are_named() {
+        let images = vec![image(1.0, 0, 0.0), image(2.0, 2000, 0.5), image(2.5, 2500, 0.01), image(4.0, 4000, 0.02)];
+        let policy = MergedPolicy {
+            policy: "arm".to_owned(),
+            images,
+            frontier: vec![1, 2],
+            success_frontier: Vec::new(),
+            knee: Some(2),
+        };
+        let merged = Merged { clock_hz: 168e6, policies: vec![policy] };
+        let text = report(&merged);
+        let words: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
+        assert_eq!(words[1], ["arm", "distill", "1", "bits", "-", "-", "-", "-"]);
+        assert_eq!(words[2], ["distill", "2", "bits", "2000", "1.000", "5.00e-1*", "2.000"]);
+        assert_eq!(words[4], ["distill", "4", "bits", "4000", "2.000", "2.00e-2", "4.000"]);
+        assert!(text.contains("knee of arm: distill at 2500 bytes and 1.250 ms, NMSE 1.00e-2\n"), "{text}");
+        assert!(text.contains("at 168 MHz on a Cortex-M4"), "{text}");
+        let svg = frontiers::svg(&merged);
+        assert!(svg.contains("flash of the image, kB") && svg.contains("knee: 2.5 kB, 1.250 ms"), "{svg}");
+        assert!(svg.contains(">frontier of all methods<") || svg.matches("<polyline").count() >= 2, "{svg}");
     }
 }

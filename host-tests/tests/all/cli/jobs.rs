@@ -146,6 +146,32 @@ fn interrupted_sweeps_resume_to_the_same_store() -> Result<()> {
     Ok(())
 }
 
+/// The options of a command line are a spec: with a store they resume, and without one nothing stays.
+#[test]
+fn options_are_a_spec_in_memory() -> Result<()> {
+    let sweep = Sweep::new()?;
+    let line = "sweep policy --methods rtn,distill --bpw 4,5 --steps 2 --quiet --json";
+    let table = succeeded(&sweep.run(&format!("{line} a.json"), "")?)?;
+    let kept = succeeded(&sweep.run(&format!("{line} b.json --store store --threads 1 --log log"), "")?)?;
+    ensure!(kept == table && table.contains("5 bits"), "{kept}");
+    let json = |name: &str| -> Result<Value> { Ok(serde_json::from_slice(&fs::read(sweep.folder()?.join(name))?)?) };
+    ensure!(json("a.json")? == json("b.json")?);
+    // Two methods at two budgets, each made and measured, and the merge.
+    ensure!(results(&sweep.folder()?.join("store")) == 9);
+    let log = fs::read(sweep.folder()?.join("log"))?;
+    ensure!(succeeded(&sweep.run(&format!("{line} c.json --store store --log log"), "")?)? == table);
+    ensure!(fs::read(sweep.folder()?.join("log"))? == log, "a job with a result ran again");
+    // A spec of the same options has the same jobs; more budgets run in the same store.
+    let spec = "policies = [\"policy\"]\nmethods = [\"rtn\", \"distill\"]\nbpw = [4, 5]\nsteps = 2\n";
+    fs::write(sweep.folder()?.join("same.toml"), spec)?;
+    ensure!(succeeded(&sweep.run("plan same.toml --missing store", "")?)?.is_empty());
+    fs::write(sweep.folder()?.join("more.toml"), spec.replace("bpw", "flash = [\"1K\", \"8K\"]\nbpw"))?;
+    let more = succeeded(&sweep.run("sweep more.toml --store store --quiet", "")?)?;
+    ensure!(more.contains("1024 bytes") && more.contains("8192 bytes") && more.contains("5 bits"), "{more}");
+    ensure!(results(&sweep.folder()?.join("store")) == 9 + 2 * 2 * 2 + 1);
+    Ok(())
+}
+
 /// `sbatch` as a script that runs the array's tasks as processes, several at a time.
 const SBATCH: &str = r#"#!/bin/sh
 while [ $# -gt 0 ]; do
@@ -240,10 +266,15 @@ fn failed_jobs_leave_the_other_results() -> Result<()> {
 #[test]
 fn sweeps_are_refused_before_any_job() -> Result<()> {
     let sweep = Sweep::new()?;
-    fs::write(sweep.folder()?.join("key.toml"), format!("bits = 3\n{SPEC}"))?;
-    failed(&sweep.run("sweep key.toml --store store --quiet", "")?, 1, &["key.toml", "unknown field `bits`"])?;
+    fs::write(sweep.folder()?.join("key.toml"), format!("bit = 3\n{SPEC}"))?;
+    failed(&sweep.run("sweep key.toml --store store --quiet", "")?, 1, &["key.toml", "unknown field `bit`"])?;
     failed(&sweep.run("sweep none.toml --store store --quiet", "")?, 1, &["none.toml: cannot read the file"])?;
-    failed(&sweep.run("sweep sweep.toml --store store --bpw 3", "")?, 2, &["cannot be used with"])?;
+    failed(
+        &sweep.run("sweep sweep.toml --store store --bpw 3 --methods rtn", "")?,
+        1,
+        &["sweep.toml: is a spec, which has keys for --bpw, --methods"],
+    )?;
+    failed(&sweep.run("sweep sweep.toml policy --store store", "")?, 1, &["sweep.toml: is a spec; sweep it alone"])?;
     failed(&sweep.run("sweep sweep.toml --quiet", "")?, 1, &["sweep.toml: is a spec; add --store DIR"])?;
     failed(&sweep.run("sweep sweep.toml --store policy --quiet", "")?, 1, &["is not empty, and has no store.json"])?;
     failed(&sweep.run("merge sweep.toml --store new", "")?, 1, &["jobs have no result yet"])?;

@@ -10,9 +10,10 @@ use crate::digest::of_bytes;
 use crate::error::JobError;
 use crate::figures::Driven;
 use crate::host::{Host, Rollout};
-use crate::job::{Drive, Episodes, Job};
+use crate::job::Job;
 use crate::record::Outcome;
 use crate::store::Store;
+use crate::work::{Drive, Episodes};
 
 /// Runs the episodes of a job.
 pub(super) fn drive(

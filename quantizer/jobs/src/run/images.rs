@@ -1,23 +1,22 @@
 //! Jobs that make an image.
 
-use std::collections::BTreeMap;
-
 use actq::budget::Budget;
 use actq::data::{Dataset, Learned, Recordings, Sizes};
-use actq::error::Result;
+use actq::error::{Cause, Error, Result};
 use actq::measure::time::{CLOCK, StepTime};
-use actq::methods::{Method, Options, Outcome as MatrixOutcome};
-use actq::pipeline::{QuantizedPolicy, Quantizer};
+use actq::methods::Outcome as MatrixOutcome;
+use actq::pipeline::Quantizer;
 use actq::policy::Policy;
 
-use super::inputs::{Kept, path_of};
+use super::inputs::{self, Kept, path_of};
 use crate::digest::of_bytes;
 use crate::error::JobError;
 use crate::figures::{Driven, Made};
 use crate::host::Host;
-use crate::job::{Job, Learn, Make, Role};
+use crate::job::{Input, Job, Role};
 use crate::record::Outcome;
 use crate::store::Store;
+use crate::work::{Learn, Make};
 
 /// Makes an image of the recordings in the policy's folder.
 pub(super) fn quantize(
@@ -28,7 +27,7 @@ pub(super) fn quantize(
     watch: &mut dyn FnMut(&str, f64),
 ) -> Result<(Outcome, Option<Kept>), JobError> {
     let policy = host.load(path_of(make.policy.as_deref())?)?;
-    let parts = calib(job, &policy)?;
+    let parts = calib(job, &policy, host)?;
     made(job, make, &policy, parts, store, host, watch)
 }
 
@@ -41,7 +40,7 @@ pub(super) fn learn(
     watch: &mut dyn FnMut(&str, f64),
 ) -> Result<(Outcome, Option<Kept>), JobError> {
     let policy = host.load(path_of(learn.make.policy.as_deref())?)?;
-    let mut parts = calib(job, &policy)?;
+    let mut parts = calib(job, &policy, host)?;
     for address in &learn.recordings {
         let path = store.recording(address);
         match store.read(address)? {
@@ -49,7 +48,7 @@ pub(super) fn learn(
             Outcome::Impossible(why) => return Ok((Outcome::Impossible(why), None)),
             _ => {
                 let text = format!("{address}: the result has no recording to learn from");
-                return Err(JobError::never(actq::error::Error::input(text)));
+                return Err(JobError::never(Error::input(text)));
             }
         }
         parts.push(Dataset::load(&path, Sizes::of(&policy))?);
@@ -57,10 +56,20 @@ pub(super) fn learn(
     made(job, &learn.make, &policy, parts, store, host, watch)
 }
 
-/// Reads the recording to learn from, if the job has one.
-fn calib(job: &Job, policy: &Policy) -> Result<Vec<Dataset>> {
-    let files = job.inputs.iter().filter(|input| input.role == Role::Calib);
-    files.map(|input| Dataset::load(&input.path, Sizes::of(policy))).collect()
+/// Reads the recordings to learn from, if the job has any.
+fn calib(job: &Job, policy: &Policy, host: &dyn Host) -> Result<Vec<Dataset>> {
+    let read = |input: &Input| match input.role {
+        Role::Calib => Some(Dataset::load(&input.path, Sizes::of(policy))),
+        Role::Recorded => Some(host.recorded(policy, &input.path)),
+        Role::Policy | Role::Heldout | Role::Command => None,
+    };
+    job.inputs.iter().filter_map(read).collect()
+}
+
+/// Returns `true` for an error that says that no image is within the budget.
+fn is_impossible(error: &Error, budget: Budget) -> bool {
+    let searches = matches!(budget, Budget::ImageBytes(_) | Budget::MaxNmse(_) | Budget::Time(_));
+    error.budget().is_some() || (searches && matches!(error.cause(), Cause::Input(_)))
 }
 
 fn made(
@@ -74,13 +83,21 @@ fn made(
 ) -> Result<(Outcome, Option<Kept>), JobError> {
     let method = host.method(&make.method)?;
     let learned = if parts.is_empty() { None } else { Some(Learned::join(&mut parts, &policy.graph)?.dataset) };
-    let mut recordings = Recordings { calib: learned, heldout: None };
+    let heldout = match job.inputs.iter().any(|input| input.role == Role::Heldout) {
+        true => Some(inputs::heldout(job, Sizes::of(policy))?),
+        false => None,
+    };
+    let mut recordings = Recordings { calib: learned, heldout };
     recordings.fill_actions(&policy.graph);
     let frames = recordings.calib.as_ref().map_or(0, Dataset::frames);
-    let (quantized, scores) = match image(make, method, policy, &recordings, watch) {
+    let options = make.options(method)?;
+    let quantizer = Quantizer::new(policy, &recordings, options.method.clone(), None, |share| {
+        watch("calibrating", share);
+    })?;
+    let quantized = match quantizer.quantize(&options, watch) {
         Ok(made) => made,
         // The reason is a result, too: another try gives it again.
-        Err(error) if error.budget().is_some() => return Ok((Outcome::Impossible(error.to_string()), None)),
+        Err(error) if is_impossible(&error, make.budget) => return Ok((Outcome::Impossible(error.to_string()), None)),
         Err(error) => return Err(error.into()),
     };
     let buffer = quantized.buffer();
@@ -94,29 +111,8 @@ fn made(
         frames,
         matrices: policy.graph.matrices.iter().map(|matrix| matrix.name.clone()).collect(),
         rows: quantized.outcomes.iter().map(MatrixOutcome::trained_rows).collect(),
-        scores,
+        scores: quantizer.method().scores(),
     };
     let kept = Kept { path: store.image(&job.address), bytes: quantized.image };
     Ok((Outcome::Made(result), Some(kept)))
-}
-
-type Scores = Vec<BTreeMap<String, f64>>;
-
-fn image(
-    make: &Make,
-    method: Method,
-    policy: &Policy,
-    recordings: &Recordings,
-    watch: &mut dyn FnMut(&str, f64),
-) -> Result<(QuantizedPolicy, Scores)> {
-    let Make { bpw, steps, relative, seed, .. } = *make;
-    let plain = Options::new(method, Budget::BitsPerWeight(bpw));
-    let options = Options { group: plain.method.default_group(), steps, relative, seed, ..plain };
-    options.check()?;
-    let quantizer = Quantizer::new(policy, recordings, options.method.clone(), None, |share| {
-        watch("calibrating", share);
-    })?;
-    let quantized = quantizer.quantize(&options, watch)?;
-    let scores = quantizer.method().scores();
-    Ok((quantized, scores))
 }

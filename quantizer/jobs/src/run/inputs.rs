@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use actq::data::{Dataset, Sizes};
 use actq::error::{Context as _, Error, Result, ensure};
 use actq::runtime::ImageBuffer;
 
 use crate::digest::of_file;
 use crate::error::JobError;
 use crate::figures::Made;
-use crate::job::Input;
+use crate::job::{Input, Job, Role};
 use crate::record::Outcome;
 use crate::store::Store;
 
@@ -48,4 +49,10 @@ pub(super) fn image(address: &str, store: &Store) -> Result<Result<(Made, ImageB
         Outcome::Impossible(why) => Ok(Err(why)),
         _ => Err(JobError::never(Error::input(format!("{address}: the result is not an image")))),
     }
+}
+
+/// Reads the recording that errors are measured on.
+pub(super) fn heldout(job: &Job, sizes: Sizes) -> Result<Dataset> {
+    let input = job.inputs.iter().find(|input| input.role == Role::Heldout);
+    Dataset::load(&input.context("the job has no held-out recording")?.path, sizes)
 }

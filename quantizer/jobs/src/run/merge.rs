@@ -7,10 +7,10 @@ use actq::measure::eval::ErrorSums;
 
 use crate::error::JobError;
 use crate::figures::{Driven, Made};
-use crate::job::{Merge, Row};
 use crate::merged::{Figures, Merged, MergedImage, MergedPolicy};
 use crate::record::Outcome;
 use crate::store::Store;
+use crate::work::{Merge, Row};
 
 /// Merges the results of a plan, which must be in the store.
 ///
@@ -18,16 +18,16 @@ use crate::store::Store;
 ///
 /// "Again" if a result is missing.
 pub(super) fn merge(plan: &Merge, store: &Store) -> Result<Merged, JobError> {
-    let mut policies: Vec<MergedPolicy> = plan.policies.iter().map(|name| MergedPolicy::of(name)).collect();
+    let mut images: Vec<Vec<MergedImage>> = vec![Vec::new(); plan.policies.len()];
     for row in &plan.rows {
-        let Some(policy) = policies.get_mut(row.policy) else {
+        let Some(of_policy) = images.get_mut(row.policy) else {
             let text = format!("{}: its policy is not in the list; plan again", row.image);
             return Err(JobError::never(Error::input(text)));
         };
-        policy.images.push(image(row, store)?);
+        of_policy.push(image(row, store)?);
     }
-    policies.iter_mut().for_each(MergedPolicy::find_frontiers);
-    Ok(Merged { policies })
+    let policies = plan.policies.iter().zip(images).map(|(name, images)| MergedPolicy::new(name, images)).collect();
+    Ok(Merged { clock_hz: plan.clock_hz, policies })
 }
 
 fn image(row: &Row, store: &Store) -> Result<MergedImage, JobError> {
@@ -36,8 +36,8 @@ fn image(row: &Row, store: &Store) -> Result<MergedImage, JobError> {
         Outcome::Impossible(_) => None,
         _ => return Err(unexpected(&row.image)),
     };
-    let Row { method, bpw, seed, round, image, .. } = row.clone();
-    Ok(MergedImage { method, budget: bpw, seed, round, address: image, made: figures })
+    let Row { method, budget, seed, round, image, .. } = row.clone();
+    Ok(MergedImage { method, budget, seed, round, address: image, made: figures })
 }
 
 fn figures(row: &Row, made: Made, store: &Store) -> Result<Figures, JobError> {

@@ -5,19 +5,20 @@ use std::fs;
 use std::io::Error as IoError;
 use std::path::{Path, PathBuf};
 
-use actq::data::{Dataset, NpzWriter};
+use actq::data::{Dataset, NpzWriter, Sizes};
 use actq::error::{Error, Result};
 use actq::methods::Method;
 use actq::pipeline::driven::DriveOutcome;
 use actq::policy::Policy;
 use actq::random::Random;
 use actq_jobs::error::JobError;
-use actq_jobs::host::{Host, Rolled, Rollout};
+use actq_jobs::host::{Found, Host, Needed, Rolled, Rollout};
 use actq_jobs::job::Job;
 use actq_jobs::plan;
 use actq_jobs::run::run;
 use actq_jobs::spec::Spec;
 use actq_jobs::store::Store;
+use actq_jobs::work::Custom;
 use ndarray::Array3;
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use tempfile::TempDir;
@@ -93,6 +94,10 @@ impl Host for Fake {
         ["policy.json", "policy.safetensors"].map(|name| policy.join(name)).into()
     }
 
+    fn recorded(&self, policy: &Policy, recording: &Path) -> Result<Dataset> {
+        Dataset::load(recording, Sizes::of(policy))
+    }
+
     fn method(&self, name: &str) -> Result<Method> {
         match name {
             "rtn" => Ok(Method::Rtn),
@@ -129,6 +134,25 @@ impl Host for Fake {
         };
         let recordings = if rollout.record.is_some() { seeds.map(recording).collect() } else { Vec::new() };
         Ok(Rolled { outcome: DriveOutcome::parse(&line), recordings })
+    }
+
+    /// Doubles the number of the options, or of the result that it needs, and writes it into a file.
+    fn custom(
+        &self,
+        _job: &Job,
+        work: &Custom,
+        needs: &[Needed],
+        _watch: &mut dyn FnMut(&str, f64),
+    ) -> Result<Found, JobError> {
+        if work.name != "double" {
+            return Err(JobError::never(Error::input(format!("{} is unknown", work.name))));
+        }
+        let number = needs.first().map_or(&work.options["n"], |needed| &needed.value).as_u64().expect("a number");
+        let text = (2 * number).to_string();
+        if let Some(file) = needs.first().and_then(|needed| needed.file.as_ref()) {
+            assert_eq!(fs::read_to_string(file).expect("a file"), number.to_string());
+        }
+        Ok(Found { value: (2 * number).into(), file: Some(("txt", text.into_bytes())) })
     }
 }
 

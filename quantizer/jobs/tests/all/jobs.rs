@@ -3,13 +3,14 @@
 use std::fs;
 
 use crate::common::{Fake, SPEC, files, folder, jobs, run_all};
-use actq::pipeline::sweep::knee;
-use actq_jobs::job::Work;
-use actq_jobs::merged::Merged;
+use actq::budget::{Budget, TimeLimit};
+use actq_jobs::merged::{Merged, MergedImage};
 use actq_jobs::order;
+use actq_jobs::plan::add;
 use actq_jobs::record::Outcome;
 use actq_jobs::run::run;
 use actq_jobs::store::Store;
+use actq_jobs::work::{Custom, Work};
 
 fn merged(dir: &tempfile::TempDir) -> Merged {
     let plan = jobs(dir).expect("a plan");
@@ -78,9 +79,10 @@ fn results_do_not_depend_on_order_or_interruption() {
 fn counts_of_episodes_add_up() {
     let merged = merged(&folder(SPEC));
     let [policy] = &merged.policies[..] else { panic!("one policy") };
-    assert_eq!(policy.images.iter().map(|image| image.round).collect::<Vec<_>>(), [0, 0, 0, 1, 0, 1]);
+    // By budget, then by method: rtn, distill, and round 1 of distill.
+    assert_eq!(policy.images.iter().map(|image| image.round).collect::<Vec<_>>(), [0, 0, 1, 0, 0, 1]);
     assert!(policy.images[0].made.is_none(), "rtn has no image of 1 bit");
-    for image in policy.images.iter().filter(|image| image.budget == 20.0) {
+    for image in policy.images.iter().filter(|image| image.budget == Budget::BitsPerWeight(20.0)) {
         let made = image.made.as_ref().expect("an image");
         let driven = made.driven.as_ref().expect("episodes");
         // Seeds 100 to 104 in three jobs; the mean of the first seeds 100, 102 and 104, by episodes.
@@ -96,10 +98,10 @@ fn counts_of_episodes_add_up() {
         let bytes = |i: &usize| policy.images[*i].made.as_ref().map(|made| made.image.bytes);
         assert_eq!(frontier.is_sorted_by_key(bytes), smaller);
     }
-    let sweep = policy.sweep();
-    let names: Vec<&str> = sweep.curves.iter().map(|curve| curve.method.as_str()).collect();
-    assert_eq!((names, &sweep.budgets[..]), (vec!["rtn", "distill", "distill, round 1"], &[1.0, 20.0][..]));
-    assert_eq!(knee(&sweep.curves).is_some(), sweep.knee.is_some());
+    let curves = policy.curves();
+    let names: Vec<(&str, usize)> = curves.iter().map(|(name, images)| (name.as_str(), images.len())).collect();
+    assert_eq!(names, [("rtn", 2), ("distill", 2), ("distill, round 1", 2)]);
+    assert!(policy.knee.is_none(), "two points have no bend");
 }
 
 #[test]
@@ -135,4 +137,121 @@ fn changed_and_missing_inputs_stop_a_job() {
     let error = run(evaluate).expect_err("no recording");
     assert!(!error.again && format!("{:#}", error.error).contains("cannot read the file"), "{:#}", error.error);
     assert_eq!(files(store.folder()).len(), 2, "store.json and the first result");
+}
+
+/// The text of a plan's options that say how an image is made.
+fn makes(spec: &str) -> Vec<String> {
+    let plan = jobs(&folder(spec)).expect("a plan");
+    let make = |job: &actq_jobs::job::Job| match &job.work {
+        Work::Quantize(make) => Some(format!("{} {} {:?} {:?}", make.method, make.budget, make.effort, make.widths)),
+        _ => None,
+    };
+    plan.iter().filter_map(make).collect()
+}
+
+#[test]
+fn every_budget_and_option_makes_an_image() {
+    let spec = |keys: &str| format!("policies = [\"policy\"]\nmethods = [\"distill\"]\n{keys}\n");
+    let keys = "bits = [3]\nbpw = [20]\nflash = [\"2K\", 4096]\nmax_nmse = [0.5]\nsteps = 2\nwidths = { in = 8 }";
+    let of = |budget: &str| format!("distill {budget} Default {{\"in\": 8}}");
+    let budgets = ["width 3", "20 bits", "NMSE 0.5", "2048 bytes", "4096 bytes"].map(of);
+    assert_eq!(makes(&spec(keys)), budgets);
+    // Together, every image keeps a size and a time.
+    let both = "flash = [\"2K\", \"4K\"]\nms = [1, 2.5]\nclock = \"84M\"\neffort = \"quick\"";
+    let of = |budget: &str| format!("distill {budget} Quick {{}}");
+    let expected = ["1 ms, 2048 bytes", "1 ms, 4096 bytes", "2.5 ms, 2048 bytes", "2.5 ms, 4096 bytes"].map(of);
+    assert_eq!(makes(&spec(both)), expected);
+
+    // All of them run; the impossible ones say why.
+    let found = merged(&folder(&spec(&format!("{keys}\nms = [1e-9, 5]\nclock = \"84M\""))));
+    assert_eq!(found.clock_hz, 84e6);
+    let images = &found.policies[0].images;
+    let is_made = |image: &MergedImage| image.made.is_some();
+    // A size goes with each time: 1e-9 ms with 2K and 4K, then 5 ms.
+    assert_eq!(images.iter().map(is_made).collect::<Vec<_>>(), [true, true, true, false, false, true, true]);
+    for image in images {
+        let Some(made) = &image.made else { continue };
+        match image.budget {
+            Budget::ImageBytes(bytes) => assert!(made.image.bytes <= bytes),
+            Budget::MaxNmse(nmse) => assert!(made.nmse <= nmse, "{}", made.nmse),
+            Budget::Time(TimeLimit { milliseconds, image_bytes, .. }) => {
+                assert!(made.milliseconds(found.clock_hz) <= milliseconds);
+                assert!(image_bytes.is_none_or(|bytes| made.image.bytes <= bytes));
+            }
+            Budget::Width(_) | Budget::BitsPerWeight(_) => (),
+        }
+        if image.budget == Budget::BitsPerWeight(20.0) {
+            assert!(made.image.rows[0].keys().all(|bits| [0, 8].contains(bits)), "{:?}", made.image.rows);
+        }
+    }
+}
+
+#[test]
+fn every_option_is_part_of_the_address() {
+    let address = |more: &str| {
+        let spec = format!("policies = [\"policy\"]\nmethods = [\"distill\"]\n{more}\n");
+        jobs(&folder(&spec)).expect(more)[0].address.clone()
+    };
+    let all = [
+        "bpw = [3]",
+        "bpw = [3.5]",
+        "bits = [3]",
+        "flash = [4096]",
+        "ms = [3]",
+        "ms = [3]\nclock = \"84M\"",
+        "ms = [3]\nflash = [4096]",
+        "max_nmse = [0.1]",
+        "bpw = [3]\neffort = \"quick\"",
+        "bpw = [3]\nsteps = 2",
+        "bpw = [3]\nrelative = true",
+        "bpw = [3]\ngroup = 32",
+        "bpw = [3]\nactivations = 16",
+        "bpw = [3]\nwidths = { in = 4 }",
+        "bpw = [3]\nseeds = [2]",
+        "bpw = [3]\ncalib = [\"policy/calib.npz\"]",
+    ];
+    let addresses: std::collections::BTreeSet<String> = all.iter().map(|more| address(more)).collect();
+    assert_eq!(addresses.len(), all.len());
+    assert_eq!(address("bpw = [3]\nclock = \"84M\"\ncpus = 4"), address("bpw = [3]"), "no image depends on these");
+}
+
+#[test]
+fn named_recordings_replace_those_of_the_policy() {
+    let spec = "policies = [\"policy\"]\nmethods = [\"distill\"]\nbpw = [20]\nsteps = 2\n";
+    let own = merged(&folder(spec));
+    let named = format!("{spec}calib = [\"other\"]\nheldout = \"h.npz\"\n");
+    let dir = folder(&named);
+    fs::create_dir(dir.path().join("other")).expect("a folder");
+    for (from, to) in [("calib", "other/a"), ("heldout", "other/b"), ("heldout", "h")] {
+        fs::copy(dir.path().join(format!("policy/{from}.npz")), dir.path().join(format!("{to}.npz"))).expect("copied");
+    }
+    fs::remove_file(dir.path().join("policy/calib.npz")).expect("removed");
+    let other = merged(&dir);
+    let frames = |merged: &Merged| merged.policies[0].images[0].made.as_ref().map(|made| made.image.frames);
+    assert_eq!((frames(&own), frames(&other)), (Some(250), Some(500)));
+}
+
+#[test]
+fn work_of_the_program_reads_the_results_that_it_needs() {
+    let dir = folder(SPEC);
+    let mut plan = Vec::new();
+    let work = |name: &str, needs: Vec<String>| {
+        Work::Custom(Custom { name: name.to_owned(), options: serde_json::json!({"n": 2}), needs })
+    };
+    let size = (1, 1, 1.0);
+    let first = add(&mut plan, "first".into(), work("double", Vec::new()), Vec::new(), size).expect("added");
+    let last = add(&mut plan, "last".into(), work("double", vec![first]), Vec::new(), size).expect("added");
+    let other = add(&mut plan, "other".into(), work("unknown", Vec::new()), Vec::new(), size).expect("added");
+    assert_eq!(order::read(&order::text(&plan).expect("text")).expect("a plan"), plan);
+    let (path, host) = (dir.path().join("store"), Fake::default());
+    assert_eq!(run_all(&plan[..2], &path, &host).expect("both run"), 2);
+    let store = Store::open(&path, &host).expect("a store");
+    match store.read(&last).expect("a result") {
+        Outcome::Custom(found) => assert_eq!(found.value, 8),
+        found => panic!("{found:?}"),
+    }
+    assert_eq!(fs::read(store.file(&last, "txt")).expect("a file"), b"8");
+    let error = run_all(&plan[2..], &path, &host).expect_err("no such work");
+    assert!(!error.again && format!("{:#}", error.error).contains("unknown"), "{:#}", error.error);
+    assert!(!store.has(&other));
 }

@@ -18,13 +18,31 @@ fn specs_are_refused_with_the_key() {
         ("steps = 2", "minutes = 2", "minutes: learning that time limits"),
         ("steps = 2", "steps = -2", "invalid value"),
         ("bpw = [1, 20]", "bpw = [1, 0]", "budgets are numbers above 0"),
-        ("bpw = [1, 20]", "bpw = []", "bpw: the list is empty"),
+        ("bpw = [1, 20]", "bpw = []", "no budget: name at least one"),
         ("bpw = [1, 20]", "bpw = [2, 2.0]", "bpw: 2 is named twice"),
+        ("bpw = [1, 20]", "bits = [5]", "bits: 5: use 2, 3, 4 or 8"),
+        ("bpw = [1, 20]", "flash = [\"16Q\"]", "flash: 16Q: use a number of bytes"),
+        ("bpw = [1, 20]", "flash = [\"1K\", 1024]", "flash: 1024 is named twice"),
+        ("bpw = [1, 20]", "ms = [-1]", "ms: [-1.0]: budgets are numbers above 0"),
+        ("bpw = [1, 20]", "ms = [1]\nclock = \"fast\"", "clock: fast: use a number of Hz"),
+        ("bpw = [1, 20]", "max_nmse = [0]", "max_nmse: [0.0]: budgets are numbers above 0"),
+        ("steps = 2", "effort = \"much\"", "unknown variant `much`"),
+        ("steps = 2", "steps = 2\neffort = \"quick\"", "steps and effort: both say how long to learn"),
+        ("steps = 2", "group = 48", "group is 48"),
+        ("steps = 2", "activations = 12", "activations: 12; use 8 or 16 bits"),
+        ("steps = 2", "widths = { middle = 8 }", "widths: middle: tiny has no such matrix; it has in, out"),
+        ("steps = 2", "widths = { in = 5 }", "widths: in = 5: use 2, 3, 4 or 8"),
+        ("steps = 2", "calib = [\"none.npz\"]", "none.npz"),
+        (
+            "policies = [\"policy\"]",
+            "policies = [\"policy\", \"b\"]\nheldout = \"h.npz\"",
+            "calib and heldout apply to one policy",
+        ),
         ("\"distill\"]", "\"rtn\"]", "methods: rtn is named twice"),
         ("\"rtn\", \"distill\"", "\"rtn\"", "only method distill learns"),
         ("\"rtn\", ", "\"rtm\", ", "method \"rtm\" is unknown"),
         ("policies = [\"policy\"]", "policies = [\"nowhere\"]", "nowhere"),
-        ("policies = [\"policy\"]", "policies = [\"policy\", \"./policy\"]", "two policies are named \"tiny\""),
+        ("policies = [\"policy\"]", "policies = [\"policy\", \"./policy\"]", "have one address"),
         ("episodes = 5", "episodes = 0", "drive.episodes: 0"),
         ("first_seed = 10\n", "first_seed = 98\n", "seeds 98 to 100 are also seeds of [drive], 100 to 104"),
         ("command = \"simulator\"", "command = \"s\"\nfiles = [\"missing.py\"]", "missing.py: cannot read the file"),
@@ -39,7 +57,7 @@ fn specs_are_refused_with_the_key() {
     let dir = folder(SPEC);
     fs::remove_file(dir.path().join("policy/heldout.npz")).expect("removed");
     let error = format!("{:#}", jobs(&dir).expect_err("no recording"));
-    assert!(error.contains("a sweep needs recorded observations"), "{error}");
+    assert!(error.contains("actq sweep needs recorded observations"), "{error}");
 }
 
 /// Returns the plan's text with one address replaced by another.

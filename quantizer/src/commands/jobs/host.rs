@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
+use actq::data::Dataset;
 use actq::error::{Error, Result};
 use actq::methods::Method;
 use actq::policy::Policy;
@@ -21,8 +22,9 @@ use crate::serve::wait_for_recorders;
 /// Name of the spec's command in errors.
 const NAME: &str = "the drive command";
 
-/// The command `actq`.
-pub(super) struct Command;
+/// The command `actq`, whose methods are those of the library.
+#[derive(Clone, Copy, Debug)]
+pub struct Command;
 
 impl Host for Command {
     fn load(&self, policy: &Path) -> Result<Policy> {
@@ -31,6 +33,10 @@ impl Host for Command {
 
     fn files(&self, policy: &Path) -> Vec<PathBuf> {
         source_files(policy)
+    }
+
+    fn recorded(&self, policy: &Policy, recording: &Path) -> Result<Dataset> {
+        importers::recorded(policy, recording)
     }
 
     fn method(&self, name: &str) -> Result<Method> {

@@ -5,13 +5,13 @@ use std::io::{self, Read as _};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use actq_jobs::host::Host;
 use actq_jobs::job::Job;
 use actq_jobs::run;
 use actq_jobs::store::Store;
 use anyhow::{Context as _, Result};
 use serde_json::json;
 
-use super::host::Command;
 use crate::args::jobs::JobArgs;
 use crate::terminal::print;
 use crate::threads::{allocation, start_threads};
@@ -19,18 +19,18 @@ use crate::threads::{allocation, start_threads};
 /// The least time between two lines of progress.
 const BETWEEN_LINES: Duration = Duration::from_millis(500);
 
-/// Runs one job.
-pub(crate) fn run(args: &JobArgs) -> Result<()> {
+/// Runs one job in this process.
+pub fn run(args: &JobArgs, host: &dyn Host) -> Result<()> {
     let job = read(&args.job)?;
     let threads = match args.threads {
         0 => u16::try_from(job.cpus.min(allocation())).unwrap_or(u16::MAX),
         given => given,
     };
     start_threads(threads)?;
-    let store = Store::open(&args.store, &Command)?;
+    let store = Store::open(&args.store, host)?;
     let begun = Instant::now();
     let mut reported: Option<Instant> = None;
-    let ran = run::run(&job, &store, &Command, &mut |work, share| {
+    let ran = run::run(&job, &store, host, &mut |work, share| {
         if args.progress && reported.is_none_or(|at| at.elapsed() >= BETWEEN_LINES) {
             reported = Some(Instant::now());
             // A reader that has ended does not stop the job.

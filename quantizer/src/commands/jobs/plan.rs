@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use actq_jobs::host::Host;
 use actq_jobs::job::Job;
 use actq_jobs::spec::Spec;
 use actq_jobs::store::Store;
@@ -15,7 +16,7 @@ use crate::terminal::print;
 
 /// Prints the jobs of a spec.
 pub(crate) fn run(args: &PlanArgs) -> Result<()> {
-    let mut jobs = read(&args.spec)?;
+    let mut jobs = read(&args.spec, &Command)?;
     if let Some(folder) = &args.missing {
         let store = Store::open(folder, &Command)?;
         jobs.retain(|job| !store.has(&job.address));
@@ -25,10 +26,10 @@ pub(crate) fn run(args: &PlanArgs) -> Result<()> {
 }
 
 /// Plans a spec, or reads a plan.
-pub(super) fn read(path: &Path) -> Result<Vec<Job>> {
+pub(crate) fn read(path: &Path, host: &dyn Host) -> Result<Vec<Job>> {
     let name = path.display();
     if path.extension().is_some_and(|ending| ending == "toml") {
-        return plan::jobs(&Spec::read(path)?, &Command).with_context(|| name.to_string());
+        return plan::jobs(&Spec::read(path)?, host).with_context(|| name.to_string());
     }
     let text = fs::read_to_string(path).with_context(|| format!("{name}: cannot read the file"))?;
     order::read(&text).with_context(|| {

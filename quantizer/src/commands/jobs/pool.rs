@@ -1,10 +1,9 @@
-//! `actq sweep SPEC.toml`: a pool of worker processes on this machine.
+//! A pool of worker processes on this machine.
 
 use std::collections::BTreeMap;
-use std::env;
 use std::fs::OpenOptions;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Sender, channel};
 use std::thread;
@@ -17,55 +16,57 @@ use actq_jobs::store::Store;
 use anyhow::{Context as _, Result, ensure};
 use serde_json::{Value, json};
 
-use super::{host, merge, plan};
-use crate::args::SweepArgs;
 use crate::group;
 use crate::report::progress::duration;
-use crate::terminal::{Progress, note, reserve};
-use crate::threads::allocation;
+use crate::terminal::{Progress, note};
 
-/// Runs the jobs of a spec that have no result yet, and prints the results.
-pub(crate) fn run(args: &SweepArgs) -> Result<()> {
-    let folder = args.pool.store.as_deref().context("name a folder with --store")?;
-    let [spec] = &args.policy_dirs[..] else {
-        anyhow::bail!("--store takes one spec or plan, and {} are given", args.policy_dirs.len())
-    };
-    let outputs = reserve(args.svg.iter().chain(&args.json), [spec])?;
-    let progress = Progress::new(args.run.quiet, "planning")?;
-    let jobs = plan::read(spec)?;
-    let store = Store::open(folder, &host::Command)?;
-    let cores = if args.run.threads == 0 { allocation() } else { args.run.threads.into() };
-    let mut pool = Pool {
-        jobs: &jobs,
-        store: &store,
-        schedule: Schedule::new(&jobs, |job| store.has(&job.address), args.pool.tries.into()),
-        cores,
-        actq: env::current_exe().context("cannot find the running executable")?,
-        log: args.pool.log.clone(),
-        shares: BTreeMap::new(),
-    };
-    let ended = pool.work(&progress);
+/// How the jobs of a plan are run.
+#[derive(Clone, Copy, Debug)]
+pub struct Pool<'a> {
+    /// The program that runs a job: it has the command `job` of `actq`.
+    pub program: &'a Path,
+    /// Cores for all workers together.
+    pub cores: usize,
+    /// Most tries of a job.
+    pub tries: usize,
+    /// File to which a line is appended for each job that has run.
+    pub log: Option<&'a Path>,
+    /// `true` to show no progress.
+    pub quiet: bool,
+    /// `true` if the store stays when this process ends.
+    pub is_kept: bool,
+}
+
+/// Runs the jobs of a plan that have no result yet, each in a process of its own.
+///
+/// # Errors
+///
+/// At the end, if a job has failed; the store then has the results of the others.
+pub fn complete(jobs: &[Job], store: &Store, pool: &Pool<'_>) -> Result<()> {
+    let progress = Progress::new(pool.quiet, "starting")?;
+    let schedule = Schedule::new(jobs, |job| store.has(&job.address), pool.tries);
+    let mut work = Working { jobs, store, schedule, pool, shares: BTreeMap::new() };
+    let ended = work.work(&progress);
     drop(progress);
     ended?;
-    let Counts { failed, skipped, .. } = pool.schedule.counts();
-    ensure!(
-        failed == 0,
-        "{failed} jobs failed, and {skipped} that need them did not run; the others have their results in {}. Run the same command \
-         again to retry",
-        folder.display()
-    );
-    merge::report(&jobs, &store, outputs, args.svg.is_some(), args.json.is_some())
+    let Counts { failed, skipped, .. } = work.schedule.counts();
+    let kept = match pool.is_kept {
+        true => format!(
+            "; the others have their results in {}. Run the same command again to retry",
+            store.folder().display()
+        ),
+        false => String::new(),
+    };
+    ensure!(failed == 0, "{failed} jobs failed, and {skipped} that need them did not run{kept}");
+    Ok(())
 }
 
 /// Jobs, store and workers.
-struct Pool<'a> {
+struct Working<'a> {
     jobs: &'a [Job],
     store: &'a Store,
     schedule: Schedule<'a>,
-    /// Cores for all workers together.
-    cores: usize,
-    actq: PathBuf,
-    log: Option<PathBuf>,
+    pool: &'a Pool<'a>,
     /// Share done of each running job.
     shares: BTreeMap<usize, f64>,
 }
@@ -86,11 +87,11 @@ struct Try {
     said: String,
 }
 
-impl Pool<'_> {
+impl Working<'_> {
     fn work(&mut self, progress: &Progress) -> Result<()> {
         let (sender, receiver) = channel();
         let (begun, left_at_begin) = (Instant::now(), self.schedule.work().0);
-        let mut free = self.cores;
+        let mut free = self.pool.cores;
         loop {
             while let Some(job) = self.schedule.start(free) {
                 free = free.saturating_sub(self.jobs[job].cpus);
@@ -105,14 +106,14 @@ impl Pool<'_> {
             // Before the first progress, nothing is known but the estimates of the plan.
             let made = left_at_begin - left;
             let seconds =
-                if made > 0.0 { begun.elapsed().as_secs_f64() * left / made } else { left / self.cores as f64 };
+                if made > 0.0 { begun.elapsed().as_secs_f64() * left / made } else { left / self.pool.cores as f64 };
             let work = format!("{done} of {count} jobs, {running} running, {} left", duration(seconds));
             progress.set(&work, if all > 0.0 { 1.0 - left / all } else { 0.0 });
             match receiver.recv().context("the workers' threads have ended")? {
                 Message::Share(job, share) => drop(self.shares.insert(job, share)),
                 Message::Ended(job, of) => {
                     self.shares.remove(&job);
-                    free = (free + self.jobs[job].cpus).min(self.cores);
+                    free = (free + self.jobs[job].cpus).min(self.pool.cores);
                     self.end(job, &of)?;
                 }
             }
@@ -129,9 +130,9 @@ impl Pool<'_> {
     /// Starts a worker, and a thread that reads its output.
     fn start(&self, job: usize, sender: Sender<Message>) -> Result<()> {
         let line = serde_json::to_string(&self.jobs[job])?;
-        let mut command = Command::new(&self.actq);
+        let mut command = Command::new(self.pool.program);
         command.args(["job", "-", "--progress", "--store"]).arg(self.store.folder());
-        command.args(["--threads", &self.jobs[job].cpus.min(self.cores).min(256).to_string()]);
+        command.args(["--threads", &self.jobs[job].cpus.min(self.pool.cores).min(256).to_string()]);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let begun = Instant::now();
         let mut child = group::spawn(&mut command).context("cannot start a worker")?;
@@ -157,7 +158,7 @@ impl Pool<'_> {
             let next = if again { "it is tried again" } else { "no further try" };
             note([format!("{}: failed with status {status}; {next}: {}", job.title, said.trim_end())]);
         }
-        let Some(log) = &self.log else { return Ok(()) };
+        let Some(log) = self.pool.log else { return Ok(()) };
         let entry = json!({
             "address": job.address,
             "title": job.title,
