@@ -16,7 +16,7 @@ Usage: cargo xtask python [--optional] [-- PYTEST...]
 Makes a virtual environment below the target directory, builds and installs the Python package, runs its tests, and checks
 its types. Needs Python 3.9 or later with venv: python3, or the interpreter that ACTQ_PYTHON names.
 
-  --optional  Also install torch and Stable-Baselines3, and run the tests that need them
+  --optional  Also install torch, Stable-Baselines3 and Ray, and run the tests that need them
   PYTEST...   Arguments for pytest, as -k head";
 
 /// The oldest supported version of Python.
