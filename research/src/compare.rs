@@ -1,139 +1,85 @@
-//! The comparison: every method at every budget on every policy, each image in its own task.
-//!
-//! One thread quantizes, as learning uses all cores; another drives the finished images, and appends the results to the
-//! journal.
+//! The comparison: every method at every budget on every policy, each image made by one job and driven by another.
 
 mod actquant_k;
 mod cell;
-mod journal;
+mod jobs;
 mod making;
-mod pace;
 mod plan;
 mod report;
+mod results;
 mod simulator;
+mod work;
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Mutex, MutexGuard};
-use std::thread;
-use std::time::{Duration, Instant};
 use std::{env, fs};
 
 use actq_bench::{command, ur3};
+use actq_cli::commands::jobs::host::Command;
+use actq_cli::commands::jobs::pool::{Pool, complete};
 use actq_cli::outputs::files;
-use actq_cli::report::progress::duration;
-use anyhow::{Context as _, Result, anyhow, ensure};
+use actq_jobs::order;
+use actq_jobs::store::Store;
+use anyhow::{Context as _, Result, ensure};
 
 pub use cell::{Cell, CellKey, Made};
-pub use journal::{Header, Journal};
-use making::{Attempt, Maker, Subject};
+use jobs::Entrant;
 use plan::UR3;
 pub use plan::{Contender, Plan};
-use simulator::{Driver, Episodes, Simulator};
+use results::{HEADER, LOG, PLAN, STORE};
+pub use results::{Header, Results};
+use simulator::{Simulator, shared};
+pub use work::work;
 
-/// The least time between two progress lines of a slow cell.
-const BETWEEN_LINES: Duration = Duration::from_secs(60);
+/// Most tries of a job in one run.
+const TRIES: usize = 2;
 
-/// A policy of the comparison.
-struct Entrant {
-    name: String,
-    folder: PathBuf,
-    simulator: Simulator,
-}
-
-/// A cell that was made, or is impossible, and the policy to drive.
-struct Job {
-    cell: Cell,
-    driver: Option<Driver>,
-    simulator: Simulator,
-}
-
-/// Runs the cells of the plan that the journal lacks, and writes the report.
+/// Runs the jobs of the plan that have no result yet, and writes the report.
 ///
 /// # Errors
-/// Reports failed cells at the end, after all others are made. The same plan run again retries them.
+/// Reports failed jobs at the end, after all others have run. The same plan run again retries them.
 pub fn run(plan: &Plan) -> Result<()> {
-    if !plan.report {
-        compare(plan)?;
+    let outcome = if plan.report { Ok(()) } else { compare(plan) };
+    // The finished cells are worth a report even if others failed.
+    if plan.out.join(PLAN).is_file() || outcome.is_ok() {
+        let path = report::write(&Results::read(&plan.out)?, &plan.out)?;
+        eprintln!("wrote {}", path.display());
     }
-    let path = report::write(&Journal::read(&plan.out)?, &plan.out)?;
-    eprintln!("wrote {}", path.display());
-    Ok(())
+    outcome
 }
 
 fn compare(plan: &Plan) -> Result<()> {
     let entrants = entrants(plan)?;
-    let journal = Journal::open(plan)?;
-    let all: Vec<(CellKey, &Entrant)> =
-        entrants.iter().flat_map(|entrant| keys(plan, &entrant.name).map(move |key| (key, entrant))).collect();
-    let is_done = |(key, entrant): &(CellKey, &Entrant)| {
-        // If a simulator has been added since, repeat the cells that were not driven.
-        let drivable = !matches!(entrant.simulator, Simulator::Missing(_));
-        journal.find(key).is_some_and(|cell| cell.driven.is_some() || cell.why.is_some() || !drivable)
-    };
-    let missing: Vec<(CellKey, &Entrant)> = all.iter().filter(|cell| !is_done(cell)).cloned().collect();
-    eprintln!("{} of {} cells are done, {} remain", all.len() - missing.len(), all.len(), missing.len());
-    if missing.is_empty() {
+    let jobs = jobs::jobs(plan, &entrants)?;
+    order::check(&jobs)?;
+    fs::create_dir_all(&plan.out).with_context(|| format!("cannot create {}", plan.out.display()))?;
+    let header = serde_json::to_string_pretty(&Header::now(plan)?)? + "\n";
+    files::write(&plan.out.join(HEADER), header.as_bytes())?;
+    files::write(&plan.out.join(PLAN), order::text(&jobs)?.as_bytes())?;
+    let store = Store::open(&plan.out.join(STORE), &Command)?;
+    let left = jobs.iter().filter(|job| !store.has(&job.address)).count();
+    eprintln!("{} of {} jobs are done, {left} remain", jobs.len() - left, jobs.len());
+    if left == 0 {
         return Ok(());
     }
-    let images = absolute(&plan.out)?.join("images");
-    fs::create_dir_all(&images).with_context(|| format!("cannot create {}", images.display()))?;
-    // A rebuild of the command must not affect a run of hours.
+    // A rebuild of the commands must not affect a run of hours.
     let private = tempfile::tempdir().context("cannot create a temporary folder")?;
-    let mut actq = PathBuf::new();
-    if missing.iter().any(|(_, entrant)| matches!(entrant.simulator, Simulator::MuJoCo { .. })) {
-        actq = private.path().join(format!("actq{}", env::consts::EXE_SUFFIX));
-        fs::copy(command::binary()?, &actq).context("cannot copy the command actq")?;
+    let copy = |program: &std::path::Path, name: &str| {
+        let to = private.path().join(format!("{name}{}", env::consts::EXE_SUFFIX));
+        fs::copy(program, &to).with_context(|| format!("cannot copy the command {name}"))?;
+        anyhow::Ok(to)
+    };
+    let program = copy(&env::current_exe().context("cannot find the running executable")?, "actq-research")?;
+    if entrants.iter().any(|entrant| matches!(entrant.simulator, Simulator::MuJoCo { .. })) {
+        copy(command::binary()?, "actq")?;
     }
-
-    let status = Status { journal: Mutex::new(journal), keys: missing.iter().map(|(key, _)| key.clone()).collect() };
-    let mut failures = Vec::new();
-    thread::scope(|scope| -> Result<()> {
-        let (to_drive, jobs) = channel::<Job>();
-        let (status, actq) = (&status, &actq);
-        let driving = scope.spawn(move || drive(plan, jobs, actq, status));
-        let mut groups: BTreeMap<&str, Vec<&CellKey>> = BTreeMap::new();
-        for (key, entrant) in &missing {
-            groups.entry(&entrant.name).or_default().push(key);
-        }
-        'policies: for entrant in &entrants {
-            let Some(keys) = groups.get(entrant.name.as_str()) else { continue };
-            let subject = Subject::load(&entrant.folder)?;
-            let mut maker = Maker::new(&subject, plan);
-            for key in keys {
-                match make(key, entrant, &mut maker, &images) {
-                    Ok(job) => {
-                        if to_drive.send(job).is_err() {
-                            // The other thread has ended, and reports why.
-                            break 'policies;
-                        }
-                    }
-                    Err(error) => failures.push(failed(key, &error)),
-                }
-            }
-        }
-        drop(to_drive);
-        failures.extend(driving.join().map_err(|_| anyhow!("the driving thread panicked"))??);
-        Ok(())
-    })?;
-    if !failures.is_empty() {
-        // The finished cells are worth a report all the same.
-        report::write(&Journal::read(&plan.out)?, &plan.out)?;
-    }
-    ensure!(
-        failures.is_empty(),
-        "{} cells failed; the same command retries them:\n{}",
-        failures.len(),
-        failures.join("\n")
-    );
-    Ok(())
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let log = plan.out.join(LOG);
+    let pool = Pool { program: &program, cores, tries: TRIES, log: Some(&log), quiet: false, is_kept: true };
+    complete(&jobs, &store, &pool)
 }
 
 /// Returns the policies of a plan that are present.
 fn entrants(plan: &Plan) -> Result<Vec<Entrant>> {
-    let shared = env::var_os("ACTQ_SHARED").filter(|folder| !folder.is_empty()).map(PathBuf::from);
-    let shared = shared.as_deref().map(absolute).transpose()?;
+    let shared = shared()?;
     let mut entrants = Vec::new();
     for name in &plan.policies {
         let simulator = Simulator::of(name, shared.as_deref());
@@ -157,102 +103,4 @@ fn entrants(plan: &Plan) -> Result<Vec<Entrant>> {
     }
     ensure!(!entrants.is_empty(), "no policy is left: set ACTQ_SHARED, or add ur3 to --policies");
     Ok(entrants)
-}
-
-/// Returns the cells of a policy: itself, then every method at every budget.
-fn keys<'a>(plan: &'a Plan, policy: &'a str) -> impl Iterator<Item = CellKey> + 'a {
-    let key = move |method, budget| CellKey { policy: policy.to_owned(), method, budget };
-    let rows = plan.methods.iter().flat_map(|&method| plan.budgets.iter().map(move |&budget| (method, budget)));
-    std::iter::once(key(None, None)).chain(rows.map(move |(method, budget)| key(Some(method), Some(budget))))
-}
-
-fn make(key: &CellKey, entrant: &Entrant, maker: &mut Maker<'_>, images: &Path) -> Result<Job> {
-    let mut cell = Cell { key: key.clone(), made: None, why: None, driven: None, drive_seconds: 0.0 };
-    let simulator = entrant.simulator.clone();
-    let (Some(method), Some(budget)) = (key.method, key.budget) else {
-        return Ok(Job { cell, driver: Some(Driver::Folder(entrant.folder.clone())), simulator });
-    };
-    let mut reported_at = Instant::now();
-    let attempt = maker.make(method, budget, |work, share| {
-        if reported_at.elapsed() >= BETWEEN_LINES {
-            eprintln!("  {}: {work}, {:.0}%", key.title(), 100.0 * share);
-            reported_at = Instant::now();
-        }
-    })?;
-    let driver = match attempt {
-        Attempt::Made(image, made) => {
-            let path = images.join(format!("{}-{}-{budget}.actq", key.policy, method.name()));
-            files::write(&path, &image)?;
-            cell.made = Some(made);
-            Some(Driver::Image(path))
-        }
-        Attempt::Simulated(graph, made) => {
-            let folder = images.join(format!("{}-{}-{budget}", key.policy, method.name()));
-            actquant_k::write_policy(maker.policy(), &graph, &folder)?;
-            cell.made = Some(made);
-            Some(Driver::Folder(folder))
-        }
-        Attempt::Impossible(why) => {
-            cell.why = Some(why);
-            None
-        }
-    };
-    Ok(Job { cell, driver, simulator })
-}
-
-/// The state that both threads share.
-struct Status {
-    journal: Mutex<Journal>,
-    /// The cells that this run must make.
-    keys: Vec<CellKey>,
-}
-
-impl Status {
-    fn journal(&self) -> MutexGuard<'_, Journal> {
-        // After a panic elsewhere the journal still has whole lines.
-        self.journal.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-    }
-
-    /// Appends a cell, and prints its result and the remaining time.
-    fn add(&self, cell: Cell) -> Result<()> {
-        let title = cell.key.title();
-        let what = report::sentence(&cell);
-        let mut journal = self.journal();
-        journal.add(cell)?;
-        let missing: Vec<CellKey> = self.keys.iter().filter(|key| journal.find(key).is_none()).cloned().collect();
-        let left = pace::seconds_left(&journal.cells, &missing).unwrap_or_default();
-        let (done, all) = (self.keys.len() - missing.len(), self.keys.len());
-        eprintln!("[{done}/{all}] {title}: {what}; about {} left", duration(left));
-        Ok(())
-    }
-}
-
-/// Drives jobs until the channel closes. Returns the failures.
-fn drive(plan: &Plan, jobs: Receiver<Job>, actq: &Path, status: &Status) -> Result<Vec<String>> {
-    let episodes = Episodes { first: plan.seed0, count: plan.episodes };
-    let mut failures = Vec::new();
-    for Job { mut cell, driver, simulator } in jobs {
-        let begun = Instant::now();
-        let outcome = driver.map_or(Ok(None), |driver| simulator.run(&driver, episodes, actq));
-        match outcome {
-            Ok(outcome) => {
-                cell.driven = outcome.map(serde_json::to_value).transpose()?;
-                cell.drive_seconds = begun.elapsed().as_secs_f64();
-                status.add(cell)?;
-            }
-            Err(error) => failures.push(failed(&cell.key, &error)),
-        }
-    }
-    Ok(failures)
-}
-
-/// Reports a failed cell immediately, and returns the message for the end.
-fn failed(key: &CellKey, error: &anyhow::Error) -> String {
-    let message = format!("{}: {error:#}", key.title());
-    eprintln!("FAILED {message}");
-    message
-}
-
-fn absolute(path: &Path) -> Result<PathBuf> {
-    fs::canonicalize(path).with_context(|| format!("cannot read {}", path.display()))
 }

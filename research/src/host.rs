@@ -1,5 +1,6 @@
-//! What jobs need from this command: the methods of this crate beside those of `actq`.
+//! What jobs need from this command: the methods and works of this crate beside those of `actq`.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use actq::data::Dataset;
@@ -8,10 +9,13 @@ use actq::methods::Method;
 use actq::policy::Policy;
 use actq_cli::commands::jobs::host::Command;
 use actq_jobs::error::JobError;
-use actq_jobs::host::{Host, Rolled, Rollout};
+use actq_jobs::host::{Found, Host, Needed, Rolled, Rollout};
+use actq_jobs::job::Job;
+use actq_jobs::work::Custom;
 
 use crate::actquant::ActQuant;
 use crate::actquant::choices::Choices;
+use crate::compare;
 
 /// The command `actq-research`.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +51,19 @@ impl Host for Research {
 
     fn drive(&self, rollout: &Rollout<'_>) -> Result<Rolled, JobError> {
         Command.drive(rollout)
+    }
+
+    fn custom(
+        &self,
+        job: &Job,
+        work: &Custom,
+        needs: &[Needed],
+        watch: &mut dyn FnMut(&str, f64),
+    ) -> Result<Found, JobError> {
+        compare::work(job, work, needs, watch).map_err(|error| {
+            let again = error.chain().any(|cause| cause.is::<io::Error>());
+            JobError { again, error: Error::other(error) }
+        })
     }
 }
 

@@ -16,30 +16,24 @@ enum Command {
     Quantize(Quantize),
     /// Compare methods at several budgets, as `actq sweep` does, with actquant among the methods
     Sweep(Sweep),
-    /// Run one job of a sweep, as `actq job` does; `sweep` starts it
+    /// Run one job of a sweep or a comparison, as `actq job` does; the other commands start it
     Job(Job),
     /// Compare the methods at equal budgets: held-out error, true bits, closed-loop success
     ///
     /// The policies are the UR3 policy and, if ACTQ_SHARED names their folder, the shared ones. Their tasks run in
-    /// MuJoCo with the Python of ACTQ_MUJOCO_PYTHON (go1_*, g1_*) and ACTQ_GYMNASIUM_PYTHON (fetch_*). Each result is
-    /// appended to DIR/compare.jsonl as soon as it is known: the same command resumes an interrupted run. The report is
-    /// DIR/compare.md.
+    /// MuJoCo with the Python of ACTQ_MUJOCO_PYTHON (go1_*, g1_*) and ACTQ_GYMNASIUM_PYTHON (fetch_*). Each image and
+    /// each closed loop is a job, whose result is kept in DIR/store: the same command resumes an interrupted run, also at
+    /// a later commit that makes the same images. The report is DIR/compare.md.
     #[command(override_usage = "cargo xtask compare [OPTIONS] --out <DIR>")]
     Compare(Plan),
 }
 
 fn main() -> ExitCode {
-    let plan = match Command::parse() {
-        Command::Quantize(command) => return actq_cli::run_work(|| command.run()),
-        Command::Sweep(command) => return actq_cli::run_work(|| command.run()),
-        Command::Job(command) => return actq_cli::run_work(|| command.run()),
-        Command::Compare(plan) => plan,
-    };
-    match compare::run(&plan) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("\nerror: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    let command = Command::parse();
+    actq_cli::run_work(|| match &command {
+        Command::Quantize(command) => command.run(),
+        Command::Sweep(command) => command.run(),
+        Command::Job(command) => command.run(),
+        Command::Compare(plan) => compare::run(plan),
+    })
 }

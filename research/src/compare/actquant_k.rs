@@ -4,7 +4,6 @@
 //! padding to whole super-blocks is not counted.
 
 use std::fs;
-use std::path::Path;
 
 use actq::budget::Rate;
 use actq::data::Dataset;
@@ -12,7 +11,6 @@ use actq::graph::Graph;
 use actq::import::FILES;
 use actq::measure::eval;
 use actq::policy::Policy;
-use actq_cli::outputs::files;
 use anyhow::{Context as _, Result, ensure};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
@@ -106,15 +104,11 @@ fn simulate(
     Ok(Simulated { nmse: eval::network_nmse(&graph, heldout)?, graph, formats: formats.to_vec(), bytes })
 }
 
-/// Writes the policy with the matrices of `graph` into a folder of its own.
-pub(super) fn write_policy(policy: &Policy, graph: &Graph, folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
-    let [json, tensors] = FILES;
-    let read = |name: &str| {
-        let path = policy.dir.join(name);
-        fs::read(&path).with_context(|| format!("cannot read {}", path.display()))
-    };
-    let bytes = read(tensors)?;
+/// Returns the policy's file of tensors with the matrices of `graph`.
+pub(super) fn tensors(policy: &Policy, graph: &Graph) -> Result<Vec<u8>> {
+    let [_, tensors] = FILES;
+    let path = policy.dir.join(tensors);
+    let bytes = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let source = SafeTensors::deserialize(&bytes).with_context(|| format!("{}: {tensors}", policy.dir.display()))?;
     let mut replaced = Vec::new();
     for (before, after) in policy.graph.matrices.iter().zip(&graph.matrices) {
@@ -135,6 +129,5 @@ pub(super) fn write_policy(policy: &Policy, graph: &Graph, folder: &Path) -> Res
     for (name, shape, data) in &replaced {
         views.push((name, TensorView::new(Dtype::F32, shape.clone(), data)?));
     }
-    files::write(&folder.join(tensors), &safetensors::serialize(views, None)?)?;
-    files::write(&folder.join(json), &read(json)?)
+    Ok(safetensors::serialize(views, None)?)
 }

@@ -33,9 +33,7 @@ impl CellKey {
 pub struct Made {
     /// Error on the held-out recording.
     pub nmse: f64,
-    /// Predicted milliseconds of a step at the default clock; `None` if no kernel computes the format, and in journals
-    /// of earlier versions.
-    #[serde(default)]
+    /// Predicted milliseconds of a step at the default clock; `None` if no kernel computes the format.
     pub milliseconds: Option<f64>,
     /// Bits per weight, everything counted.
     pub bpw: f64,
@@ -47,15 +45,21 @@ pub struct Made {
     pub format: String,
     /// `true` for the method's default group.
     pub default_group: bool,
-    /// Seconds of statistics and quantization; the simulator runs at the same time.
-    pub seconds: f64,
 }
 
-/// A line of the journal.
+/// The result of a job that makes an image.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Attempted {
+    /// The image.
+    pub(super) made: Option<Made>,
+    /// Reason if no image is possible.
+    pub(super) why: Option<String>,
+}
+
+/// A result.
+#[derive(Clone, Debug)]
 pub struct Cell {
     /// Key.
-    #[serde(flatten)]
     pub key: CellKey,
     /// The image; none for the f32 policy.
     pub made: Option<Made>,
@@ -63,8 +67,8 @@ pub struct Cell {
     pub why: Option<String>,
     /// Output of the closed loop; `None` without one.
     pub driven: Option<Value>,
-    /// Seconds of the closed loop.
-    pub drive_seconds: f64,
+    /// Seconds of the job that made the image, if the log has them.
+    pub seconds: Option<f64>,
 }
 
 impl Cell {

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::time::Instant;
 
 use actq::budget::{Budget, BudgetTooSmall};
 use actq::data::{Dataset, Recording, Recordings};
@@ -17,7 +16,7 @@ use anyhow::{Context as _, Result};
 
 use super::actquant_k;
 use super::cell::Made;
-use super::plan::{Contender, Plan};
+use super::plan::Contender;
 use crate::actquant::ActionStatistics;
 use crate::kquants::Format;
 
@@ -56,13 +55,14 @@ impl Subject {
 /// The methods prepared for a policy, each on first use.
 pub(super) struct Maker<'a> {
     subject: &'a Subject,
-    plan: &'a Plan,
-    ready: BTreeMap<String, (Quantizer<'a>, f64)>,
+    steps: Option<usize>,
+    seed: u64,
+    ready: BTreeMap<String, Quantizer<'a>>,
 }
 
 impl<'a> Maker<'a> {
-    pub(super) fn new(subject: &'a Subject, plan: &'a Plan) -> Self {
-        Self { subject, plan, ready: BTreeMap::new() }
+    pub(super) fn new(subject: &'a Subject, steps: Option<usize>, seed: u64) -> Self {
+        Self { subject, steps, seed, ready: BTreeMap::new() }
     }
 
     /// The policy.
@@ -113,8 +113,7 @@ impl<'a> Maker<'a> {
 
     /// Makes ActQuant in K-quants.
     fn simulate(&self, contender: Contender, budget: f64) -> Result<Attempt> {
-        let begun = Instant::now();
-        let (quantizer, preparing) = self.prepared(contender)?;
+        let quantizer = self.prepared(contender)?;
         let statistics = quantizer.method().custom::<ActionStatistics>().context("the method has no statistics")?;
         let policy = &self.subject.policy;
         let simulated = match actquant_k::quantize(&policy.graph, statistics, budget, self.subject.heldout()?) {
@@ -125,7 +124,6 @@ impl<'a> Maker<'a> {
                 return Ok(Attempt::Impossible(least(&too_small, &format!("all matrices in {}", Format::ALL[0]))));
             }
         };
-        let seconds = preparing + begun.elapsed().as_secs_f64();
         let (weights, parameters) = (policy.weights, policy.parameters);
         // Everything but the matrices stays in f32.
         let bytes = simulated.bytes + 4 * (parameters - weights);
@@ -137,7 +135,6 @@ impl<'a> Maker<'a> {
             bytes_per_parameter: bytes as f64 / parameters.max(1) as f64,
             format: simulated.formats.iter().map(Format::to_string).collect::<Vec<_>>().join(" "),
             default_group: true,
-            seconds,
         };
         Ok(Attempt::Simulated(simulated.graph, made))
     }
@@ -147,16 +144,15 @@ impl<'a> Maker<'a> {
         let method = contender.method();
         let name = method.to_string();
         if !self.ready.contains_key(&name) {
-            let begun = Instant::now();
             let Subject { policy, recordings } = self.subject;
             let quantizer = Quantizer::new(policy, recordings, method, None, |share| progress("calibrating", share))?;
-            self.ready.insert(name, (quantizer, begun.elapsed().as_secs_f64()));
+            self.ready.insert(name, quantizer);
         }
         Ok(())
     }
 
-    /// Returns a contender's prepared method, and the seconds of its statistics.
-    fn prepared(&self, contender: Contender) -> Result<&(Quantizer<'a>, f64)> {
+    /// Returns a contender's prepared method.
+    fn prepared(&self, contender: Contender) -> Result<&Quantizer<'a>> {
         self.ready.get(&contender.method().to_string()).context("the method is not prepared")
     }
 
@@ -167,16 +163,13 @@ impl<'a> Maker<'a> {
         group: usize,
         progress: &mut impl FnMut(&str, f64),
     ) -> Result<Result<Attempt, BudgetTooSmall>> {
-        let steps = if contender == Contender::DistillNotLearned { Some(0) } else { self.plan.steps };
+        let steps = if contender == Contender::DistillNotLearned { Some(0) } else { self.steps };
         let plain = Options::new(contender.method(), Budget::BitsPerWeight(budget));
-        let options = Options { group, steps, seed: self.plan.seed, ..plain };
-        let begun = Instant::now();
-        let (quantizer, preparing) = self.prepared(contender)?;
-        let quantized = match quantizer.quantize(&options, progress) {
+        let options = Options { group, steps, seed: self.seed, ..plain };
+        let quantized = match self.prepared(contender)?.quantize(&options, progress) {
             Ok(quantized) => quantized,
             Err(error) => return error.budget().map(|small| Err(*small)).ok_or(error.into()),
         };
-        let seconds = preparing + begun.elapsed().as_secs_f64();
         let buffer = quantized.buffer();
         let image = buffer.image(Path::new("image in memory"))?;
         let report = eval::evaluate(image, self.subject.heldout()?)?;
@@ -188,7 +181,6 @@ impl<'a> Maker<'a> {
             bytes_per_parameter: report.bytes as f64 / self.subject.policy.parameters.max(1) as f64,
             format: if group == 0 { "row".to_owned() } else { group.to_string() },
             default_group: group == options.method.default_group(),
-            seconds,
         };
         Ok(Ok(Attempt::Made(quantized.image, made)))
     }

@@ -118,11 +118,11 @@ pub struct Plan {
     /// Limit of learning steps; by default chosen for the network
     #[arg(long, value_name = "N")]
     pub steps: Option<usize>,
-    /// Folder of compare.jsonl, compare.md and the images; created if missing
+    /// Folder of compare.md and the results; created if missing
     #[arg(long, value_name = "DIR")]
     #[serde(skip)]
     pub out: PathBuf,
-    /// Run nothing: rewrite compare.md from compare.jsonl
+    /// Run nothing: rewrite compare.md from the results
     #[arg(long)]
     #[serde(skip)]
     pub report: bool,

@@ -12,8 +12,8 @@ use anyhow::Result;
 use serde_json::Value;
 
 use super::cell::{Cell, CellKey, Made};
-use super::journal::{Header, Journal};
 use super::plan::Contender;
+use super::results::{Header, Results};
 
 /// Distance of the robot from its target, by the simulator's name for it, with its unit.
 const TRACKING: [(&str, &str); 3] = [("tracking_error_mm", "mm"), ("err_lin", "m/s"), ("dist", "m")];
@@ -38,25 +38,13 @@ in its favour: activations are not rounded, padding of rows to 256 is not counte
 of the weights' magnitude, and of allocations from Q2_K and from IQ2_XS, the one with the lowest held-out error was taken. Its IQ2_XS has a \
 grid of the same size and rate, but not llama.cpp's. Its image bytes are those of its blocks and everything else in f32.";
 
-/// Writes the report beside the journal, and returns its path.
-pub(super) fn write(journal: &Journal, folder: &Path) -> Result<PathBuf> {
-    let asked = Asked::of(&journal.header)?;
+/// Writes the report beside the results, and returns its path.
+pub(super) fn write(results: &Results, folder: &Path) -> Result<PathBuf> {
+    let asked = Asked::of(&results.header)?;
     let path = folder.join("compare.md");
-    files::write(&folder.join(PICTURE), stacked(&plots(journal, &asked)).as_bytes())?;
-    files::write(&path, markdown(journal, &asked)?.as_bytes())?;
+    files::write(&folder.join(PICTURE), stacked(&plots(results, &asked)).as_bytes())?;
+    files::write(&path, markdown(results, &asked)?.as_bytes())?;
     Ok(path)
-}
-
-/// Describes a cell in a line of progress.
-pub(super) fn sentence(cell: &Cell) -> String {
-    let made = cell
-        .made
-        .as_ref()
-        .map(|made| format!("NMSE {:.1e} with {} bytes in {:.0} s", made.nmse, made.bytes, made.seconds));
-    let driven = cell.outcome().and_then(|outcome| success(&outcome)).map(|success| format!("success {success}"));
-    let why = cell.why.as_ref().map(|why| format!("not made: {why}"));
-    let parts: Vec<String> = [made, driven, why].into_iter().flatten().collect();
-    if parts.is_empty() { "not driven".to_owned() } else { parts.join(", ") }
 }
 
 /// The plan's request: policies and methods in its order, budgets from few bits to many, independent of the order of
@@ -82,9 +70,9 @@ impl Asked {
 
 /// Returns the plots of success over bytes and over predicted milliseconds: one of each driven policy, a line for each
 /// method.
-fn plots(journal: &Journal, asked: &Asked) -> Vec<Plot> {
+fn plots(results: &Results, asked: &Asked) -> Vec<Plot> {
     let percent = |cell: &Cell| cell.outcome()?.success().map(|success| 100.0 * success);
-    let find = |policy: &str, method, budget| journal.find(&CellKey { policy: policy.to_owned(), method, budget });
+    let find = |policy: &str, method, budget| results.find(&CellKey { policy: policy.to_owned(), method, budget });
     let line = |policy: &str, method: Contender| -> Series {
         let points = |x: fn(&Made) -> Option<f64>| {
             let cells = asked.budgets.iter().filter_map(|&budget| find(policy, Some(method), Some(budget)));
@@ -114,25 +102,24 @@ fn plots(journal: &Journal, asked: &Asked) -> Vec<Plot> {
     asked.policies.iter().filter_map(plot).collect()
 }
 
-fn markdown(journal: &Journal, asked: &Asked) -> Result<String> {
-    let mut text = head(&journal.header)?;
+fn markdown(results: &Results, asked: &Asked) -> Result<String> {
+    let mut text = head(&results.header)?;
     writeln!(text, "\n![Success over bytes and over predicted milliseconds, a plot a policy]({PICTURE})")?;
     if asked.methods.iter().any(|method| method.is_simulated()) {
         writeln!(text, "\n{K_QUANTS}")?;
     }
     for policy in &asked.policies {
-        section(&mut text, journal, asked, policy)?;
+        section(&mut text, results, asked, policy)?;
     }
     Ok(text)
 }
 
 /// Writes date, sources, command and seeds.
 fn head(header: &Header) -> Result<String> {
-    let Header { commit, dirty, date, options, .. } = header;
+    let Header { commits, date, options, .. } = header;
     let mut text = String::new();
-    let changes = if *dirty { ", with changes that are not in it" } else { "" };
     writeln!(text, "# Comparison of the methods, {}\n", date.split(' ').next().unwrap_or(date))?;
-    writeln!(text, "- begun {date} UTC, commit `{commit}`{changes}")?;
+    writeln!(text, "- begun {date} UTC, commit {}", commits.join(", then "))?;
     writeln!(text, "- `{}`", command(options))?;
     let (seed0, episodes) = (options["seed0"].as_u64().unwrap_or_default(), options["episodes"].as_u64().unwrap_or(1));
     writeln!(
@@ -160,9 +147,9 @@ fn command(options: &Value) -> String {
     words.join(" ")
 }
 
-fn section(text: &mut String, journal: &Journal, asked: &Asked, policy: &str) -> Result<()> {
+fn section(text: &mut String, results: &Results, asked: &Asked, policy: &str) -> Result<()> {
     let find = |method: Option<Contender>, budget: Option<f64>| {
-        journal.find(&CellKey { policy: policy.to_owned(), method, budget })
+        results.find(&CellKey { policy: policy.to_owned(), method, budget })
     };
     let f32_cell = find(None, None);
     let cells: Vec<(Contender, f64, Option<&Cell>)> = asked
@@ -208,7 +195,7 @@ fn section(text: &mut String, journal: &Journal, asked: &Asked, policy: &str) ->
             format!("{:.3} ({budget})", made.bpw),
             format!("{:.3}", made.bytes_per_parameter),
             format(made),
-            format!("{:.1}", made.seconds),
+            cell.seconds.map_or_else(none, |seconds| format!("{seconds:.1}")),
         ];
         row(text, method.title(), figures)?;
     }

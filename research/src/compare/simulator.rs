@@ -85,6 +85,14 @@ impl Simulator {
     }
 }
 
+/// Returns the folder of the shared policies, if there is one.
+pub(super) fn shared() -> Result<Option<PathBuf>> {
+    let folder = std::env::var_os("ACTQ_SHARED").filter(|folder| !folder.is_empty()).map(PathBuf::from);
+    let absolute =
+        |path: PathBuf| std::fs::canonicalize(&path).with_context(|| format!("cannot read {}", path.display()));
+    folder.map(absolute).transpose()
+}
+
 /// Resolves a program to run from another folder: a path becomes absolute, a name is searched for as a shell does.
 /// Links stay, because the Python of a virtual environment finds itself by them.
 fn program(name: PathBuf) -> PathBuf {

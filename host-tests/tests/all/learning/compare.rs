@@ -2,33 +2,28 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Output;
 
-use actq_research::compare::{Cell, Contender, Journal, Plan, run};
+use actq_bench::command::{failed, research, run, succeeded};
+use actq_research::compare::{Cell, Contender, Results};
 use anyhow::{Context as _, Result, ensure};
 
-fn plan(folder: &Path) -> Plan {
-    Plan {
-        policies: vec!["ur3".to_owned()],
-        methods: vec![Contender::Rtn, Contender::Distill],
-        budgets: vec![3.0, 1.5],
-        episodes: 2,
-        seed0: 1000,
-        seed: 1,
-        steps: Some(20),
-        out: folder.to_owned(),
-        report: false,
-    }
+/// Runs `cargo xtask compare` with two methods on a policy.
+fn compare(folder: &Path, policy: &str, more: &[&str]) -> Result<Output> {
+    let out = folder.display().to_string();
+    let own = ["compare", "--policies", policy, "--out", &out];
+    let options = "--methods rtn,distill --budgets 3.0,1.5 --episodes 2 --seed0 1000 --seed 1 --steps 20";
+    run(research(&[&own, &options.split(' ').collect::<Vec<_>>()[..], more].concat()), b"")
 }
 
 #[test]
 fn a_comparison_runs_once_and_explains_impossible_cells() -> Result<()> {
     let folder = tempfile::tempdir()?;
     let folder = folder.path().join("results");
-    let plan = plan(&folder);
-    run(&plan)?;
+    succeeded(&compare(&folder, "ur3", &[])?)?;
 
-    let Journal { cells, header, .. } = Journal::read(&folder)?;
-    ensure!(header.options["episodes"] == 2, "{header:?}");
+    let Results { cells, header } = Results::read(&folder)?;
+    ensure!(header.options["episodes"] == 2 && header.commits.len() == 1, "{header:?}");
     let found: Vec<_> = cells.iter().map(|cell| (cell.key.method, cell.key.budget)).collect();
     let methods = [Contender::Rtn, Contender::Distill].map(Some);
     let [few, many] = [1.5, 3.0].map(Some);
@@ -44,6 +39,7 @@ fn a_comparison_runs_once_and_explains_impossible_cells() -> Result<()> {
         ensure!(made.nmse > 0.0 && Some(made.bpw) <= cell.key.budget && success(cell).is_some(), "{cell:?}");
         ensure!(made.default_group && made.bytes_per_parameter < 1.0, "{made:?}");
         ensure!(made.milliseconds.is_some_and(|ms| (0.5..5.0).contains(&ms)), "{made:?}");
+        ensure!(cell.seconds.is_some_and(|seconds| seconds > 0.0), "{cell:?}");
     }
 
     let report = fs::read_to_string(folder.join("compare.md"))?;
@@ -58,29 +54,22 @@ fn a_comparison_runs_once_and_explains_impossible_cells() -> Result<()> {
     ] {
         ensure!(report.contains(words), "{words:?} is not in\n{report}");
     }
-
     let picture = fs::read_to_string(folder.join("compare.svg"))?;
     ensure!(picture.contains("ur3: success over flash and over time (f32: 100%)"), "{picture}");
 
-    // The seconds in it would differ.
-    let journal = fs::read_to_string(folder.join("compare.jsonl"))?;
-    run(&plan)?;
-    ensure!(fs::read_to_string(folder.join("compare.jsonl"))? == journal, "a finished cell ran again");
-    // A run that stopped within a line resumes after the line before it.
-    let cut = journal.trim_end().rfind('\n').context("lines")? + 20;
-    fs::write(folder.join("compare.jsonl"), &journal[..cut])?;
-    run(&plan)?;
-    let again = fs::read_to_string(folder.join("compare.jsonl"))?;
-    ensure!(again[..cut] == journal[..cut] && again.lines().count() == journal.lines().count(), "{again}");
-
-    let error =
-        run(&Plan { episodes: 3, ..plan.clone() }).err().context("expected a refusal of other options")?.to_string();
-    ensure!(
-        error.contains("compare.jsonl: holds results of other sources or options") && error.contains("--out"),
-        "{error}"
-    );
-    fs::remove_file(folder.join("compare.md"))?;
-    run(&Plan { report: true, ..plan })?;
+    // Nothing is left to do, and a missing result is the only one that runs again.
+    let log = || fs::read_to_string(folder.join("log.jsonl"));
+    let before = log()?;
+    succeeded(&compare(&folder, "ur3", &[])?)?;
+    ensure!(log()? == before, "a finished cell ran again");
+    let last = before.lines().last().and_then(|line| line.split('"').nth(3)).context("an address")?;
+    let path = folder.join("store").join(format!("{last}.json"));
+    let result = fs::read(&path)?;
+    fs::remove_file(&path)?;
+    succeeded(&compare(&folder, "ur3", &["--report"])?)?;
+    ensure!(!path.exists(), "a report ran a job");
+    succeeded(&compare(&folder, "ur3", &[])?)?;
+    ensure!(fs::read(&path)? == result && log()?.lines().count() == before.lines().count() + 1);
     ensure!(
         fs::read_to_string(folder.join("compare.md"))?.lines().count() == report.lines().count(),
         "the report differs"
@@ -91,9 +80,8 @@ fn a_comparison_runs_once_and_explains_impossible_cells() -> Result<()> {
 #[test]
 fn a_missing_policy_is_named() -> Result<()> {
     let folder = tempfile::tempdir()?;
-    let plan = Plan { policies: vec!["no_such_policy".to_owned()], ..plan(folder.path()) };
-    let error = run(&plan).err().context("expected a refusal of the missing policy")?.to_string();
+    let output = compare(&folder.path().join("results"), "no_such_policy", &[])?;
     // With the shared policies the command looks for the folder; without them no policy remains.
-    ensure!(error.contains("no_such_policy: holds no policy.json") || error.contains("no policy is left"), "{error}");
-    Ok(())
+    failed(&output, 1, &["no_such_policy: holds no policy.json"])
+        .or_else(|_| failed(&output, 1, &["no policy is left"]))
 }
