@@ -223,7 +223,7 @@ impl Spec {
             drive.check()?;
         }
         if let Some(learn) = &self.learn {
-            learn.check(self)?;
+            learn.check(self.drive.as_ref(), &self.methods)?;
         }
         Ok(())
     }

@@ -5,8 +5,6 @@ use std::path::PathBuf;
 use actq::error::{Context as _, Result, ensure};
 use serde::Deserialize;
 
-use super::{Spec, one};
-
 /// Closed-loop episodes.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -48,6 +46,10 @@ pub struct Learn {
     pub first_seed: u64,
 }
 
+fn one() -> usize {
+    1
+}
+
 fn second() -> f64 {
     1.0
 }
@@ -72,12 +74,12 @@ impl Drive {
 }
 
 impl Learn {
-    pub(super) fn check(&self, spec: &Spec) -> Result<()> {
-        let drive = spec.drive.as_ref().context("learn: needs [drive], whose command rolls the images out")?;
+    pub(super) fn check(&self, drive: Option<&Drive>, methods: &[String]) -> Result<()> {
+        let drive = drive.context("learn: needs [drive], whose command rolls the images out")?;
         ensure!((1..=100).contains(&self.rounds), "learn.rounds: {}; use 1 to 100", self.rounds);
         ensure!(self.episodes > 0, "learn.episodes: 0; use 1 or more");
         ensure!(
-            spec.methods.iter().any(|method| method == "distill"),
+            methods.iter().any(|method| method == "distill"),
             "learn: only method distill learns; add \"distill\" to methods, or remove [learn]"
         );
         let seeds = (self.rounds as u64).checked_mul(self.episodes).and_then(|n| self.first_seed.checked_add(n));
