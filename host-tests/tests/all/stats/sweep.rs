@@ -51,9 +51,10 @@ fn a_sweep_stores_allocations_and_scores() -> Result<()> {
         succeeded(
             &fixture.actq(&format!("sweep policy --bpw 4 --methods distill --steps 3 --seed {n} --json t.json"))?,
         )?;
-        Ok(serde_json::from_slice(&fs::read(fixture.path("t.json"))?)?)
+        let value: Value = serde_json::from_slice(&fs::read(fixture.path("t.json"))?)?;
+        Ok(value["policies"][0]["images"][0]["made"]["image"]["image"].clone())
     };
     let (one, again, two) = (seed(1)?, seed(1)?, seed(2)?);
-    ensure!(one == again && one != two, "the seed has no effect on the images");
+    ensure!(one.is_string() && one == again && one != two, "the seed has no effect on the images");
     Ok(())
 }
