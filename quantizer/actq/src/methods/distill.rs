@@ -1,8 +1,8 @@
 //! The method distill. It measures how much every row matters, gives each a width within the budget, and removes rows
 //! of width 0. Then it distills, or, with 0 steps, uses two-sided error feedback.
 
-mod activations;
-mod adam;
+pub mod activations;
+pub mod adam;
 pub mod allocate;
 pub mod balance;
 pub mod choose;
@@ -10,8 +10,8 @@ pub mod compact;
 pub mod dimension;
 pub mod feedback;
 mod latent;
-mod lessons;
-mod objective;
+pub mod lessons;
+pub mod objective;
 pub mod removal;
 pub mod schedule;
 mod shape;

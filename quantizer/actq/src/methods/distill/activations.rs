@@ -101,7 +101,7 @@ fn roomy(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> 
 
 /// Chooses int16 for each matrix whose input, rounded to int8, adds more to the error than int16 costs in time; the
 /// others keep their least magnitude.
-pub(super) fn choose_activations(
+pub fn choose_activations(
     graph: &Graph,
     quantized: &[Quantized],
     windows: &Windows,

@@ -2,7 +2,7 @@
 
 /// Adam's moments of a range of parameters.
 #[derive(Clone, Debug)]
-pub(super) struct Adam {
+pub struct Adam {
     first: Vec<f32>,
     second: Vec<f32>,
 }
@@ -14,7 +14,7 @@ const TINY: f32 = 1e-12;
 
 /// Size of one step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stride {
+pub struct Stride {
     rate: f32,
     /// Bias corrections of the moments after few steps.
     first: f32,
@@ -23,7 +23,7 @@ pub(super) struct Stride {
 
 impl Stride {
     /// Returns the stride of step `t`, which counts from 1.
-    pub(super) fn new(rate: f32, t: i32) -> Self {
+    pub fn new(rate: f32, t: i32) -> Self {
         Self { rate, first: 1.0 / (1.0 - FIRST.powi(t)), second: 1.0 / (1.0 - SECOND.powi(t)) }
     }
 }
@@ -38,12 +38,12 @@ impl Stride {
 
 impl Adam {
     /// Makes moments of `len` parameters.
-    pub(super) fn new(len: usize) -> Self {
+    pub fn new(len: usize) -> Self {
         Self { first: vec![0.0; len], second: vec![0.0; len] }
     }
 
     /// Moves `parameters` along `grads`.
-    pub(super) fn step(&mut self, parameters: &mut [f32], grads: &[f32], stride: Stride) {
+    pub fn step(&mut self, parameters: &mut [f32], grads: &[f32], stride: Stride) {
         step(parameters, grads, Moments { first: &mut self.first, second: &mut self.second }, stride);
     }
 

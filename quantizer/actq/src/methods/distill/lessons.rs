@@ -17,26 +17,27 @@ const LEAST_KEPT: usize = 16;
 
 /// Observations, the state before the first, and the f32 network's outputs.
 #[derive(Debug)]
-pub(super) struct Lesson {
+pub struct Lesson {
     frames: Array2<f32>,
     state: State,
-    pub(super) target: Array2<f32>,
+    /// The f32 network's outputs, `[frame, element]`.
+    pub target: Array2<f32>,
 }
 
 impl Lesson {
     /// Asks the f32 network about a batch for the network `graph`, whose `states` are those of the episodes.
-    pub(super) fn of(windows: &Windows, batch: Batch, graph: &Graph, states: &[State]) -> Self {
+    pub fn of(windows: &Windows, batch: Batch, graph: &Graph, states: &[State]) -> Self {
         let target = windows.teach(&batch);
         Self { state: batch.state_of(graph, states), frames: batch.frames, target }
     }
 
     /// Runs a network over the observations.
-    pub(super) fn pass(&self, network: &Network<'_>, weights: &Weights) -> crate::graph::Pass {
+    pub fn pass(&self, network: &Network<'_>, weights: &Weights) -> crate::graph::Pass {
         network.forward(weights, self.frames.clone(), &mut self.state.clone())
     }
 
     /// Returns a state of zeros in the form of this one.
-    pub(super) fn zero_state(&self) -> State {
+    pub fn zero_state(&self) -> State {
         self.state.iter().map(|state| state.each_ref().map(|array| Array2::zeros(array.raw_dim()))).collect()
     }
 
@@ -47,7 +48,7 @@ impl Lesson {
 
 /// The lesson of a part of a batch.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Source {
+pub enum Source {
     /// A new lesson, drawn with this seed.
     New(u64),
     /// A kept one.
@@ -56,7 +57,7 @@ pub(super) enum Source {
 
 /// The lessons of late.
 #[derive(Debug)]
-pub(super) struct Lessons {
+pub struct Lessons {
     kept: Vec<Lesson>,
     /// Parts of batches so far, and new lessons.
     parts: usize,
@@ -66,12 +67,12 @@ pub(super) struct Lessons {
 
 impl Lessons {
     /// Begins without lessons.
-    pub(super) fn new(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         Self { kept: Vec::new(), parts: 0, drawn: 0, random: Random::new(seed) }
     }
 
     /// Returns the sources of the next batch, one for each part.
-    pub(super) fn next(&mut self, parts: usize) -> Vec<Source> {
+    pub fn next(&mut self, parts: usize) -> Vec<Source> {
         let mut next = || {
             self.parts += 1;
             // The first batches are new, so that no lesson counts much more often than others.
@@ -85,12 +86,12 @@ impl Lessons {
     }
 
     /// Returns a kept lesson.
-    pub(super) fn kept(&self, index: usize) -> &Lesson {
+    pub fn kept(&self, index: usize) -> &Lesson {
         &self.kept[index]
     }
 
     /// Keeps a lesson, in place of the oldest one if there are enough.
-    pub(super) fn keep(&mut self, lesson: Lesson) {
+    pub fn keep(&mut self, lesson: Lesson) {
         let room = (VALUES / lesson.values().max(1)).clamp(LEAST_KEPT, KEPT);
         match self.kept.len() < room {
             true => self.kept.push(lesson),

@@ -7,7 +7,7 @@ use crate::methods::options::Options;
 
 /// Loss of a batch, with its derivative.
 #[derive(Debug)]
-pub(super) struct Objective<'a> {
+pub struct Objective<'a> {
     variance: &'a [f32],
     /// Outputs that vary.
     varying: usize,
@@ -31,7 +31,7 @@ pub enum Frames {
 impl Frames {
     /// Returns the weighting for a network. A recurrent policy that balances succeeds in fewer episodes unless all
     /// frames count equally.
-    pub(super) fn of(options: &Options, graph: &Graph) -> Self {
+    pub fn of(options: &Options, graph: &Graph) -> Self {
         match options.relative {
             true => Self::Relative,
             false if graph.state_len() > 0 => Self::Even,
@@ -51,14 +51,14 @@ impl Frames {
 impl<'a> Objective<'a> {
     /// Makes the loss: the mean over samples and outputs of squared error over variance and, except for
     /// [`Frames::Even`], times the frame's weight, which is 1 on average over a batch.
-    pub(super) fn new(variance: &'a [f32], frames: Frames) -> Self {
+    pub fn new(variance: &'a [f32], frames: Frames) -> Self {
         let varying = variance.iter().filter(|variance| **variance > 0.0).count().max(1);
         Self { variance, varying, frames }
     }
 
     /// Returns the derivative by the outputs, `[frame, element]`, and the loss against the f32 network's outputs.
     /// Outputs that do not vary do not count.
-    pub(super) fn measure(&self, outputs: &Array2<f32>, target: &Array2<f32>) -> (Array2<f32>, f32) {
+    pub fn measure(&self, outputs: &Array2<f32>, target: &Array2<f32>) -> (Array2<f32>, f32) {
         let count = (target.nrows() * self.varying) as f32;
         let weight = |variance: &f32| if *variance > 0.0 { 1.0 / (variance * count) } else { 0.0 };
         let of_outputs: Vec<f32> = self.variance.iter().map(weight).collect();
