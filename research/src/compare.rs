@@ -1,6 +1,7 @@
 //! The comparison: every method at every budget on every policy, each image made by one job and driven by another.
 
 mod actquant_k;
+mod allowed;
 mod cell;
 mod jobs;
 mod making;
@@ -20,6 +21,7 @@ use actq_jobs::order;
 use actq_jobs::store::Store;
 use anyhow::{Context as _, Result, ensure};
 
+pub use allowed::Allowed;
 pub use cell::{Cell, CellKey, Made};
 use jobs::Entrant;
 use plan::UR3;

@@ -6,6 +6,8 @@ pub mod commands;
 pub mod compare;
 pub mod host;
 pub mod kquants;
+pub mod pruned;
+pub mod student;
 // The library's own, which it compiles for its unit tests alone.
 #[cfg(test)]
 #[path = "../../quantizer/actq/src/testing.rs"]

@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use actq::pipeline::driven::DriveOutcome;
 
+use super::allowed::Allowed;
 use super::plan::Contender;
 
 /// The key of a result: a policy, its method and its budget; without a method the f32 policy.
@@ -14,15 +15,15 @@ pub struct CellKey {
     pub policy: String,
     /// The method.
     pub method: Option<Contender>,
-    /// Allowed bits per weight.
-    pub budget: Option<f64>,
+    /// What the image may take.
+    pub budget: Option<Allowed>,
 }
 
 impl CellKey {
     /// Returns the human-readable name.
     pub(super) fn title(&self) -> String {
         match (self.method, self.budget) {
-            (Some(method), Some(budget)) => format!("{}, {} at {budget} bits", self.policy, method.title()),
+            (Some(method), Some(budget)) => format!("{}, {} at {}", self.policy, method.title(), budget.title()),
             _ => format!("{}, f32", self.policy),
         }
     }
@@ -41,7 +42,8 @@ pub struct Made {
     pub bytes: usize,
     /// Bytes of the image per parameter of the trained policy.
     pub bytes_per_parameter: f64,
-    /// Weights that share a scale: `row`, or a number of columns; for K-quants the format of each matrix.
+    /// Weights that share a scale: `row`, or a number of columns; for K-quants the format of each matrix; for rivals
+    /// the widths, too.
     pub format: String,
     /// `true` for the method's default group.
     pub default_group: bool,

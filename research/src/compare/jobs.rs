@@ -13,6 +13,7 @@ use actq_jobs::work::{Custom, Work};
 use anyhow::{Context as _, Result};
 use serde::{Deserialize, Serialize};
 
+use super::allowed::Allowed;
 use super::cell::CellKey;
 use super::plan::{Contender, Plan};
 use super::simulator::Simulator;
@@ -40,7 +41,7 @@ pub(super) struct Entrant {
 pub(super) struct Making {
     policy: String,
     pub(super) method: Contender,
-    pub(super) budget: f64,
+    pub(super) budget: Allowed,
     pub(super) steps: Option<usize>,
     pub(super) seed: u64,
     revision: u32,
@@ -102,7 +103,9 @@ pub(super) fn jobs(plan: &Plan, entrants: &[Entrant]) -> Result<Vec<Job>> {
                 let inputs = files.iter().chain(&recordings).cloned().collect();
                 let title = format!("{}: make", key.title());
                 let made = add(&mut jobs, title, Work::Custom(work), inputs, (1, memory, seconds))?;
-                drive(&mut jobs, &key, vec![made])?;
+                if method.is_driven() {
+                    drive(&mut jobs, &key, vec![made])?;
+                }
             }
         }
     }

@@ -3,22 +3,26 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use actq::budget::{Budget, BudgetTooSmall};
+use actq::budget::BudgetTooSmall;
 use actq::data::{Dataset, Recording, Recordings};
 use actq::graph::Graph;
 use actq::measure::eval;
 use actq::measure::time::{CLOCK, StepTime};
 use actq::methods::Options;
-use actq::pipeline::Quantizer;
+use actq::pipeline::{QuantizedPolicy, Quantizer};
 use actq::policy::Policy;
 use actq_kernels::layout::GROUPS;
 use anyhow::{Context as _, Result};
 
 use super::actquant_k;
+use super::allowed::Allowed;
 use super::cell::Made;
-use super::plan::Contender;
+use super::plan::{Contender, Rival};
 use crate::actquant::ActionStatistics;
 use crate::kquants::Format;
+use crate::pruned::pruned;
+use crate::student::rival::{Settings, Teacher};
+use crate::student::{form, student};
 
 /// A policy and its recordings.
 pub(super) struct Subject {
@@ -32,6 +36,8 @@ pub(super) enum Attempt {
     Made(Vec<u8>, Made),
     /// A network without an image, and its figures.
     Simulated(Graph, Made),
+    /// The figures of a network that nothing runs.
+    Undriven(Made),
     /// Impossible, with the reason.
     Impossible(String),
 }
@@ -77,12 +83,20 @@ impl<'a> Maker<'a> {
     pub(super) fn make(
         &mut self,
         contender: Contender,
-        budget: f64,
+        budget: Allowed,
         mut progress: impl FnMut(&str, f64),
     ) -> Result<Attempt> {
         self.prepare(contender, &mut progress)?;
+        if let Some(rival) = contender.rival() {
+            return self.rival((contender, rival), budget, &mut progress);
+        }
         if contender.is_simulated() {
-            return self.simulate(contender, budget);
+            return match budget {
+                Allowed::Bits(bits) => self.simulate(contender, bits),
+                Allowed::Flash { .. } => {
+                    Ok(Attempt::Impossible("a simulated format has no image; use bits per weight".to_owned()))
+                }
+            };
         }
         let default = contender.method().default_group();
         let first = self.with_group(contender, budget, default, &mut progress)?;
@@ -156,32 +170,79 @@ impl<'a> Maker<'a> {
         self.ready.get(&contender.method().to_string()).context("the method is not prepared")
     }
 
-    fn with_group(
+    /// Makes a student or a pruned network.
+    fn rival(
         &self,
-        contender: Contender,
-        budget: f64,
-        group: usize,
+        (contender, rival): (Contender, Rival),
+        budget: Allowed,
         progress: &mut impl FnMut(&str, f64),
-    ) -> Result<Result<Attempt, BudgetTooSmall>> {
-        let steps = if contender == Contender::DistillNotLearned { Some(0) } else { self.steps };
-        let plain = Options::new(contender.method(), Budget::BitsPerWeight(budget));
-        let options = Options { group, steps, seed: self.seed, ..plain };
-        let quantized = match self.prepared(contender)?.quantize(&options, progress) {
-            Ok(quantized) => quantized,
-            Err(error) => return error.budget().map(|small| Err(*small)).ok_or(error.into()),
+    ) -> Result<Attempt> {
+        let quantizer = self.prepared(contender)?;
+        let Subject { policy, recordings } = self.subject;
+        let calib = recordings.calib.as_ref().with_context(|| Recording::Calib.missing("a rival"))?;
+        let teacher = Teacher::new(policy, quantizer.method().graph(), calib);
+        let settings = Settings { budget: budget.budget(), steps: self.steps, seed: self.seed };
+        let made = match rival {
+            Rival::Student(form) => student(&teacher, form, settings, progress),
+            Rival::Pruned => pruned(&teacher, settings, progress),
         };
+        let made = match made {
+            Ok(made) => made,
+            Err(error) => {
+                let Some(&BudgetTooSmall { bytes, .. }) = error.budget() else { return Err(error.into()) };
+                return Ok(Attempt::Impossible(format!("the narrowest takes {bytes} bytes")));
+            }
+        };
+        let format = format!("row; {}", made.description);
+        if let Some(image) = made.image {
+            let figures = self.measured(&image, format)?;
+            return Ok(Attempt::Made(image.image, figures));
+        }
+        let taken = form::taken(policy, &made.network, form::Form::F32)?;
+        Ok(Attempt::Undriven(Made {
+            nmse: eval::network_nmse(&made.network, self.subject.heldout()?)?,
+            milliseconds: Some(taken.milliseconds),
+            bpw: 8.0 * taken.weights as f64 / policy.weights.max(1) as f64,
+            bytes: taken.image,
+            bytes_per_parameter: taken.image as f64 / policy.parameters.max(1) as f64,
+            format,
+            default_group: true,
+        }))
+    }
+
+    /// Measures an image.
+    fn measured(&self, quantized: &QuantizedPolicy, format: String) -> Result<Made> {
         let buffer = quantized.buffer();
         let image = buffer.image(Path::new("image in memory"))?;
         let report = eval::evaluate(image, self.subject.heldout()?)?;
-        let made = Made {
+        Ok(Made {
             nmse: report.nmse,
             milliseconds: Some(StepTime::new(&image, CLOCK).milliseconds),
             bpw: report.bpw,
             bytes: report.bytes,
             bytes_per_parameter: report.bytes as f64 / self.subject.policy.parameters.max(1) as f64,
-            format: if group == 0 { "row".to_owned() } else { group.to_string() },
-            default_group: group == options.method.default_group(),
+            format,
+            default_group: true,
+        })
+    }
+
+    fn with_group(
+        &self,
+        contender: Contender,
+        budget: Allowed,
+        group: usize,
+        progress: &mut impl FnMut(&str, f64),
+    ) -> Result<Result<Attempt, BudgetTooSmall>> {
+        let steps = if contender == Contender::DistillNotLearned { Some(0) } else { self.steps };
+        let plain = Options::new(contender.method(), budget.budget());
+        let options = Options { group, steps, seed: self.seed, ..plain };
+        let quantized = match self.prepared(contender)?.quantize(&options, progress) {
+            Ok(quantized) => quantized,
+            Err(error) => return error.budget().map(|small| Err(*small)).ok_or(error.into()),
         };
+        let format = if group == 0 { "row".to_owned() } else { group.to_string() };
+        let made = self.measured(&quantized, format)?;
+        let made = Made { default_group: group == options.method.default_group(), ..made };
         Ok(Ok(Attempt::Made(quantized.image, made)))
     }
 }

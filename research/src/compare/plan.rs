@@ -6,8 +6,10 @@ use actq::methods::Method;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
+use super::allowed::Allowed;
 use crate::actquant::ActQuant;
 use crate::actquant::choices::Choices;
+use crate::student::form::Form;
 
 /// The name of the project's own policy.
 pub(super) const UR3: &str = "ur3";
@@ -44,6 +46,27 @@ pub enum Contender {
     #[value(alias = "best")]
     #[serde(alias = "best")]
     Distill,
+    /// A narrower network of the same structure, learned from random weights on, in int8
+    Student,
+    /// The same in 4 bits
+    #[value(name = "student-4")]
+    #[serde(rename = "student-4")]
+    Student4,
+    /// The same in f32: its error and its size, no image
+    #[value(name = "student-f32")]
+    #[serde(rename = "student-f32")]
+    StudentF32,
+    /// Structured pruning with fine-tuning, in int8
+    Pruned,
+}
+
+/// A rival that is a network of its own, not codes of the trained one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rival {
+    /// A narrower network that learns from random weights on.
+    Student(Form),
+    /// A pruned network that learns on.
+    Pruned,
 }
 
 impl Contender {
@@ -55,13 +78,34 @@ impl Contender {
             Self::ActQuant | Self::ActQuantK => Method::custom(ActQuant(Choices::default())),
             Self::ActQuantKHalf => Method::custom(ActQuant(Choices::half())),
             Self::ActQuantAuthors => Method::custom(ActQuant(Choices::AUTHORS)),
-            Self::DistillNotLearned | Self::Distill => Method::Distill,
+            Self::DistillNotLearned
+            | Self::Distill
+            | Self::Student
+            | Self::Student4
+            | Self::StudentF32
+            | Self::Pruned => Method::Distill,
         }
     }
 
     /// Returns `true` if the method's formats are simulated in f32, without an image.
     pub fn is_simulated(self) -> bool {
         matches!(self, Self::ActQuantK | Self::ActQuantKHalf)
+    }
+
+    /// Returns the rival that is made instead of codes of the trained network.
+    pub fn rival(self) -> Option<Rival> {
+        match self {
+            Self::Student => Some(Rival::Student(Form::Int8)),
+            Self::Student4 => Some(Rival::Student(Form::Bits4)),
+            Self::StudentF32 => Some(Rival::Student(Form::F32)),
+            Self::Pruned => Some(Rival::Pruned),
+            _ => None,
+        }
+    }
+
+    /// Returns `true` if the closed loop can run the method's results.
+    pub fn is_driven(self) -> bool {
+        self != Self::StudentF32
     }
 
     /// Returns the name on the command line.
@@ -80,6 +124,10 @@ impl Contender {
             Self::ActQuantKHalf => "actquant, K-quants, alpha 0.5",
             Self::DistillNotLearned => "distill, not learned",
             Self::Distill => "distill",
+            Self::Student => "student, int8",
+            Self::Student4 => "student, 4 bits",
+            Self::StudentF32 => "student, f32",
+            Self::Pruned => "pruned, int8",
         }
     }
 }
@@ -95,7 +143,8 @@ pub struct Plan {
         default_value = "go1_mlp,g1_lstm256,g1_lstm64,fetch_pickplace,ur3"
     )]
     pub policies: Vec<String>,
-    /// Methods; distill-0 is distill with --steps 0, not learned; actquant-authors and actquant-k-half are not in the default
+    /// Methods; distill-0 is distill with --steps 0, not learned; actquant-authors, actquant-k-half, students and pruned are
+    /// not in the default
     #[arg(
         long,
         value_name = "LIST",
@@ -103,9 +152,9 @@ pub struct Plan {
         default_value = "rtn,gptq,actquant,actquant-k,distill-0,distill"
     )]
     pub methods: Vec<Contender>,
-    /// Allowed bits per weight, everything counted
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = bits, default_value = "1.5,2,2.3,2.5,3,4")]
-    pub budgets: Vec<f64>,
+    /// Allowed bits per weight, everything counted, or flash of the whole image: in KiB as 12K, in bytes as 12000B
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Allowed::parse, default_value = "1.5,2,2.3,2.5,3,4")]
+    pub budgets: Vec<Allowed>,
     /// Closed-loop episodes of each cell
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000), default_value_t = 100)]
     pub episodes: u64,
@@ -126,9 +175,4 @@ pub struct Plan {
     #[arg(long)]
     #[serde(skip)]
     pub report: bool,
-}
-
-fn bits(text: &str) -> Result<f64, String> {
-    let bits = text.trim().parse::<f64>().ok().filter(|bits| (0.1..=16.0).contains(bits));
-    bits.ok_or_else(|| format!("{text:?} is not a number of bits per weight from 0.1 to 16"))
 }

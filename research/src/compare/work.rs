@@ -41,6 +41,7 @@ fn make(folder: &Path, making: &Making, watch: &mut dyn FnMut(&str, f64)) -> Res
         Attempt::Simulated(graph, made) => {
             (Some(made), None, Some(("safetensors", actquant_k::tensors(maker.policy(), &graph)?)))
         }
+        Attempt::Undriven(made) => (Some(made), None, None),
         Attempt::Impossible(why) => (None, Some(why), None),
     };
     Ok(Found { value: serde_json::to_value(Attempted { made, why })?, file })

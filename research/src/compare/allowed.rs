@@ -1,0 +1,99 @@
+//! The budget of a cell.
+
+use std::cmp::Ordering;
+use std::fmt;
+
+use actq::budget::Budget;
+use serde::{Deserialize, Serialize};
+
+/// What an image may take: a number of bits per weight, or, with `K` or `B`, of KiB or bytes of flash.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Allowed {
+    /// Bits per weight, everything counted.
+    Bits(f64),
+    /// Bytes of the whole image.
+    Flash {
+        /// Bytes.
+        flash: usize,
+    },
+}
+
+impl Allowed {
+    /// Parses a budget of the command line.
+    ///
+    /// # Errors
+    ///
+    /// Names what a budget may be.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let text = text.trim();
+        let bytes = |digits: &str, unit: usize| digits.parse().ok().and_then(|n: usize| n.checked_mul(unit));
+        let found = match (text.strip_suffix('K'), text.strip_suffix('B')) {
+            (Some(digits), _) => bytes(digits, 1024).filter(|n| *n > 0).map(|flash| Self::Flash { flash }),
+            (_, Some(digits)) => bytes(digits, 1).filter(|n| *n > 0).map(|flash| Self::Flash { flash }),
+            _ => text.parse().ok().filter(|bits| (0.1..=16.0).contains(bits)).map(Self::Bits),
+        };
+        found.ok_or_else(|| {
+            format!("{text:?} is not a number of bits per weight from 0.1 to 16, of KiB as 12K, or of bytes as 12000B")
+        })
+    }
+
+    /// Returns the quantizer's budget.
+    pub fn budget(self) -> Budget {
+        match self {
+            Self::Bits(bits) => Budget::BitsPerWeight(bits),
+            Self::Flash { flash } => Budget::ImageBytes(flash),
+        }
+    }
+
+    /// Orders from few bits to many, then from few bytes to many.
+    pub fn order(&self, other: &Self) -> Ordering {
+        let key = |allowed: &Self| match *allowed {
+            Self::Bits(bits) => (false, bits),
+            Self::Flash { flash } => (true, flash as f64),
+        };
+        let ((a, x), (b, y)) = (key(self), key(other));
+        a.cmp(&b).then(x.total_cmp(&y))
+    }
+
+    /// Returns the human-readable budget: `2.5 bits`, `12K of flash`.
+    pub fn title(self) -> String {
+        match self {
+            Self::Bits(_) => format!("{self} bits"),
+            Self::Flash { .. } => format!("{self} of flash"),
+        }
+    }
+}
+
+impl fmt::Display for Allowed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Bits(bits) => write!(f, "{bits}"),
+            Self::Flash { flash } if flash.is_multiple_of(1024) => write!(f, "{}K", flash / 1024),
+            Self::Flash { flash } => write!(f, "{flash}B"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn budgets_survive_text_and_journal() {
+        for (text, budget) in [
+            ("1.5", Budget::BitsPerWeight(1.5)),
+            ("12K", Budget::ImageBytes(12_288)),
+            ("10001B", Budget::ImageBytes(10_001)),
+        ] {
+            let allowed = Allowed::parse(text).expect("a budget");
+            assert_eq!((allowed.budget(), allowed.to_string().as_str()), (budget, text));
+            let json = serde_json::to_string(&allowed).expect("JSON");
+            assert_eq!(serde_json::from_str::<Allowed>(&json).expect("a budget"), allowed);
+        }
+        assert_eq!(serde_json::from_str::<Allowed>("2.5").expect("of former journals"), Allowed::Bits(2.5));
+        for text in ["", "0", "17", "0K", "K", "1.5K"] {
+            assert!(Allowed::parse(text).is_err(), "{text}");
+        }
+    }
+}
