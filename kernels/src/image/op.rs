@@ -446,8 +446,8 @@ impl<'a> Image<'a> {
         let [head, places, lengths, data] = op.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
         let index = usize::from(code).wrapping_sub(1);
-        let unknown = || if index < NAMES.len() { ImageError::LeftOut } else { ImageError::Op };
-        let form = FORMS.get(index).ok_or_else(unknown)?;
+        let unknown = if index < NAMES.len() { ImageError::LeftOut } else { ImageError::Op };
+        let form = FORMS.get(index).ok_or(unknown)?;
         if IS_PARTIAL && !form.built {
             return Err(ImageError::LeftOut);
         }
