@@ -411,13 +411,6 @@ impl<'a> Op<'a> {
     }
 }
 
-/// Returns the error of an operation that is not in the table. Apart, so that a known one costs no instruction for it.
-#[cold]
-#[inline(never)]
-fn unknown(index: usize) -> ImageError {
-    if index < NAMES.len() { ImageError::LeftOut } else { ImageError::Op }
-}
-
 impl<'a> Image<'a> {
     writer_methods! {
         /// Returns the number of operations.
@@ -453,7 +446,8 @@ impl<'a> Image<'a> {
         let [head, places, lengths, data] = op.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
         let index = usize::from(code).wrapping_sub(1);
-        let Some(form) = FORMS.get(index) else { return Err(unknown(index)) };
+        let unknown = if index < NAMES.len() { ImageError::LeftOut } else { ImageError::Op };
+        let form = FORMS.get(index).ok_or(unknown)?;
         if IS_PARTIAL && !form.built {
             return Err(ImageError::LeftOut);
         }
