@@ -253,7 +253,7 @@ fn failed_jobs_leave_the_other_results() -> Result<()> {
     let sweep = Sweep::new()?;
     fs::write(sweep.folder()?.join("broken.toml"), SPEC.replace("sh simulator.sh", "exit 75"))?;
     let output = sweep.run("sweep broken.toml --store store --tries 2 --quiet --log log.jsonl", "")?;
-    failed(&output, 1, &["it is tried again", "no further try", "jobs failed, and", "have their results in store"])?;
+    failed(&output, 1, &["it is tried again", "no further try", "jobs failed, and", "the others have their results"])?;
     let log = fs::read_to_string(sweep.folder()?.join("log.jsonl"))?;
     let of = |kind: &str, status: &str| {
         log.lines().filter(|line| line.contains(&format!("\"{kind}\"")) && line.contains(status)).count()

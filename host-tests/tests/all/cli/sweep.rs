@@ -25,7 +25,7 @@ fn sweep_accepts_named_recordings() -> Result<()> {
         &["gptq needs recorded observations: put calib.npz", "--calib"],
     )?;
     let table = succeeded(&sweep(&["--heldout", &text(&heldout), "--calib", &text(&calib)])?)?;
-    ensure!(table.contains("(4)") && table.contains("gptq") && table.contains("at 168 MHz"), "{table}");
+    ensure!(table.contains("4 bits") && table.contains("gptq") && table.contains("at 168 MHz"), "{table}");
     Ok(())
 }
 
