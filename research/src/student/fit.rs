@@ -2,23 +2,12 @@
 
 use actq::calibrate::widening::Widening;
 use actq::calibrate::windows::Windows;
-use actq::graph::{Derivatives, Graph, Network, State, Vectors, Weights};
+use actq::graph::{Derivatives, Graph, Network, State, Weights};
 use actq::methods::distill::adam::{Adam, Stride};
 use actq::methods::distill::lessons::{Lesson, Lessons, Source};
 use actq::methods::distill::objective::{Frames, Objective};
+use actq::methods::distill::train::{batch_size, clip, gradient, renews_states};
 use actq::random::Random;
-use ndarray::Array2;
-
-/// Samples of a step, frames or windows, and lessons that they are split into: as in the method distill.
-const FRAMES: usize = 256;
-const FRAME_LESSONS: usize = 4;
-const WINDOWS: usize = 16;
-const WINDOW_LESSONS: usize = 2;
-/// Largest norm of a recurrent network's gradient.
-const CLIP: f32 = 1.0;
-/// Least steps after which a recurrent network's own states are renewed, and frames of the recording for each step.
-const RENEWED: usize = 100;
-const FRAMES_A_STEP: usize = 50;
 
 /// Parameters of learning.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,13 +36,13 @@ pub fn fit(
     let network = Network::new(graph);
     let mut weights = Weights::of(graph);
     let objective = Objective::new(&windows.output_variance, by.frames);
-    let (samples, parts) = if windows.recurrent() { (WINDOWS, WINDOW_LESSONS) } else { size(graph) };
+    let (samples, parts) = batch_size(graph, windows);
     let mut lessons = Lessons::new(by.seed);
     let mut states: Vec<State> = Vec::new();
     let mut of_matrices: Vec<Adam> = graph.matrices.iter().map(|m| Adam::new(m.data.len())).collect();
     let mut of_vectors: Vec<Adam> = weights.vectors.iter().flatten().map(|v| Adam::new(v.len())).collect();
     for step in 0..by.steps {
-        if windows.recurrent() && step.is_multiple_of(RENEWED.max(windows.frames() / FRAMES_A_STEP)) {
+        if renews_states(windows, step) {
             states = windows.states_of(&network, &weights);
         }
         let mut learned = Vec::with_capacity(parts);
@@ -63,10 +52,12 @@ pub fn fit(
                 Source::New(seed) => {
                     let batch = windows.batch(samples / parts, Some(by.widening), &mut Random::new(seed));
                     let lesson = Lesson::of(windows, batch, graph, &states);
-                    learned.push(gradient(&network, &weights, &objective, &lesson));
+                    learned.push(gradient(&network, &weights, &objective, &lesson).1);
                     drawn.push(lesson);
                 }
-                Source::Kept(index) => learned.push(gradient(&network, &weights, &objective, lessons.kept(index))),
+                Source::Kept(index) => {
+                    learned.push(gradient(&network, &weights, &objective, lessons.kept(index)).1);
+                }
             }
         }
         drawn.into_iter().for_each(|lesson| lessons.keep(lesson));
@@ -94,12 +85,6 @@ pub fn fit(
     learned
 }
 
-fn gradient(network: &Network<'_>, weights: &Weights, objective: &Objective<'_>, lesson: &Lesson) -> Derivatives {
-    let pass = lesson.pass(network, weights);
-    let (error, _) = objective.measure(pass.output(), &lesson.target);
-    network.backward(weights, pass, error, &mut lesson.zero_state())
-}
-
 /// Takes a step of Adam with weights in units of their columns.
 fn step_in_units(adam: &mut Adam, values: &mut [f32], grads: &mut [f32], units: Option<&[f32]>, stride: Stride) {
     let Some(units) = units else {
@@ -113,18 +98,4 @@ fn step_in_units(adam: &mut Adam, values: &mut [f32], grads: &mut [f32], units: 
     });
     adam.step(values, grads, stride);
     values.iter_mut().zip(units()).for_each(|(w, unit)| *w /= unit);
-}
-
-/// Returns the frames of a step and its lessons. A frame of an iterative head is one frame per denoising step.
-fn size(graph: &Graph) -> (usize, usize) {
-    ((FRAMES / graph.denoising_steps().isqrt()).max(4 * FRAME_LESSONS), FRAME_LESSONS)
-}
-
-/// Scales the derivatives so that their norm is at most [`CLIP`].
-fn clip(matrices: &mut [Array2<f32>], vectors: &mut Vectors) {
-    let of_matrices = matrices.iter().flatten().map(|g| g * g).sum::<f32>();
-    let square = of_matrices + vectors.iter().flatten().flatten().map(|g| g * g).sum::<f32>();
-    let factor = CLIP / square.sqrt().max(CLIP);
-    matrices.iter_mut().for_each(|m| m.mapv_inplace(|g| g * factor));
-    vectors.iter_mut().flatten().flatten().for_each(|g| *g *= factor);
 }

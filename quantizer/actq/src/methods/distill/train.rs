@@ -121,20 +121,18 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Pres
     let mut adam_vectors: Vec<Adam> = weights.vectors.iter().flatten().map(|v| Adam::new(v.len())).collect();
     latents.iter_mut().zip(&mut weights.matrices).for_each(|(latent, matrix)| latent.write(matrix));
     let mut lessons = Lessons::new(task.seed);
-    let (size, shards, rates) = match windows.recurrent() {
-        true => (WINDOWS, WINDOW_SHARDS, OF_WINDOWS),
-        // A frame of an iterative head is one frame per denoising step.
-        false => {
-            let rates = if task.is_rest_of(windows) { OF_REST } else { OF_FRAMES };
-            ((FRAMES / task.graph.denoising_steps().isqrt()).max(4 * FRAME_SHARDS), FRAME_SHARDS, rates)
-        }
+    let (size, shards) = batch_size(task.graph, windows);
+    let rates = match windows.recurrent() {
+        true => OF_WINDOWS,
+        false if task.is_rest_of(windows) => OF_REST,
+        false => OF_FRAMES,
     };
     let objective = Objective::new(&windows.output_variance, task.frames);
     let mut schedule = Schedule::new(task.bounds, most_steps(task.graph, Effort::Default));
     let mut states = Vec::new();
     let mut held_out = None;
     while let Some(rate) = schedule.rate() {
-        if windows.recurrent() && schedule.steps().is_multiple_of(RENEWED.max(windows.frames() / FRAMES_A_STEP)) {
+        if renews_states(windows, schedule.steps()) {
             states = windows.states_of(&network, &weights);
         }
         let learned: Vec<(f32, Derivatives, Option<Lesson>)> = lessons
@@ -194,8 +192,22 @@ fn learn(latents: &mut [Latent], grads: &mut [Array2<f32>], gait: Gait, weights:
     });
 }
 
+/// Returns the samples of a batch, frames or windows, and the parts that it is cut into. A frame of an iterative head is
+/// one frame per denoising step.
+pub fn batch_size(graph: &Graph, windows: &Windows) -> (usize, usize) {
+    match windows.recurrent() {
+        true => (WINDOWS, WINDOW_SHARDS),
+        false => ((FRAMES / graph.denoising_steps().isqrt()).max(4 * FRAME_SHARDS), FRAME_SHARDS),
+    }
+}
+
+/// Returns `true` if a recurrent network runs over the recording anew before this step.
+pub fn renews_states(windows: &Windows, step: usize) -> bool {
+    windows.recurrent() && step.is_multiple_of(RENEWED.max(windows.frames() / FRAMES_A_STEP))
+}
+
 /// Computes the loss on a lesson, and its derivatives by the (rounded) weights.
-fn gradient(
+pub fn gradient(
     network: &Network<'_>,
     weights: &Weights,
     objective: &Objective<'_>,
@@ -235,8 +247,8 @@ pub fn recorded_error(
     losses(network, weights, windows, batches).map(f64::from).sum::<f64>() / MEASURED as f64
 }
 
-/// Scales the derivatives so that their norm is at most [`CLIP`].
-fn clip(matrices: &mut [Array2<f32>], vectors: &mut Vectors) {
+/// Scales the derivatives so that their norm is at most 1.
+pub fn clip(matrices: &mut [Array2<f32>], vectors: &mut Vectors) {
     let square: f32 = matrices.iter().map(|m| m.iter().map(|g| g * g).sum::<f32>()).sum::<f32>()
         + vectors.iter().flatten().flatten().map(|g| g * g).sum::<f32>();
     let factor = CLIP / square.sqrt().max(CLIP);
