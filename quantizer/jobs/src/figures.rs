@@ -56,7 +56,7 @@ pub struct Driven {
     pub recording: Option<String>,
 }
 
-/// What a job of kind custom has found.
+/// Result of a job of kind custom.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CustomResult {

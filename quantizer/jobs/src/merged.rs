@@ -40,7 +40,7 @@ pub struct MergedPolicy {
 pub struct MergedImage {
     /// The method's name.
     pub method: String,
-    /// What the image may take.
+    /// Budget of the image.
     pub budget: Budget,
     /// Seed.
     pub seed: u64,

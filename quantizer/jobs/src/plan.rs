@@ -71,7 +71,7 @@ fn make(spec: &Spec, source: &Source, name: &str, budget: Budget, seed: u64) -> 
     })
 }
 
-/// What a job takes, by estimate: cores, memory in MiB, seconds.
+/// Estimates for a job: cores, memory in MiB, seconds.
 pub type Size = (usize, u64, f64);
 
 /// Adds a job after those that it depends on, and returns its address.

@@ -36,6 +36,6 @@ pub enum Outcome {
     Driven(Driven),
     /// The results of a plan.
     Merged(Merged),
-    /// What a job of kind custom has found.
+    /// Result of a job of kind custom.
     Custom(CustomResult),
 }

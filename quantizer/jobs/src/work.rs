@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use actq::budget::Budget;
-use actq::error::{Context as _, Result, bail};
+use actq::error::{Context as _, Result};
 use actq::methods::{Activations, Effort, Method, Options};
 use actq_kernels::Width;
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ pub struct Make {
     pub policy: Option<PathBuf>,
     /// The method's name.
     pub method: String,
-    /// What the image may take.
+    /// Budget of the image.
     pub budget: Budget,
     /// Columns per u8 scale, 0 for one scale a row; `None`: the method's default.
     pub group: Option<usize>,
@@ -142,7 +142,7 @@ pub struct Row {
     pub policy: usize,
     /// The method's name.
     pub method: String,
-    /// What the image may take.
+    /// Budget of the image.
     pub budget: Budget,
     /// Seed.
     pub seed: u64,
@@ -172,9 +172,9 @@ impl Make {
             group: self.group.unwrap_or(method.default_group()),
             activations: match self.activations {
                 None => Activations::Auto,
-                Some(8) => Activations::Int8,
-                Some(16) => Activations::Int16,
-                Some(bits) => bail!("activations: {bits}; use 8 or 16 bits"),
+                Some(bits) => {
+                    Activations::of_bits(bits).with_context(|| format!("activations: {bits}; use 8 or 16 bits"))?
+                }
             },
             steps: self.steps,
             effort: self.effort,

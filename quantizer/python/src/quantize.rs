@@ -82,9 +82,9 @@ impl Request {
             group: self.group.unwrap_or(method.default_group()),
             activations: match self.activations {
                 None => Activations::Auto,
-                Some(8) => Activations::Int8,
-                Some(16) => Activations::Int16,
-                Some(bits) => return Err(error!("activations is {bits}; use 8 or 16 bits")),
+                Some(bits) => {
+                    Activations::of_bits(bits).ok_or_else(|| error!("activations is {bits}; use 8 or 16 bits"))?
+                }
             },
             steps: self.steps,
             minutes,

@@ -15,7 +15,7 @@ pub struct CellKey {
     pub policy: String,
     /// The method.
     pub method: Option<Contender>,
-    /// What the image may take.
+    /// Budget of the image.
     pub budget: Option<Allowed>,
 }
 

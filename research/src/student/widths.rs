@@ -27,7 +27,7 @@ pub struct Narrowing<'a> {
     pub ties: &'a Ties,
     /// Form of the weights.
     pub form: Form,
-    /// What the image may take.
+    /// Budget of the image.
     pub limits: Limits,
 }
 

@@ -25,7 +25,7 @@ quantize_kernels!(actq_quantize0 actq_quantize1 actq_quantize2 actq_quantize3);
 /// Quantizers by the shift of the layout's activations.
 static QUANTIZERS: [Quantize; 4] = {
     let all: [Quantize; 4] = [actq_quantize0, actq_quantize1, actq_quantize2, actq_quantize3];
-    // No layout of the build has the other shifts: any quantizer that it needs stands for them.
+    // No layout of the build has the other shifts: their entries are a quantizer that it needs anyway.
     let mut quantizers = [all[shift_from(0)]; 4];
     let mut shift = 0;
     while shift < quantizers.len() {

@@ -22,6 +22,8 @@ mod units;
 
 pub use statistics::RowStatistics;
 
+use std::borrow::Cow;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -69,9 +71,14 @@ pub fn quantize(
     let Shape { cut, dimensions, rows, widths, limits: learned_with } =
         shape(statistics, rate, options, &forced, allowed)?;
     let size = Size::new(&cut.graph, &dimensions, values(&cut.graph, rate, options));
-    let input_moments: Vec<Moments> =
-        moments.iter().zip(&cut.columns).map(|((input, _), columns)| input.of(columns)).collect();
-    let mut compacted = compact(&cut.graph, &dimensions, &widths, &input_moments.iter().collect::<Vec<_>>());
+    let inputs_of =
+        moments.iter().zip(&cut.columns).map(|((input, _), columns)| match columns.len() == input.mean.len() {
+            true => Cow::Borrowed(input),
+            false => Cow::Owned(input.of(columns)),
+        });
+    let inputs_of: Vec<Cow<'_, Moments>> = inputs_of.collect();
+    let inputs_of: Vec<&Moments> = inputs_of.iter().map(AsRef::as_ref).collect();
+    let mut compacted = compact(&cut.graph, &dimensions, &widths, &inputs_of);
     for (of_compacted, of_cut) in [(&mut compacted.columns, &cut.columns), (&mut compacted.rows, &cut.rows)] {
         let of_matrices = of_compacted.iter_mut().zip(of_cut);
         of_matrices.for_each(|(kept, former)| kept.iter_mut().for_each(|index| *index = former[*index]));

@@ -17,6 +17,15 @@ pub enum Activations {
 }
 
 impl Activations {
+    /// Returns the activations of these bits, 8 or 16.
+    pub fn of_bits(bits: u32) -> Option<Self> {
+        match bits {
+            8 => Some(Self::Int8),
+            16 => Some(Self::Int16),
+            _ => None,
+        }
+    }
+
     /// Returns `true` if all matrices get the requested bits.
     pub fn are_asked_for(self) -> bool {
         matches!(self, Self::Int8 | Self::Int16)

@@ -181,7 +181,7 @@ pub(super) struct Strip<'a> {
     of_scales: Moments<'a>,
 }
 
-/// How far a step goes.
+/// Strides of a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gait {
     pub(super) codes: Stride,

@@ -78,6 +78,9 @@ impl Cut {
             let mut ranked: Vec<usize> = (0..cell.hidden).collect();
             ranked.sort_by(|&a, &b| removals[b].total_cmp(&removals[a]));
             let gone = ranked.split_off(((cell.hidden as f64 * share).ceil() as usize).clamp(1, cell.hidden));
+            if gone.is_empty() {
+                continue;
+            }
             ranked.sort_unstable();
             cut.error += gone.iter().map(|&unit| removals[unit]).sum::<f64>();
             cut.keep(cell, &ranked, &gone, moments);
