@@ -53,7 +53,7 @@ mod app {
     use actq_boards::seams::{Source, Watchdog as _};
     use actq_controller::endpoint::Facts;
     use actq_controller::slots::Candidate;
-    use actq_controller::{Check, Endpoint, Guard, Safety, Settings, Shared as _};
+    use actq_controller::{Check, Endpoint, Guard, Output, Safety, Settings, Shared as _};
     use actq_firmware_demo::deadline::BAUD;
     use actq_firmware_demo::image;
     #[cfg(feature = "foc")]
@@ -133,9 +133,12 @@ mod app {
         timer.enable_interrupt();
         let rates = Rates::new(clock.hz, TICK_HZ);
         #[cfg(feature = "foc")]
-        let actuator = Actuator::new(stage, TICK_HZ);
+        let mut actuator = Actuator::new(stage, TICK_HZ);
         #[cfg(not(feature = "foc"))]
-        let actuator = Actuator::new(stage);
+        let mut actuator = Actuator::new(stage);
+        // A request may come before the first tick, which must not count as a fault of the hardware.
+        let applied = actuator.apply(&[Output::Coast; AXES], safety.axes());
+        safety.check(Check::Hardware, applied);
         let local = Local { wire, port, watchdog, actuator, timer, period, rates, breadcrumb };
         (Shared { safety, timing: Timing::default() }, local)
     }
