@@ -103,13 +103,23 @@ pub fn of_op(op: &Op<'_>) -> Cost {
     total(|add| features(op, add))
 }
 
-/// Computes the cost of rows of one width in a linear operation, with the preparation of their input; `in_order` is
-/// `false` if they have output steps.
+/// Computes the cost of a linear operation with biases, from `cols` values to `rows`, whose blocks have these shapes,
+/// each of another width. `in_order` is `false` if they have output steps. If it accumulates, its output is added to,
+/// without biases.
 #[cfg(feature = "writer")]
-pub fn of_rows(shape: BlockShape, in_order: bool) -> Cost {
+pub fn of_linear(
+    [rows, cols]: [usize; 2],
+    blocks: impl IntoIterator<Item = BlockShape>,
+    in_order: bool,
+    accumulate: bool,
+) -> Cost {
     total(|add| {
-        prepare(shape, add);
-        block(shape, in_order, in_order, add);
+        let in_place = in_order && !accumulate;
+        begin_linear([rows, cols], (!in_place).then(|| OutputStart::of(accumulate, !accumulate)), add);
+        for shape in blocks {
+            prepare(shape, add);
+            block(shape, in_order, in_place, add);
+        }
     })
 }
 
@@ -262,12 +272,8 @@ pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
 
 fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, usize)) {
     let in_place = matrix.start_values(accumulate).is_some();
-    add(Feature::operation(op::LINEAR), 1);
-    magnitude(matrix.cols, add);
-    if !in_place {
-        add(Feature::BIASED, 1);
-        start(OutputStart::of(accumulate, !matrix.bias.is_empty()), matrix.rows, add);
-    }
+    let apart = (!in_place).then(|| OutputStart::of(accumulate, !matrix.bias.is_empty()));
+    begin_linear([matrix.rows, matrix.cols], apart, add);
     let mut last = None;
     for rows in matrix.blocks() {
         let shape = rows.block.shape();
@@ -276,6 +282,17 @@ fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, us
             last = Some(shape.width);
         }
         block(shape, rows.steps.is_empty(), in_place, add);
+    }
+}
+
+/// Counts the features of a linear operation before its blocks; `apart` says how outputs are initialized that the blocks
+/// do not initialize themselves.
+fn begin_linear([rows, cols]: [usize; 2], apart: Option<OutputStart>, add: &mut dyn FnMut(Feature, usize)) {
+    add(Feature::operation(op::LINEAR), 1);
+    magnitude(cols, add);
+    if let Some(apart) = apart {
+        add(Feature::BIASED, 1);
+        start(apart, rows, add);
     }
 }
 

@@ -26,6 +26,21 @@ pub(crate) fn mlp() -> Graph {
     graph
 }
 
+/// Makes a network of linear layers with tanh between them.
+pub(crate) fn layers(lens: &[usize]) -> Graph {
+    let mut random = Random::new(3);
+    let mut graph = Graph::new(lens[0]);
+    for (i, of) in lens.windows(2).enumerate() {
+        graph.matrices.push(matrix(&format!("m{i}"), of[1], of[0], &mut random));
+        let input = match i {
+            0 => 0,
+            _ => graph.add(Pointwise(Function::Tanh), &[graph.nodes.len()]).expect("it fits"),
+        };
+        graph.add(Linear { matrix: i, bias: vector(of[1], &mut random) }, &[input]).expect("it fits");
+    }
+    graph
+}
+
 /// Makes a network LSTM 2 -> 3, then 3 -> 2.
 pub(crate) fn lstm() -> Graph {
     let mut random = Random::new(2);

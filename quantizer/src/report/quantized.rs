@@ -46,11 +46,11 @@ pub fn sampled(Sampled { frames, inputs, outputs }: Sampled) -> String {
 pub fn learning(learning: &Learning) -> String {
     let Learning { steps, choice, tried } = learning;
     let mut text = match choice {
-        Choice::Learning(widening) => format!("learned {steps} steps with {widening}\n"),
+        Choice::Learning(recipe) => format!("learned {steps} steps with {recipe}\n"),
         Choice::Feedback { .. } => format!("not learned: {choice}\n"),
     };
     if !tried.is_empty() {
-        let mut rows = table(&["setting", "cross-validation", "with noise"]);
+        let mut rows = table(&["setting", "error", "with noise"]);
         for Tried { choice, recorded, widened } in tried {
             rows.add_row([choice.to_string(), format!("{recorded:.2e}"), format!("{widened:.2e}")]);
         }

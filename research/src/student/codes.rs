@@ -8,6 +8,7 @@ use actq::methods::distill::activations::choose_activations;
 use actq::methods::distill::objective::Frames;
 use actq::methods::distill::schedule::Bounds;
 use actq::methods::distill::train::{Task, distill, recorded_error};
+use actq::methods::learning::Recipe;
 use actq::methods::scale::{Scales, round_to};
 use actq::random::Random;
 use actq_kernels::Width;
@@ -77,7 +78,7 @@ impl Coder {
             group: 0,
             importance: &importance,
             x_max: &vec![INT8; graph.matrices.len()],
-            widening: self.widening,
+            recipe: Recipe::new(self.widening),
             frames: self.frames,
             watched: None,
             bounds: Bounds { steps: Some(steps), time: None },

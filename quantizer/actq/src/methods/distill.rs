@@ -5,6 +5,7 @@ pub mod activations;
 pub mod adam;
 pub mod allocate;
 pub mod balance;
+mod candidate;
 pub mod choose;
 pub mod compact;
 pub mod dimension;
@@ -18,16 +19,15 @@ mod shape;
 pub mod size;
 mod statistics;
 pub mod train;
+mod trials;
 mod units;
 
 pub use statistics::RowStatistics;
 
-use std::borrow::Cow;
-
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::learning::{Choice, Learning};
+use super::learning::{Choice, Learning, Recipe};
 use super::options::Options;
 use super::packing::Activations;
 use super::progress::Progress;
@@ -40,14 +40,15 @@ use crate::error::{Result, ensure};
 use crate::graph::Graph;
 use activations::choose_activations;
 use allocate::Rows;
-use choose::{CHOOSING, Chosen, choose};
-use compact::{Compacted, add_to_bias, compact};
+use candidate::Candidate;
+use choose::{Chosen, choose};
+use compact::add_to_bias;
 use dimension::dimensions;
 use feedback::feedback;
-use objective::Frames;
-use shape::{Shape, forced, shape, values};
+use shape::{Goal, Shape, forced, values};
 use size::Size;
 use train::{Learned, Present, Task, distill};
+use trials::choose_recipe;
 
 /// Quantizes a network. The result lacks hidden elements without bits; its biases and norms have been learned.
 pub fn quantize(
@@ -66,56 +67,26 @@ pub fn quantize(
             names()
         );
     }
-    let allowed = rate.bytes(graph.weights());
-    let forced = forced(graph, rate, options);
-    let Shape { cut, dimensions, rows, widths, limits: learned_with } =
-        shape(statistics, rate, options, &forced, allowed)?;
-    let size = Size::new(&cut.graph, &dimensions, values(&cut.graph, rate, options));
-    let inputs_of =
-        moments.iter().zip(&cut.columns).map(|((input, _), columns)| match columns.len() == input.mean.len() {
-            true => Cow::Borrowed(input),
-            false => Cow::Owned(input.of(columns)),
-        });
-    let inputs_of: Vec<Cow<'_, Moments>> = inputs_of.collect();
-    let inputs_of: Vec<&Moments> = inputs_of.iter().map(AsRef::as_ref).collect();
-    let mut compacted = compact(&cut.graph, &dimensions, &widths, &inputs_of);
-    for (of_compacted, of_cut) in [(&mut compacted.columns, &cut.columns), (&mut compacted.rows, &cut.rows)] {
-        let of_matrices = of_compacted.iter_mut().zip(of_cut);
-        of_matrices.for_each(|(kept, former)| kept.iter_mut().for_each(|index| *index = former[*index]));
-    }
-    let importance: Vec<Vec<f64>> = compacted
-        .columns
-        .iter()
-        .zip(inputs)
-        .map(|(columns, importance)| columns.iter().map(|&c| importance[c]).collect())
-        .collect();
-    let bounds = statistics.bounds(options);
-    let task = Task {
-        graph: &compacted.graph,
-        widths: &compacted.widths,
-        group: options.group,
-        importance: &importance,
-        x_max: &learned_with,
-        widening: Widening::of(windows.recurrent()),
-        frames: Frames::of(options, graph),
-        watched: statistics.watched.as_ref(),
-        bounds,
-        seed: options.seed,
+    let goal = Goal { statistics, rate, options };
+    let recipe = Recipe::new(Widening::of(windows.recurrent()));
+    let mut choosing = |share, error| progress(Progress::Choosing { share, error });
+    let first = Candidate::new(goal, recipe.rounding)?;
+    let (candidate, chosen) = if options.learns() && first.task(goal, recipe).is_rest_of(windows) {
+        choose_recipe(goal, first, recipe, &mut choosing)
+    } else {
+        let feedback =
+            |moments: &[(Moments, DMatrix<f64>)], damping: f64| feed_back(&first, options.group, moments, damping);
+        let chosen = choose(&first.task(goal, recipe), windows, &feedback, &mut choosing);
+        (first, chosen)
     };
-    let feedback = |moments: &[(Moments, DMatrix<f64>)], damping: f64| {
-        feed_back(&compacted, options.group, &importance, moments, damping)
-    };
-    let Chosen { choice, bounds, tried } = choose(&task, windows, &feedback, &mut |share, error| {
-        progress(Progress::Choosing { share: CHOOSING * share, error });
-    });
-    let from = if tried.is_empty() { 0.0 } else { CHOOSING };
+    let Chosen { choice, bounds, tried, share: from } = chosen;
     let (quantized, learned, steps) = match choice {
         Choice::Feedback { damping } => {
-            let (quantized, graph) = feedback(moments, damping);
+            let (quantized, graph) = feed_back(&candidate, options.group, moments, damping);
             (quantized, graph, 0)
         }
-        Choice::Learning(_) => {
-            let task = Task { bounds, ..task };
+        Choice::Learning(recipe) => {
+            let task = Task { bounds, ..candidate.task(goal, recipe) };
             let Learned { quantized, graph, steps } =
                 distill(&task, windows, &mut |Present { share, error, held_out }| {
                     progress(Progress::Learning { share: from + (1.0 - from) * share, error, held_out });
@@ -123,6 +94,10 @@ pub fn quantize(
             (quantized, graph, steps)
         }
     };
+    let Candidate { shape: Shape { cut, dimensions, rows, widths, limits: learned_with, cycles }, compacted, .. } =
+        candidate;
+    let size = Size::new(&cut.graph, &dimensions, values(&cut.graph, rate, options));
+    let allowed = rate.bytes(graph.weights());
     let wanted = match options.activations {
         Activations::Auto => {
             let allowance = bounds.time.filter(|_| graph.denoising_steps() > 1).map(Allowance::of);
@@ -156,7 +131,7 @@ pub fn quantize(
         outcome.allocation = Some(allocation);
     }
     let learning = Some(Learning { steps, choice, tried });
-    Ok(QuantizedNetwork { graph: learned, outcomes, learning })
+    Ok(QuantizedNetwork { graph: learned, outcomes, learning, cycles })
 }
 
 /// Returns the fewest bytes that meet a rate. A balance does not count, since only the recording can require it.
@@ -169,9 +144,8 @@ pub(super) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize
 /// Quantizes without learning: every matrix by two-sided error feedback with the moments of its input and of its
 /// output's derivative. The mean error goes into the biases.
 fn feed_back(
-    compacted: &Compacted,
+    Candidate { compacted, importance, .. }: &Candidate,
     group: usize,
-    importance: &[Vec<f64>],
     moments: &[(Moments, DMatrix<f64>)],
     damping: f64,
 ) -> (Vec<Quantized>, Graph) {

@@ -4,11 +4,40 @@ use std::fmt;
 
 use crate::calibrate::widening::Widening;
 
+/// Settings of learning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recipe {
+    /// Noise on the inputs.
+    pub widening: Widening,
+    /// Factor on the learning rates.
+    pub rate: f32,
+    /// Factor on the expected error of rounding when widths are allocated. The higher, the fewer rows with more bits.
+    pub rounding: f64,
+}
+
+impl Recipe {
+    /// Returns the settings with this noise and no factors.
+    pub fn new(widening: Widening) -> Self {
+        Self { widening, rate: 1.0, rounding: 1.0 }
+    }
+}
+
+impl fmt::Display for Recipe {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { widening, rate, rounding } = self;
+        write!(f, "{widening}")?;
+        if *rate != 1.0 {
+            write!(f, ", rate x{rate}")?;
+        }
+        if *rounding != 1.0 { write!(f, ", rounding x{rounding}") } else { Ok(()) }
+    }
+}
+
 /// Way in which codes are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Choice {
-    /// Learning with inputs widened by this noise.
-    Learning(Widening),
+    /// Learning with these settings.
+    Learning(Recipe),
     /// Two-sided error feedback.
     Feedback {
         /// Share of the mean that is added to the diagonals of the inputs' moments.
@@ -19,7 +48,7 @@ pub enum Choice {
 impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Learning(widening) => write!(f, "learning with {widening}"),
+            Self::Learning(recipe) => write!(f, "learning with {recipe}"),
             Self::Feedback { damping } => write!(f, "error feedback, damping {damping}"),
         }
     }
@@ -36,7 +65,8 @@ pub struct Learning {
     pub tried: Vec<Tried>,
 }
 
-/// A choice and its errors on held-out episodes: the mean over samples and outputs of squared error over variance.
+/// A choice and its errors: the mean over samples and outputs of squared error over variance. Learning is compared with
+/// feedback on held-out episodes, and settings of learning on all.
 #[derive(Clone, Copy, Debug)]
 pub struct Tried {
     /// The choice.

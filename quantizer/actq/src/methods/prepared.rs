@@ -172,7 +172,7 @@ impl<'a> PreparedMethod<'a> {
                 outcomes
             }
         };
-        Ok(QuantizedNetwork { graph: (*graph).clone(), outcomes, learning: None })
+        Ok(QuantizedNetwork { graph: (*graph).clone(), outcomes, learning: None, cycles: None })
     }
 
     /// Returns the most steps of distillation with these options; 0 for methods that do not learn.

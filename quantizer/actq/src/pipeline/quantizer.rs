@@ -64,7 +64,12 @@ impl<'a> Quantizer<'a> {
         options: &Options,
         progress: &mut dyn FnMut(Progress),
     ) -> Result<QuantizedPolicy> {
-        let QuantizedNetwork { graph, outcomes, learning } = self.method.quantize(rate, options, progress)?;
+        self.image_of(self.method.quantize(rate, options, progress)?, rate)
+    }
+
+    /// Makes the image of a network that was quantized to a rate.
+    pub(super) fn image_of(&self, network: QuantizedNetwork, rate: Rate) -> Result<QuantizedPolicy> {
+        let QuantizedNetwork { graph, outcomes, learning, .. } = network;
         let policy = Policy { graph, ..self.policy.clone() };
         let image = emit::image(&policy, &outcomes)?;
         Ok(QuantizedPolicy { policy, outcomes, image, rate, learning, search: None, time: None })

@@ -82,7 +82,7 @@ fn smallest_limits(size: &Size<'_>, options: &Options, forced: &[Option<Width>])
 }
 
 /// Returns the layouts of these magnitudes.
-fn packed(limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
+pub(super) fn packed(limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
     limits.iter().map(|&limit| vec![Packing::of(limit, options.group)]).collect()
 }
 
@@ -151,7 +151,7 @@ mod tests {
             graph.matrices.push(WeightMatrix { name: "m".into(), rows: 64, cols, data: vec![0.0; 64 * cols] });
         }
         let size = Size::new(&graph, &[], 0);
-        let rows = |energy: f64| Rows { energy: vec![energy; 64], removal: vec![1e9; 64], forced: None };
+        let rows = |energy: f64| Rows { energy: vec![energy; 64], removal: vec![1e9; 64], rounding: 1.0, forced: None };
         let limits = |of_first: f64, activations: Activations| {
             let plain = Options::new(Method::Distill, Budget::BitsPerWeight(4.0));
             let options = Options { activations, ..plain };

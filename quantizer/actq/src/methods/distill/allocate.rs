@@ -41,6 +41,8 @@ pub struct Rows {
     pub energy: Vec<f64>,
     /// Error of each row without bits.
     pub removal: Vec<f64>,
+    /// Factor on the error of rounding.
+    pub rounding: f64,
     /// Forced width of all rows.
     pub forced: Option<Width>,
 }
@@ -48,7 +50,7 @@ pub struct Rows {
 impl Rows {
     /// Returns the predicted error of row `r` at a width.
     pub fn expected(&self, r: usize, width: Option<Width>) -> f64 {
-        width.map_or(self.removal[r], |width| epsilon(width) * self.energy[r])
+        width.map_or(self.removal[r], |width| self.rounding * epsilon(width) * self.energy[r])
     }
 }
 
@@ -304,7 +306,7 @@ mod tests {
         }
         let rows = |matrix: &WeightMatrix| {
             let energy = energies(matrix, &vec![1.0; matrix.cols], &vec![1.0; matrix.rows]);
-            Rows { removal: energy.clone(), energy, forced: None }
+            Rows { removal: energy.clone(), energy, rounding: 1.0, forced: None }
         };
         let rows: Vec<Rows> = graph.matrices.iter().map(rows).collect();
         let packings = vec![vec![Packing::of(127, 0), Packing::of(32767, 0)]; 2];
@@ -335,7 +337,7 @@ mod tests {
         let size = Size { packings, ..Size::new(&graph, &[], 0) };
         // The row that matters is beyond the reach of a step.
         let energy: Vec<f64> = (0..300).map(|r| if r == 299 { 1.0 } else { 1e-9 }).collect();
-        let rows = [Rows { removal: energy.clone(), energy, forced: None }];
+        let rows = [Rows { removal: energy.clone(), energy, rounding: 1.0, forced: None }];
         let least = size.bytes(&size.smallest(&[None]));
         assert!(allocate(&size, &rows, least as f64).is_ok());
         let error = allocate(&size, &rows, least as f64 - 1.0).expect_err("too small");

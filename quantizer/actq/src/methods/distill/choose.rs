@@ -1,4 +1,5 @@
-//! Chooses between learning and feedback by the errors on whole held-out episodes.
+//! Chooses between learning and feedback by the errors on whole held-out episodes. `trials.rs` serves networks that
+//! have lost most of their weights: feedback makes up for rounding, and not for rows that were removed.
 //!
 //! Each has three quarters of the episodes, and learning an eighth of its steps. The error is measured on the other
 //! episodes, at the recorded observations and at widened ones. A feed-forward network takes what has the lower error at
@@ -18,7 +19,7 @@ use crate::methods::learning::{Choice, Tried};
 use crate::methods::quantized::{Quantized, dequantized};
 
 /// Least steps of which a part is spent on choices.
-const LEAST_STEPS: usize = 3000;
+pub(super) const LEAST_STEPS: usize = 3000;
 /// Divisor of the steps, and of the time, for one choice.
 const STEPS: usize = 8;
 const TIME: u32 = 12;
@@ -42,14 +43,22 @@ pub struct Chosen {
     pub bounds: Bounds,
     /// Ways that were compared.
     pub tried: Vec<Tried>,
+    /// Approximate share of the choice in all the work.
+    pub share: f64,
 }
 
-/// Approximate share of the choice in all the work.
-pub const CHOOSING: f64 = 1.0 / (STEPS + 1) as f64;
+impl Chosen {
+    /// Returns a choice without trials.
+    pub(super) fn untried(choice: Choice, bounds: Bounds) -> Self {
+        Self { choice, bounds, tried: Vec::new(), share: 0.0 }
+    }
+}
 
-/// Tries all choices. If no episode can be held out, few steps are to be learned, or most weights are gone, it tries
-/// nothing: feedback makes up for rounding, and not for rows that were removed. It does not try feedback for an
-/// iterative head, since moments over all denoising steps take longer than the result is worth.
+/// Share of a trial in all the work.
+const SHARE: f64 = 1.0 / (STEPS + 1) as f64;
+
+/// Tries all choices. If no episode can be held out, or few steps are to be learned, it tries nothing. It does not try
+/// feedback for an iterative head, since moments over all denoising steps take longer than the result is worth.
 pub fn choose(
     task: &Task<'_>,
     windows: &Windows,
@@ -58,11 +67,11 @@ pub fn choose(
 ) -> Chosen {
     let Bounds { steps, time } = task.bounds;
     let learns = steps != Some(0);
-    let untried = if learns { Choice::Learning(task.widening) } else { Choice::Feedback { damping: DAMPING_INPUT } };
-    let untried = Chosen { choice: untried, bounds: task.bounds, tried: Vec::new() };
+    let untried = if learns { Choice::Learning(task.recipe) } else { Choice::Feedback { damping: DAMPING_INPUT } };
+    let untried = Chosen::untried(untried, task.bounds);
     let iterative = task.graph.denoising_steps() > 1;
-    let learns_anyway = learns && (task.is_rest_of(windows) || steps.is_some_and(|steps| steps < LEAST_STEPS));
-    if learns_anyway || !learns && iterative {
+    let few = learns && steps.is_some_and(|steps| steps < LEAST_STEPS);
+    if few || !learns && iterative {
         return untried;
     }
     let Some((learned_from, left_out)) = windows.split() else { return untried };
@@ -80,17 +89,17 @@ pub fn choose(
     if learns {
         let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
         let trial = Task { bounds, watched: None, ..task.clone() };
-        let learned = distill(&trial, &learned_from, &mut |now| progress(now.share, now.error));
-        try_out(Choice::Learning(task.widening), (learned.quantized, learned.graph));
+        let learned = distill(&trial, &learned_from, &mut |now| progress(SHARE * now.share, now.error));
+        try_out(Choice::Learning(task.recipe), (learned.quantized, learned.graph));
     }
     let choice = best(&tried, windows.recurrent()).map_or(untried.choice, |best| best.choice);
     let left = time.map(|time| time - time / TIME);
-    Chosen { choice, bounds: Bounds { steps, time: left }, tried }
+    Chosen { choice, bounds: Bounds { steps, time: left }, tried, share: SHARE }
 }
 
 /// Returns the best choice: among those whose errors on the path differ by chance only, the one with the lowest error
 /// off it. Feedback is complete here, whereas learning has had an eighth of its steps.
-fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
+pub(super) fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
     let left = |tried: &Tried| if matches!(tried.choice, Choice::Learning(_)) { ERROR_RATIO } else { 1.0 };
     let widened = |tried: &Tried| left(tried) * tried.widened;
     let expected = |tried: &Tried| if recurrent { widened(tried) } else { left(tried) * tried.recorded };
@@ -100,7 +109,7 @@ fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
 }
 
 /// Returns the errors of a network at recorded and at widened observations, the same ones for every choice.
-fn errors(task: &Task<'_>, graph: &Graph, quantized: &[Quantized], windows: &Windows) -> [f64; 2] {
+pub(super) fn errors(task: &Task<'_>, graph: &Graph, quantized: &[Quantized], windows: &Windows) -> [f64; 2] {
     let network = Network::rounded(graph, task.x_max);
     let weights = dequantized(graph, quantized);
     [None, Some(Widening::WIDE)].map(|widening| recorded_error(&network, &weights, windows, widening, task.seed))
@@ -112,6 +121,7 @@ mod tests {
 
     use super::*;
     use crate::budget::{Budget, Rate};
+    use crate::methods::learning::Recipe;
     use crate::methods::{Learning, Method, Options, PreparedMethod};
     use crate::testing::{dataset, mlp};
 
@@ -142,7 +152,7 @@ mod tests {
     #[test]
     fn feedback_must_beat_the_predicted_learning_error() {
         let learned = |noise: f32, recorded, widened| {
-            let choice = Choice::Learning(Widening { noise, ..Widening::WIDE });
+            let choice = Choice::Learning(Recipe::new(Widening { noise, ..Widening::WIDE }));
             Tried { choice, recorded, widened }
         };
         let fed_back = |recorded| Tried { choice: Choice::Feedback { damping: 0.01 }, recorded, widened: 9.0 };
@@ -163,6 +173,6 @@ mod tests {
     fn one_episode_or_few_steps_skip_the_choice() {
         let found = |Learning { choice, tried, .. }: Learning| (choice, tried.len());
         assert_eq!(found(chosen(1, 0)), (Choice::Feedback { damping: DAMPING_INPUT }, 0));
-        assert_eq!(found(chosen(4, 8)), (Choice::Learning(Widening::OF_FRAMES), 0));
+        assert_eq!(found(chosen(4, 8)), (Choice::Learning(Recipe::new(Widening::OF_FRAMES)), 0));
     }
 }

@@ -3,7 +3,7 @@
 use actq_kernels::Width;
 use rayon::prelude::*;
 
-use super::activations::allocated;
+use super::activations::{allocated, packed};
 use super::allocate::{Rows, energies, expected};
 use super::dimension::{Dimension, Widths, dimensions};
 use super::size::Size;
@@ -14,6 +14,14 @@ use crate::calibrate::moments::Moments;
 use crate::error::Result;
 use crate::graph::{Graph, WeightMatrix};
 use crate::methods::options::Options;
+
+/// What is asked of a network.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Goal<'a> {
+    pub(super) statistics: &'a RowStatistics,
+    pub(super) rate: Rate,
+    pub(super) options: &'a Options,
+}
 
 /// Shape of the network to learn.
 #[derive(Debug)]
@@ -27,22 +35,20 @@ pub(super) struct Shape {
     pub(super) widths: Widths,
     /// Activation magnitude of every matrix.
     pub(super) limits: Vec<u16>,
+    /// Counted cycles, if the rate limits them.
+    pub(super) cycles: Option<f64>,
 }
 
 /// Shares of the cells' units to choose from.
 const SHARES: [f64; 7] = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375, 0.25];
 
 /// Chooses the units of recurrent cells, and the widths of all rows. Units are removed together where something is
-/// learned and no width is forced: of several shares of them, the one with the lowest expected error stays.
-pub(super) fn shape(
-    statistics: &RowStatistics,
-    rate: Rate,
-    options: &Options,
-    forced: &[Option<Width>],
-    allowed: f64,
-) -> Result<Shape> {
+/// learned and no width is forced: of several shares of them, the one with the lowest expected error stays. `rounding` is a factor on the error that
+/// rounding is expected to cause.
+pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64) -> Result<Shape> {
     let RowStatistics { inputs, outputs, moments, .. } = statistics;
     let graph = statistics.graph();
+    let (forced, allowed) = (forced(graph, rate, options), rate.bytes(graph.weights()));
     let of_inputs: Vec<&Moments> = moments.iter().map(|(input, _)| input).collect();
     let removals = statistics.removals(options.learns());
     let of_cut = |cut: Cut| {
@@ -51,7 +57,7 @@ pub(super) fn shape(
             let (input, output) = (pick(&inputs[m], &cut.columns[m]), pick(&outputs[m], &cut.rows[m]));
             let energy = energies(matrix, &input, &output);
             let removal = removals[m].as_ref().map_or_else(|| energy.clone(), |of| pick(of, &cut.rows[m]));
-            Rows { energy, removal, forced: forced[m] }
+            Rows { energy, removal, rounding, forced: forced[m] }
         };
         let rows: Vec<Rows> = cut.graph.matrices.iter().enumerate().map(of_matrix).collect();
         let cycles = match rate {
@@ -60,8 +66,9 @@ pub(super) fn shape(
         };
         let dimensions = dimensions(&cut.graph);
         let size = Size { cycles, ..Size::new(&cut.graph, &dimensions, values(&cut.graph, rate, options)) };
-        let (widths, limits) = allocated(size, &rows, options, allowed)?;
-        Ok(Shape { cut, dimensions, rows, widths, limits })
+        let (widths, limits) = allocated(size.clone(), &rows, options, allowed)?;
+        let cycles = cycles.map(|_| Size { packings: packed(&limits, options), ..size }.cycles(&widths));
+        Ok(Shape { cut, dimensions, rows, widths, limits, cycles })
     };
     if !options.learns() || forced.iter().any(Option::is_some) || statistics.cells().0.is_empty() {
         return of_cut(Cut::nothing(graph));
@@ -79,6 +86,12 @@ pub(super) fn shape(
 }
 
 impl Shape {
+    /// Returns `true` if another shape has the same units, widths and activations.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        let key = |shape: &'_ Self| (shape.cut.rows.clone(), shape.widths.clone(), shape.limits.clone());
+        key(self) == key(other)
+    }
+
     /// Returns the expected error.
     fn error(&self) -> f64 {
         self.cut.error + expected(&self.rows, &self.widths)

@@ -8,6 +8,7 @@ use actq_kernels::pace::cost;
 
 use super::balance::balance_bytes;
 use super::dimension::{Dimension, Widths};
+use crate::graph::operation::{Operand, Product};
 use crate::graph::{Graph, Node, NodeKind};
 use crate::methods::packing::Packing;
 
@@ -24,6 +25,8 @@ pub struct Size<'a> {
     pub values: usize,
     /// Runs of every matrix in a step.
     pub runs: Vec<usize>,
+    /// `true` for every matrix that adds to the output of another: that of an LSTM's state.
+    pub accumulates: Vec<bool>,
     /// Most modelled cycles of the products and of the functions after them; `None`: time does not matter.
     pub cycles: Option<f64>,
     /// What the allocation pays with.
@@ -44,7 +47,11 @@ impl<'a> Size<'a> {
     pub fn new(graph: &'a Graph, dimensions: &'a [Dimension], values: usize) -> Self {
         let runs = (0..graph.matrices.len()).map(|m| graph.runs(m)).collect();
         let price = Price { bit: 1.0, cycle: 0.0 };
-        Self { graph, dimensions, packings: Vec::new(), values, runs, cycles: None, price }
+        let cells = graph.nodes.iter().filter(|node| matches!(node.kind, NodeKind::Lstm(_)));
+        let products: Vec<Product> = cells.flat_map(|node| node.kind.products()).collect();
+        let of_state = |m: usize| products.iter().any(|p| p.matrix == m && p.operand == Operand::State);
+        let accumulates = (0..graph.matrices.len()).map(of_state).collect();
+        Self { graph, dimensions, packings: Vec::new(), values, runs, accumulates, cycles: None, price }
     }
 
     /// Returns `true` if the widths keep `limit`, in bytes, and the limit on cycles.
@@ -64,10 +71,14 @@ impl<'a> Size<'a> {
     pub fn cycles(&self, widths: &Widths) -> f64 {
         let of_matrix = |m: usize| {
             let Some(&packing) = self.packings[m].first() else { return 0.0 };
-            let blocks = self.blocks(widths, m, packing).map(|(shape, sorted)| cost::of_rows(shape, sorted).cycles);
+            let (cols, sorted, blocks) = self.blocks(widths, m, packing);
+            let kept = widths[m].iter().flatten().count();
+            // A removed row of no dimension is an output of its bias alone.
+            let rows = Dimension::made_by(self.dimensions, m).map_or(self.graph.matrices[m].rows, |_| kept);
+            let products = cost::of_linear([rows, cols], blocks, sorted && kept == rows, self.accumulates[m]);
             let functions =
                 Dimension::made_by(self.dimensions, m).map_or(0.0, |d| self.of_functions(d, d.kept(widths)));
-            self.runs[m] as f64 * (blocks.sum::<u64>() as f64 + functions)
+            self.runs[m] as f64 * (products.cycles as f64 + functions)
         };
         let of_cell = |node: &Node| match &node.kind {
             NodeKind::Lstm(cell) => cost::of_units(true, cell.hidden).cycles as f64,
@@ -80,7 +91,10 @@ impl<'a> Size<'a> {
     /// Returns the cycles of one more row of `cols` columns in every run of a matrix.
     pub fn row_cycles(&self, m: usize, width: Width, cols: usize) -> f64 {
         let Some(packing) = self.packings[m].first() else { return 0.0 };
-        let of = |rows: usize| cost::of_rows(packing.shape(width, rows, cols.max(1)), true).cycles as f64;
+        let of = |rows: usize| {
+            let shape = packing.shape(width, rows, cols.max(1));
+            cost::of_linear([rows, cols.max(1)], [shape], true, self.accumulates[m]).cycles as f64
+        };
         self.runs[m] as f64 * (of(2 * STRIP) - of(STRIP)) / STRIP as f64
     }
 
@@ -108,17 +122,23 @@ impl<'a> Size<'a> {
     /// Returns the bytes of a matrix in one layout. Rows of a dimension are sorted by width; other matrices have output
     /// steps if their order is not that of the blocks.
     pub fn matrix(&self, widths: &Widths, m: usize, packing: Packing) -> usize {
-        self.blocks(widths, m, packing).map(|(shape, sorted)| block_bytes(shape, !sorted)).sum()
+        let (_, sorted, blocks) = self.blocks(widths, m, packing);
+        blocks.map(|shape| block_bytes(shape, !sorted)).sum()
     }
 
-    /// Returns the blocks of a matrix in one layout; `true` if its rows need no output steps.
-    fn blocks(&self, widths: &Widths, m: usize, packing: Packing) -> impl Iterator<Item = (BlockShape, bool)> + use<> {
+    /// Returns a matrix's columns, and its blocks in one layout; `true` if its rows need no output steps.
+    fn blocks(
+        &self,
+        widths: &Widths,
+        m: usize,
+        packing: Packing,
+    ) -> (usize, bool, impl Iterator<Item = BlockShape> + use<>) {
         let fed = Dimension::feeding(self.dimensions, m);
         let cols = fed.map_or(self.graph.matrices[m].cols, |d| d.kept(widths).max(1));
         let sorted = Dimension::made_by(self.dimensions, m).is_some() || are_in_order(&widths[m]);
         let rows_of = Width::ALL.map(|width| (width, widths[m].iter().filter(|w| **w == Some(width)).count()));
         let used = rows_of.into_iter().filter(|(_, rows)| *rows > 0);
-        used.map(move |(width, rows)| (packing.shape(width, rows, cols), sorted))
+        (cols, sorted, used.map(move |(width, rows)| packing.shape(width, rows, cols)))
     }
 
     /// Returns the widths that take the fewest bytes. Every matrix keeps one row, since without any it would disconnect

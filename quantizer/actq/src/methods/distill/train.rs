@@ -17,6 +17,7 @@ use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
 use crate::graph::{Derivatives, Graph, Matrix, Network, STRIP, Vectors, Weights};
+use crate::methods::learning::Recipe;
 use crate::methods::options::Effort;
 use crate::methods::quantized::Quantized;
 use crate::random::Random;
@@ -69,8 +70,8 @@ pub struct Task<'a> {
     pub importance: &'a [Vec<f64>],
     /// Activation magnitude of every matrix.
     pub x_max: &'a [u16],
-    /// Noise on the inputs.
-    pub widening: Widening,
+    /// Noise on the inputs, and factor on the rates.
+    pub recipe: Recipe,
     /// Weighting of frames.
     pub frames: Frames,
     /// Held-out observations, to report the error on.
@@ -140,7 +141,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Pres
             .into_par_iter()
             .map(|source| match source {
                 Source::New(seed) => {
-                    let batch = windows.batch(size / shards, Some(task.widening), &mut Random::new(seed));
+                    let batch = windows.batch(size / shards, Some(task.recipe.widening), &mut Random::new(seed));
                     let lesson = Lesson::of(windows, batch, task.graph, &states);
                     let (loss, derivatives) = gradient(&network, &weights, &objective, &lesson);
                     (loss, derivatives, Some(lesson))
@@ -162,7 +163,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Pres
             clip(&mut of_matrices, &mut of_vectors);
         }
         schedule.took(loss);
-        let stride = |of: f32| Stride::new(of * rate, schedule.steps() as i32);
+        let stride = |of: f32| Stride::new(of * task.recipe.rate * rate, schedule.steps() as i32);
         let gait = Gait { codes: stride(rates.latent), scales: stride(rates.scale), strides: rates.strides };
         let by_vector = stride(rates.vector);
         learn(&mut latents, &mut of_matrices, gait, &mut weights.matrices);
