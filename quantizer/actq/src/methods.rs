@@ -12,7 +12,7 @@ mod quantized;
 pub mod scale;
 
 pub use crate::calibrate::allowance::Sampled;
-pub use learning::{Choice, Learning, Tried};
+pub use learning::{Choice, Learning, Recipe, Tried};
 pub use options::{CustomMethod, CustomStatistics, Effort, Method, Options};
 pub use packing::{Activations, Packing};
 pub use prepared::{PreparedMethod, least_bytes, quantize};

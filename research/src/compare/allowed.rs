@@ -3,10 +3,12 @@
 use std::cmp::Ordering;
 use std::fmt;
 
-use actq::budget::Budget;
+use actq::budget::{Budget, TimeLimit};
+use actq::measure::time::CLOCK;
 use serde::{Deserialize, Serialize};
 
-/// What an image may take: a number of bits per weight, or, with `K` or `B`, of KiB or bytes of flash.
+/// What an image may take: a number of bits per weight, or, with `K` or `B`, of KiB or bytes of flash, or, with `ms`, of
+/// milliseconds of a step at [`CLOCK`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Allowed {
@@ -16,6 +18,11 @@ pub enum Allowed {
     Flash {
         /// Bytes.
         flash: usize,
+    },
+    /// Predicted time of a step.
+    Time {
+        /// Milliseconds.
+        ms: f64,
     },
 }
 
@@ -28,13 +35,18 @@ impl Allowed {
     pub fn parse(text: &str) -> Result<Self, String> {
         let text = text.trim();
         let bytes = |digits: &str, unit: usize| digits.parse().ok().and_then(|n: usize| n.checked_mul(unit));
+        let time = |digits: &str| digits.parse().ok().filter(|ms| *ms > 0.0 && f64::is_finite(*ms));
         let found = match (text.strip_suffix('K'), text.strip_suffix('B')) {
+            _ if text.ends_with("ms") => time(text.trim_end_matches("ms")).map(|ms| Self::Time { ms }),
             (Some(digits), _) => bytes(digits, 1024).filter(|n| *n > 0).map(|flash| Self::Flash { flash }),
             (_, Some(digits)) => bytes(digits, 1).filter(|n| *n > 0).map(|flash| Self::Flash { flash }),
             _ => text.parse().ok().filter(|bits| (0.1..=16.0).contains(bits)).map(Self::Bits),
         };
         found.ok_or_else(|| {
-            format!("{text:?} is not a number of bits per weight from 0.1 to 16, of KiB as 12K, or of bytes as 12000B")
+            format!(
+                "{text:?} is not a number of bits per weight from 0.1 to 16, of KiB as 12K, of bytes as 12000B, or of \
+                 milliseconds as 0.25ms"
+            )
         })
     }
 
@@ -43,14 +55,16 @@ impl Allowed {
         match self {
             Self::Bits(bits) => Budget::BitsPerWeight(bits),
             Self::Flash { flash } => Budget::ImageBytes(flash),
+            Self::Time { ms } => Budget::Time(TimeLimit { milliseconds: ms, clock_hz: CLOCK, image_bytes: None }),
         }
     }
 
-    /// Orders from few bits to many, then from few bytes to many.
+    /// Orders from few bits to many, then from few bytes to many, then from short to long.
     pub fn order(&self, other: &Self) -> Ordering {
         let key = |allowed: &Self| match *allowed {
-            Self::Bits(bits) => (false, bits),
-            Self::Flash { flash } => (true, flash as f64),
+            Self::Bits(bits) => (0, bits),
+            Self::Flash { flash } => (1, flash as f64),
+            Self::Time { ms } => (2, ms),
         };
         let ((a, x), (b, y)) = (key(self), key(other));
         a.cmp(&b).then(x.total_cmp(&y))
@@ -61,6 +75,7 @@ impl Allowed {
         match self {
             Self::Bits(_) => format!("{self} bits"),
             Self::Flash { .. } => format!("{self} of flash"),
+            Self::Time { .. } => format!("{self} a step"),
         }
     }
 }
@@ -71,6 +86,7 @@ impl fmt::Display for Allowed {
             Self::Bits(bits) => write!(f, "{bits}"),
             Self::Flash { flash } if flash.is_multiple_of(1024) => write!(f, "{}K", flash / 1024),
             Self::Flash { flash } => write!(f, "{flash}B"),
+            Self::Time { ms } => write!(f, "{ms}ms"),
         }
     }
 }
@@ -85,6 +101,7 @@ mod tests {
             ("1.5", Budget::BitsPerWeight(1.5)),
             ("12K", Budget::ImageBytes(12_288)),
             ("10001B", Budget::ImageBytes(10_001)),
+            ("0.25ms", Budget::Time(TimeLimit { milliseconds: 0.25, clock_hz: CLOCK, image_bytes: None })),
         ] {
             let allowed = Allowed::parse(text).expect("a budget");
             assert_eq!((allowed.budget(), allowed.to_string().as_str()), (budget, text));
@@ -92,7 +109,7 @@ mod tests {
             assert_eq!(serde_json::from_str::<Allowed>(&json).expect("a budget"), allowed);
         }
         assert_eq!(serde_json::from_str::<Allowed>("2.5").expect("of former journals"), Allowed::Bits(2.5));
-        for text in ["", "0", "17", "0K", "K", "1.5K"] {
+        for text in ["", "0", "17", "0K", "K", "1.5K", "ms", "0ms", "-1ms", "infms"] {
             assert!(Allowed::parse(text).is_err(), "{text}");
         }
     }

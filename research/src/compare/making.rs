@@ -93,7 +93,7 @@ impl<'a> Maker<'a> {
         if contender.is_simulated() {
             return match budget {
                 Allowed::Bits(bits) => self.simulate(contender, bits),
-                Allowed::Flash { .. } => {
+                Allowed::Flash { .. } | Allowed::Time { .. } => {
                     Ok(Attempt::Impossible("a simulated format has no image; use bits per weight".to_owned()))
                 }
             };

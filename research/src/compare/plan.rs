@@ -152,7 +152,8 @@ pub struct Plan {
         default_value = "rtn,gptq,actquant,actquant-k,distill-0,distill"
     )]
     pub methods: Vec<Contender>,
-    /// Allowed bits per weight, everything counted, or flash of the whole image: in KiB as 12K, in bytes as 12000B
+    /// Allowed bits per weight, everything counted; or flash of the whole image, in KiB as 12K or in bytes as 12000B; or
+    /// time of a step, in milliseconds at 168 MHz as 0.25ms
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Allowed::parse, default_value = "1.5,2,2.3,2.5,3,4")]
     pub budgets: Vec<Allowed>,
     /// Closed-loop episodes of each cell

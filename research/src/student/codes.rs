@@ -3,13 +3,12 @@
 use actq::calibrate::widening::Widening;
 use actq::calibrate::windows::Windows;
 use actq::graph::{Graph, Network, Weights, zero_state};
-use actq::methods::Quantized;
 use actq::methods::distill::activations::choose_activations;
 use actq::methods::distill::objective::Frames;
 use actq::methods::distill::schedule::Bounds;
 use actq::methods::distill::train::{Task, distill, recorded_error};
-use actq::methods::learning::Recipe;
 use actq::methods::scale::{Scales, round_to};
+use actq::methods::{Quantized, Recipe};
 use actq::random::Random;
 use actq_kernels::Width;
 
