@@ -81,6 +81,14 @@ impl Rate {
             Self::Within { bytes, .. } => bytes.map_or(f64::INFINITY, |bytes| bytes as f64),
         }
     }
+
+    /// Returns the modelled cycles that rows, functions and recurrent cells may take, if they are limited.
+    pub fn cycles(self) -> Option<f64> {
+        match self {
+            Self::Within { cycles, .. } => Some(cycles),
+            Self::Width(_) | Self::BitsPerWeight(_) | Self::Bytes(_) => None,
+        }
+    }
 }
 
 /// The error of a budget that even the narrowest widths exceed.

@@ -43,9 +43,9 @@ use allocate::Rows;
 use candidate::Candidate;
 use choose::{Chosen, choose};
 use compact::add_to_bias;
-use dimension::dimensions;
 use feedback::feedback;
-use shape::{Goal, Shape, forced, values};
+pub(super) use shape::least_bytes;
+use shape::{Goal, Shape, values};
 use size::Size;
 use train::{Learned, Present, Task, distill};
 use trials::choose_recipe;
@@ -132,13 +132,6 @@ pub fn quantize(
     }
     let learning = Some(Learning { steps, choice, tried });
     Ok(QuantizedNetwork { graph: learned, outcomes, learning, cycles })
-}
-
-/// Returns the fewest bytes that meet a rate. A balance does not count, since only the recording can require it.
-pub(super) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
-    let dimensions = dimensions(graph);
-    let size = Size::new(graph, &dimensions, values(graph, rate, options));
-    activations::least_bytes(&size, options, &forced(graph, rate, options))
 }
 
 /// Quantizes without learning: every matrix by two-sided error feedback with the moments of its input and of its

@@ -3,7 +3,7 @@
 use actq_kernels::Width;
 use rayon::prelude::*;
 
-use super::activations::{allocated, packed};
+use super::activations::{allocated, least_bytes as least, packed};
 use super::allocate::{Rows, energies, expected};
 use super::dimension::{Dimension, Widths, dimensions};
 use super::size::Size;
@@ -60,26 +60,24 @@ pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64)
             Rows { energy, removal, rounding, forced: forced[m] }
         };
         let rows: Vec<Rows> = cut.graph.matrices.iter().enumerate().map(of_matrix).collect();
-        let cycles = match rate {
-            Rate::Within { cycles, .. } => Some(cycles),
-            Rate::Width(_) | Rate::BitsPerWeight(_) | Rate::Bytes(_) => None,
-        };
+        let cycles = rate.cycles();
         let dimensions = dimensions(&cut.graph);
         let size = Size { cycles, ..Size::new(&cut.graph, &dimensions, values(&cut.graph, rate, options)) };
         let (widths, limits) = allocated(size.clone(), &rows, options, allowed)?;
         let cycles = cycles.map(|_| Size { packings: packed(&limits, options), ..size }.cycles(&widths));
         Ok(Shape { cut, dimensions, rows, widths, limits, cycles })
     };
-    if !options.learns() || forced.iter().any(Option::is_some) || statistics.cells().0.is_empty() {
+    if !loses_units(options, &forced) || statistics.cells().0.is_empty() {
         return of_cut(Cut::nothing(graph));
     }
     let (cells, of_units) = statistics.cells();
     let shapes: Vec<Result<Shape>> =
         SHARES.par_iter().map(|share| of_cut(Cut::to(graph, cells, of_units, *share, &of_inputs))).collect();
-    // The first error says what no shape can keep.
+    // The last error names the fewest bytes: those of the fewest units.
+    let most = rate.cycles();
     let best = shapes.into_iter().reduce(|best, next| match (&best, &next) {
-        (Ok(a), Ok(b)) if b.error() < a.error() => next,
-        (Err(_), Ok(_)) => next,
+        (Ok(a), Ok(b)) if b.is_better(a, most) => next,
+        (Err(_), _) => next,
         _ => best,
     });
     best.unwrap_or_else(|| of_cut(Cut::nothing(graph)))
@@ -92,17 +90,42 @@ impl Shape {
         key(self) == key(other)
     }
 
+    /// Returns `true` if it takes fewer cycles above the limit than another shape, or as many and has a lower expected
+    /// error.
+    fn is_better(&self, other: &Self, most: Option<f64>) -> bool {
+        let above = |shape: &Self| shape.cycles.zip(most).map_or(0.0, |(cycles, most)| (cycles - most).max(0.0));
+        above(self).total_cmp(&above(other)).then(self.error().total_cmp(&other.error())).is_lt()
+    }
+
     /// Returns the expected error.
     fn error(&self) -> f64 {
         self.cut.error + expected(&self.rows, &self.widths)
     }
 }
 
-/// Returns the width that is forced on every matrix, if any.
+/// Returns `true` if recurrent cells may lose units: something is learned, and no width is forced.
+fn loses_units(options: &Options, forced: &[Option<Width>]) -> bool {
+    options.learns() && forced.iter().all(Option::is_none)
+}
+
+/// Returns the fewest bytes that meet a rate. A balance does not count, since only the recording can require it.
+pub(in crate::methods) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
+    let forced = forced(graph, rate, options);
+    let of = |graph: &Graph| {
+        let dimensions = dimensions(graph);
+        least(&Size::new(graph, &dimensions, values(graph, rate, options)), options, &forced)
+    };
+    match loses_units(options, &forced) {
+        true => SHARES.iter().map(|share| of(&Cut::outline(graph, *share).graph)).min().unwrap_or_default(),
+        false => of(graph),
+    }
+}
+
+/// Returns the width that is forced on every matrix, if any: its own, or that of all.
 pub(super) fn forced(graph: &Graph, rate: Rate, options: &Options) -> Vec<Option<Width>> {
     let named = |matrix: &WeightMatrix| options.forced.iter().find(|(name, _)| *name == matrix.name).map(|(_, w)| *w);
     let of_matrix = |matrix: &WeightMatrix| match rate {
-        Rate::Width(width) => Some(width),
+        Rate::Width(width) => named(matrix).or(Some(width)),
         Rate::BitsPerWeight(_) | Rate::Bytes(_) | Rate::Within { .. } => named(matrix),
     };
     graph.matrices.iter().map(of_matrix).collect()
@@ -113,5 +136,41 @@ pub(super) fn values(graph: &Graph, rate: Rate, options: &Options) -> usize {
     match rate {
         Rate::Bytes(_) | Rate::Within { bytes: Some(_), .. } => graph.changed_values(options.learns()),
         Rate::Width(_) | Rate::BitsPerWeight(_) | Rate::Within { bytes: None, .. } => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::Budget;
+    use crate::methods::{Method, PreparedMethod};
+    use crate::testing::{dataset, lstm};
+
+    #[test]
+    fn a_matrix_may_differ_from_the_width_of_all() {
+        let graph = lstm();
+        let recording = dataset(&graph, 4, 60);
+        let method = PreparedMethod::new(&graph, Method::Distill, Some(&recording), |_| {}).expect("statistics");
+        let forced = vec![("out".to_owned(), Width::W8)];
+        let options = Options { steps: Some(1), forced, ..Options::new(Method::Distill, Budget::Width(Width::W2)) };
+        let made = method.quantize(Rate::Width(Width::W2), &options, |_| {}).expect("a network");
+        let widths = made.outcomes.iter().map(|outcome| outcome.quantized.widths[0]);
+        assert_eq!(widths.collect::<Vec<_>>(), [Width::W2, Width::W2, Width::W8].map(Some));
+    }
+
+    #[test]
+    fn the_smallest_recurrent_image_has_the_fewest_units() {
+        let graph = lstm();
+        let recording = dataset(&graph, 4, 60);
+        let method = PreparedMethod::new(&graph, Method::Distill, Some(&recording), |_| {}).expect("statistics");
+        let options = |steps| Options { steps: Some(steps), ..Options::new(Method::Distill, Budget::Width(Width::W2)) };
+        let least = |steps| least_bytes(&graph, Rate::Bytes(0), &options(steps));
+        assert!(least(1) < least(0), "{} bytes, {} with all units", least(1), least(0));
+        for steps in [0, 1] {
+            let bytes = |bytes| method.quantize(Rate::Bytes(bytes), &options(steps), |_| {});
+            assert!(bytes(least(steps)).is_ok());
+            let error = bytes(least(steps) - 1).expect_err("one byte less");
+            assert_eq!(error.budget().map(|small| small.bytes), Some(least(steps)));
+        }
     }
 }

@@ -48,6 +48,11 @@ impl Cell {
     }
 }
 
+/// Returns the number of a cell's units in a share.
+fn kept_of(cell: &Cell, share: f64) -> usize {
+    ((cell.hidden as f64 * share).ceil() as usize).clamp(1, cell.hidden)
+}
+
 /// A graph whose cells have lost units.
 #[derive(Clone, Debug)]
 pub(super) struct Cut {
@@ -70,6 +75,17 @@ impl Cut {
         Self { graph: graph.clone(), rows: all(|m| m.rows), columns: all(|m| m.cols), former, error: 0.0 }
     }
 
+    /// Keeps the given share of every cell's units, whichever, and only to count bytes.
+    pub(super) fn outline(graph: &Graph, share: f64) -> Self {
+        let mut cut = Self::nothing(graph);
+        for cell in cells(graph) {
+            let units: Vec<usize> = (0..cell.hidden).collect();
+            let (kept, gone) = units.split_at(kept_of(&cell, share));
+            cut.keep(&cell, kept, gone, None);
+        }
+        cut
+    }
+
     /// Keeps the given share of every cell's units: those with the largest `removals`. The contribution of the others
     /// is estimated from these by the moments of every matrix's input.
     pub(super) fn to(graph: &Graph, cells: &[Cell], removals: &[Vec<f64>], share: f64, moments: &[&Moments]) -> Self {
@@ -77,13 +93,13 @@ impl Cut {
         for (cell, removals) in cells.iter().zip(removals) {
             let mut ranked: Vec<usize> = (0..cell.hidden).collect();
             ranked.sort_by(|&a, &b| removals[b].total_cmp(&removals[a]));
-            let gone = ranked.split_off(((cell.hidden as f64 * share).ceil() as usize).clamp(1, cell.hidden));
+            let gone = ranked.split_off(kept_of(cell, share));
             if gone.is_empty() {
                 continue;
             }
             ranked.sort_unstable();
             cut.error += gone.iter().map(|&unit| removals[unit]).sum::<f64>();
-            cut.keep(cell, &ranked, &gone, moments);
+            cut.keep(cell, &ranked, &gone, Some(moments));
         }
         cut
     }
@@ -101,7 +117,8 @@ impl Cut {
         whole
     }
 
-    fn keep(&mut self, cell: &Cell, kept: &[usize], gone: &[usize], moments: &[&Moments]) {
+    /// Removes the units `gone` of a cell; without moments their contribution is lost.
+    fn keep(&mut self, cell: &Cell, kept: &[usize], gone: &[usize], moments: Option<&[&Moments]>) {
         let graph = &mut self.graph;
         for &m in &cell.makers {
             self.rows[m] = unit_rows(graph.matrices[m].rows, cell.hidden, kept);
@@ -113,10 +130,10 @@ impl Cut {
             graph.nodes[node].len = kept.len();
         }
         for &m in &cell.consumers {
-            let contribution = absorb(&mut graph.matrices[m], gone, kept, moments[m]);
+            let contribution = moments.map(|moments| absorb(&mut graph.matrices[m], gone, kept, moments[m]));
             graph.matrices[m] = columns(&graph.matrices[m], kept);
             self.columns[m] = kept.to_vec();
-            add_to_bias(graph, m, &contribution);
+            contribution.iter().for_each(|contribution| add_to_bias(graph, m, contribution));
         }
     }
 }
