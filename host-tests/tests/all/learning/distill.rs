@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use actq::budget::Budget;
 use actq::data::Recordings;
 use actq::measure::eval::{self, ErrorReport};
-use actq::methods::{Method, Options};
+use actq::methods::{Effort, Method, Options};
 use actq::pipeline::Quantizer;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
@@ -105,14 +105,16 @@ fn another_seed_gives_another_image() -> Result<()> {
 }
 
 /// Errors below half of GPTQ's at about the same bits (GPTQ has one scale per row and one width, so it gets slightly
-/// more), after a share of the default steps.
-fn halves_gptq(dir: &Path, steps: usize, budgets: &[(f64, Width)]) -> Result<()> {
+/// more), with the effort quick: all of its steps, or fewer.
+fn halves_gptq(dir: &Path, steps: Option<usize>, budgets: &[(f64, Width)]) -> Result<()> {
     let policy = Policy::load(dir)?;
     let recordings = Recordings::load(&policy)?;
     let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     let gptq = Quantizer::new(&policy, &recordings, Method::Gptq, None, |_| {})?;
     for &(bits, width) in budgets {
-        let ours = report(dir, &image(&quantizer, &distill(bits, steps))?)?;
+        let options =
+            Options { steps, effort: Effort::Quick, ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
+        let ours = report(dir, &image(&quantizer, &options)?)?;
         let theirs = report(dir, &image(&gptq, &Options::new(Method::Gptq, Budget::Width(width)))?)?;
         assert!(ours.bpw < theirs.bpw);
         assert!(ours.nmse < 0.5 * theirs.nmse, "{}: {} against {}", policy.name, ours.nmse, theirs.nmse);
@@ -122,13 +124,13 @@ fn halves_gptq(dir: &Path, steps: usize, budgets: &[(f64, Width)]) -> Result<()>
 
 #[test]
 fn the_ur3_head_halves_gptqs_error() -> Result<()> {
-    halves_gptq(&ur3(), 1000, &[(3.0, Width::W3), (2.0, Width::W2)])
+    halves_gptq(&ur3(), None, &[(3.0, Width::W3), (2.0, Width::W2)])
 }
 
 #[test]
 fn a_recurrent_policy_halves_gptqs_error() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
-    halves_gptq(&policies.join("g1_lstm256"), 100, &[(2.0, Width::W2)])
+    halves_gptq(&policies.join("g1_lstm256"), Some(100), &[(2.0, Width::W2)])
 }
 
 /// The errors of a shared policy, at bits per weight and after learning steps, stay below limits.
