@@ -88,6 +88,12 @@ impl Task<'_> {
     pub fn is_rest_of(&self, windows: &Windows) -> bool {
         2 * self.graph.weights() < windows.graph.weights()
     }
+
+    /// Returns `true` if the network keeps less than a quarter of the weights: it is not the trained one any more, but a
+    /// small one.
+    pub fn is_small_beside(&self, windows: &Windows) -> bool {
+        4 * self.graph.weights() < windows.graph.weights()
+    }
 }
 
 /// Result of a distillation.

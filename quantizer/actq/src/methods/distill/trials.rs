@@ -5,8 +5,9 @@
 //! between many rows of few bits and few rows of many: a factor on that error gives several shapes for one budget.
 //! First come the rates, then the shapes at the best rate. After a tenth of the steps their order is nearly that of the
 //! end. All trials learn from all episodes, and their errors are those at the recorded observations: shapes of one
-//! budget overfit alike, and the differences on a quarter of the episodes are mostly chance
-//! (docs/records/2026-11-26-trials.md).
+//! budget overfit alike, and the differences on a quarter of the episodes are mostly chance. Higher rates are
+//! tried where less than a quarter of the weights is left: larger networks overfit more at them, which trials do not
+//! see, and gain little (docs/records/2026-11-26-trials.md).
 
 use super::candidate::Candidate;
 use super::choose::{Chosen, LEAST_STEPS, best, errors};
@@ -15,7 +16,7 @@ use super::shape::Goal;
 use super::train::{Present, Task, distill};
 use crate::methods::learning::{Choice, Recipe, Tried};
 
-/// Factors on the learning rates. Those of recurrent networks hardly depend on the size.
+/// Factors on the learning rates. Of recurrent networks, the first: their rates hardly depend on the size.
 const RATES: [f32; 3] = [1.0, 4.0, 8.0];
 /// Factors on the error of rounding.
 const ROUNDINGS: [f64; 4] = [1.0, 4.0, 16.0, 64.0];
@@ -36,7 +37,8 @@ pub(super) fn choose_recipe(
     if steps.is_some_and(|steps| steps < LEAST_STEPS) {
         return (first, Chosen::untried(Choice::Learning(recipe), Bounds { steps, time }));
     }
-    let rates = if windows.recurrent() { &RATES[..1] } else { &RATES[..] };
+    let small = first.task(goal, recipe).is_small_beside(windows);
+    let rates = if small && !windows.recurrent() { &RATES[..] } else { &RATES[..1] };
     let most = (STEPS + rates.len() + ROUNDINGS.len() - 1) as f64;
     let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
     let mut attempt = |candidate: &Candidate, recipe: Recipe, before: usize| {
