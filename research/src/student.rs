@@ -22,7 +22,7 @@ use start::restart;
 use widths::format_widths;
 
 /// Adam's rates to choose from; shapes are tried with the first.
-const RATES: [f32; 3] = [3e-3, 1e-3, 1e-2];
+const RATES: [f32; 4] = [3e-3, 1e-3, 1e-2, 3e-2];
 
 /// Makes a student within a budget. Its widths (in proportion to the teacher's, to their roots, or equal) and Adam's
 /// rate are those with the lowest error on held-out episodes of the calibration recording. `progress` receives
