@@ -44,7 +44,6 @@ use candidate::Candidate;
 use choose::{Chosen, choose};
 use compact::add_to_bias;
 use feedback::feedback;
-pub(super) use shape::least_bytes;
 use shape::{Goal, Shape, values};
 use size::Size;
 use train::{Learned, Present, Task, distill};
@@ -132,6 +131,11 @@ pub fn quantize(
     }
     let learning = Some(Learning { steps, choice, tried });
     Ok(QuantizedNetwork { graph: learned, outcomes, learning, cycles })
+}
+
+/// Returns the fewest bytes that meet a rate. A balance does not count, since only the recording can require it.
+pub(super) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
+    shape::least_bytes(graph, rate, options)
 }
 
 /// Quantizes without learning: every matrix by two-sided error feedback with the moments of its input and of its

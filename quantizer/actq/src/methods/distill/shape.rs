@@ -108,8 +108,8 @@ fn loses_units(options: &Options, forced: &[Option<Width>]) -> bool {
     options.learns() && forced.iter().all(Option::is_none)
 }
 
-/// Returns the fewest bytes that meet a rate. A balance does not count, since only the recording can require it.
-pub(in crate::methods) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
+/// Returns the fewest bytes that meet a rate, without a balance.
+pub(super) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
     let forced = forced(graph, rate, options);
     let of = |graph: &Graph| {
         let dimensions = dimensions(graph);
