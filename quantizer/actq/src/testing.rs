@@ -1,7 +1,7 @@
 //! Small networks and recordings of them, for the unit tests of this crate and, by path, of `actq-research`.
 
 use actq::data::Dataset;
-use actq::graph::ops::{Linear, Lstm, Pointwise};
+use actq::graph::ops::{Gru, Linear, Lstm, Pointwise};
 use actq::graph::{Evaluator, Graph, WeightMatrix};
 use actq::random::Random;
 use actq_kernels::math::Function;
@@ -49,6 +49,19 @@ pub(crate) fn lstm() -> Graph {
         vec![matrix("w_ih", 12, 2, &mut random), matrix("w_hh", 12, 3, &mut random), matrix("out", 2, 3, &mut random)];
     let bias = vector(12, &mut random);
     graph.add(Lstm { hidden: 3, input: 0, state: 1, bias }, &[0]).expect("it fits");
+    graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[1]).expect("it fits");
+    graph
+}
+
+/// Makes a network GRU 2 -> `hidden`, then -> 2.
+pub(crate) fn gru(hidden: usize) -> Graph {
+    let mut random = Random::new(5);
+    let mut graph = Graph::new(2);
+    for (name, rows, cols) in [("w_ih", 3 * hidden, 2), ("w_hh", 3 * hidden, hidden), ("out", 2, hidden)] {
+        graph.matrices.push(matrix(name, rows, cols, &mut random));
+    }
+    let (input_bias, state_bias) = (vector(3 * hidden, &mut random), vector(3 * hidden, &mut random));
+    graph.add(Gru { hidden, input: 0, state: 1, input_bias, state_bias }, &[0]).expect("it fits");
     graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[1]).expect("it fits");
     graph
 }

@@ -86,8 +86,7 @@ pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64)
 impl Shape {
     /// Returns `true` if another shape has the same units, widths and activations.
     pub(super) fn is(&self, other: &Self) -> bool {
-        let key = |shape: &'_ Self| (shape.cut.rows.clone(), shape.widths.clone(), shape.limits.clone());
-        key(self) == key(other)
+        self.cut.rows == other.cut.rows && self.widths == other.widths && self.limits == other.limits
     }
 
     /// Returns `true` if it takes fewer cycles above the limit than another shape, or as many and has a lower expected

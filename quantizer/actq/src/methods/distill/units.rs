@@ -143,23 +143,7 @@ mod tests {
     use super::*;
     use crate::calibrate::moments::collect;
     use crate::graph::Evaluator;
-    use crate::graph::ops::{Gru, Linear};
-    use crate::random::Random;
-    use crate::testing::{dataset, lstm};
-
-    /// Makes a network GRU 2 -> 4, then 4 -> 2.
-    fn gru() -> Graph {
-        let mut random = Random::new(5);
-        let mut graph = Graph::new(2);
-        let mut values = |len: usize| (0..len).map(|_| 0.7 * random.unit()).collect::<Vec<f32>>();
-        for (rows, cols) in [(12, 2), (12, 4), (2, 4)] {
-            graph.matrices.push(WeightMatrix { name: "m".into(), rows, cols, data: values(rows * cols) });
-        }
-        let (input_bias, state_bias) = (values(12), values(12));
-        graph.add(Gru { hidden: 4, input: 0, state: 1, input_bias, state_bias }, &[0]).expect("it fits");
-        graph.add(Linear { matrix: 2, bias: values(2) }, &[1]).expect("it fits");
-        graph
-    }
+    use crate::testing::{dataset, gru, lstm};
 
     /// Runs a graph over some observations.
     fn outputs(graph: &Graph) -> Vec<Vec<f32>> {
@@ -170,7 +154,7 @@ mod tests {
 
     #[test]
     fn units_that_nothing_reads_go_without_a_trace() {
-        for mut graph in [lstm(), gru()] {
+        for mut graph in [lstm(), gru(4)] {
             let cell = cells(&graph).remove(0);
             let gone = [1, cell.hidden - 1];
             for &m in &cell.consumers {
