@@ -7,7 +7,7 @@ use actq::budget::{Budget, TimeLimit};
 use actq::measure::time::CLOCK;
 use serde::{Deserialize, Serialize};
 
-/// What an image may take: a number of bits per weight, or, with `K` or `B`, of KiB or bytes of flash, or, with `ms`, of
+/// Budget of an image: a number of bits per weight, or, with `K` or `B`, of KiB or bytes of flash, or, with `ms`, of
 /// milliseconds of a step at [`CLOCK`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
@@ -36,10 +36,10 @@ impl Allowed {
         let text = text.trim();
         let bytes = |digits: &str, unit: usize| digits.parse().ok().and_then(|n: usize| n.checked_mul(unit));
         let time = |digits: &str| digits.parse().ok().filter(|ms| *ms > 0.0 && f64::is_finite(*ms));
-        let found = match (text.strip_suffix('K'), text.strip_suffix('B')) {
-            _ if text.ends_with("ms") => time(text.trim_end_matches("ms")).map(|ms| Self::Time { ms }),
-            (Some(digits), _) => bytes(digits, 1024).filter(|n| *n > 0).map(|flash| Self::Flash { flash }),
-            (_, Some(digits)) => bytes(digits, 1).filter(|n| *n > 0).map(|flash| Self::Flash { flash }),
+        let found = match (text.strip_suffix('K'), text.strip_suffix('B'), text.strip_suffix("ms")) {
+            (Some(digits), ..) => bytes(digits, 1024).filter(|n| *n > 0).map(|flash| Self::Flash { flash }),
+            (_, Some(digits), _) => bytes(digits, 1).filter(|n| *n > 0).map(|flash| Self::Flash { flash }),
+            (.., Some(digits)) => time(digits).map(|ms| Self::Time { ms }),
             _ => text.parse().ok().filter(|bits| (0.1..=16.0).contains(bits)).map(Self::Bits),
         };
         found.ok_or_else(|| {
@@ -109,7 +109,7 @@ mod tests {
             assert_eq!(serde_json::from_str::<Allowed>(&json).expect("a budget"), allowed);
         }
         assert_eq!(serde_json::from_str::<Allowed>("2.5").expect("of former journals"), Allowed::Bits(2.5));
-        for text in ["", "0", "17", "0K", "K", "1.5K", "ms", "0ms", "-1ms", "infms"] {
+        for text in ["", "0", "17", "0K", "K", "1.5K", "ms", "0ms", "-1ms", "infms", "1msms"] {
             assert!(Allowed::parse(text).is_err(), "{text}");
         }
     }

@@ -9,6 +9,7 @@ use actq_cli::outputs::files;
 use actq_cli::report::plot::{Plot, Series, Vertical, stacked};
 use actq_cli::report::time::conditions;
 use anyhow::Result;
+use serde::Deserialize as _;
 use serde_json::Value;
 
 use super::allowed::Allowed;
@@ -144,8 +145,9 @@ fn head(header: &Header) -> Result<String> {
 /// Returns the command of these results.
 fn command(options: &Value) -> String {
     let list = |value: &Value| -> String {
-        let plain = |value: &Value| match value["flash"].as_u64() {
-            Some(bytes) => format!("{bytes}B"),
+        let budget = |value: &Value| Allowed::deserialize(value).ok().filter(|_| value.is_object());
+        let plain = |value: &Value| match budget(value) {
+            Some(allowed) => allowed.to_string(),
             None => value.as_str().map_or_else(|| value.to_string(), str::to_owned),
         };
         value.as_array().map_or_else(|| plain(value), |items| items.iter().map(plain).collect::<Vec<_>>().join(","))

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::graph::{Graph, WeightMatrix};
 use crate::methods::options::Options;
 
-/// What is asked of a network.
+/// A network to quantize, by its statistics, and its budget.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Goal<'a> {
     pub(super) statistics: &'a RowStatistics,
@@ -43,8 +43,8 @@ pub(super) struct Shape {
 const SHARES: [f64; 7] = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375, 0.25];
 
 /// Chooses the units of recurrent cells, and the widths of all rows. Units are removed together where something is
-/// learned and no width is forced: of several shares of them, the one with the lowest expected error stays. `rounding` is a factor on the error that
-/// rounding is expected to cause.
+/// learned and no width is forced: of several shares of them, the one with the lowest expected error stays. `rounding`
+/// is a factor on the error that rounding is expected to cause.
 pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64) -> Result<Shape> {
     let RowStatistics { inputs, outputs, moments, .. } = statistics;
     let graph = statistics.graph();
