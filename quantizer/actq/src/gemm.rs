@@ -43,14 +43,9 @@ impl<T: Element> Panels<T> {
     /// Packs `b`.
     pub(crate) fn of(b: ArrayView2<'_, T>) -> Self {
         let (depth, cols) = b.dim();
-        let mut values = vec![[T::default(); COLS]; depth * cols.div_ceil(COLS)];
-        for (panel, values) in values.chunks_exact_mut(depth.max(1)).enumerate() {
-            let (from, to) = (panel * COLS, cols.min((panel + 1) * COLS));
-            for (row, values) in b.rows().into_iter().zip(values) {
-                copy(row.as_slice().unwrap_or_default(), from, to, values);
-            }
-        }
-        Self { depth, cols, values }
+        let mut panels = Self { depth, cols, values: vec![[T::default(); COLS]; depth * cols.div_ceil(COLS)] };
+        b.axis_chunks_iter(Axis(0), COLS).zip(panels.row_strips()).for_each(|(rows, mut strip)| strip.refill(rows));
+        panels
     }
 
     /// Packs the transpose of `w`, on this thread alone: commands read policies before they start their threads.
@@ -66,6 +61,16 @@ impl<T: Element> Panels<T> {
     pub(crate) fn strips(&mut self) -> impl Iterator<Item = Strip<'_, T>> {
         self.values.chunks_exact_mut(self.depth.max(1)).map(|values| Strip { values })
     }
+
+    /// Returns the parts that 16 rows of a matrix at a time make.
+    pub(crate) fn row_strips(&mut self) -> impl Iterator<Item = RowStrip<'_, T>> {
+        let mut strips: Vec<RowStrip<'_, T>> = Vec::new();
+        strips.resize_with(self.depth.div_ceil(COLS), || RowStrip { of_panels: Vec::new() });
+        for panel in self.values.chunks_exact_mut(self.depth.max(1)) {
+            strips.iter_mut().zip(panel.chunks_mut(COLS)).for_each(|(strip, values)| strip.of_panels.push(values));
+        }
+        strips.into_iter()
+    }
 }
 
 /// A panel of a transposed matrix.
@@ -79,6 +84,26 @@ impl<T: Element> Strip<'_, T> {
     /// Packs the transpose of other rows.
     pub(crate) fn refill(&mut self, rows: ArrayView2<'_, T>) {
         transpose(rows, self.values);
+    }
+}
+
+/// Rows of every panel of a matrix.
+#[derive(Debug)]
+pub(crate) struct RowStrip<'a, T = f32> {
+    /// `[panel][k][column]`
+    of_panels: Vec<&'a mut [[T; COLS]]>,
+}
+
+impl<T: Element> RowStrip<'_, T> {
+    /// Packs other rows.
+    pub(crate) fn refill(&mut self, rows: ArrayView2<'_, T>) {
+        let cols = rows.ncols();
+        for (panel, values) in self.of_panels.iter_mut().enumerate() {
+            let (from, to) = (panel * COLS, cols.min((panel + 1) * COLS));
+            for (row, values) in rows.rows().into_iter().zip(values.iter_mut()) {
+                copy(row.as_slice().unwrap_or_default(), from, to, values);
+            }
+        }
     }
 }
 

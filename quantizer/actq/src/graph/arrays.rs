@@ -58,6 +58,29 @@ pub fn sum_rows(dy: &Array2<f32>, sum: &mut [f32]) {
     }
 }
 
+/// Partial sums, which stay in vector registers. Their number fixes the order of additions on every processor.
+const LANES: usize = 16;
+
+/// Returns the sum of a function of each value.
+#[inline(always)]
+pub fn sum(values: &[f32], of: impl Fn(f32) -> f32) -> f32 {
+    let mut sums = [0.0; LANES];
+    for values in values.chunks(LANES) {
+        sums.iter_mut().zip(values).for_each(|(sum, v)| *sum += of(*v));
+    }
+    sums.iter().sum()
+}
+
+/// Returns the sum of the products of two rows' values.
+#[inline(always)]
+pub fn sum_of_products(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0; LANES];
+    for (a, b) in a.chunks(LANES).zip(b.chunks(LANES)) {
+        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
+    }
+    sums.iter().sum()
+}
+
 /// Returns a row as a slice. All values have the standard layout.
 pub fn contiguous<'a>(row: &'a ArrayView1<'_, f32>) -> &'a [f32] {
     row.as_slice().expect("rows are contiguous")

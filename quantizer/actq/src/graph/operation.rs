@@ -254,8 +254,8 @@ impl<'a> Backward<'a> {
         self.products.push(Factors { matrix, x, dy });
     }
 
-    /// Prepares a matrix for products with derivatives by its output, which give those by its operand.
-    pub(super) fn back(&self, matrix: usize) -> Panels {
+    /// Returns a matrix for products with derivatives by its output, which give those by its operand.
+    pub(super) fn back(&self, matrix: usize) -> &'a Panels {
         self.matrices[matrix].back()
     }
 

@@ -2,12 +2,13 @@ use actq_kernels::image::OpKind;
 use ndarray::Array2;
 
 use crate::error::Result;
-use crate::graph::arrays::sum_rows;
+use crate::graph::arrays::{contiguous, contiguous_mut, sum, sum_of_products, sum_rows};
 use crate::graph::lowering::{BufferId, Lowering, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved, expect_len, only};
 use crate::graph::syntax::{Keys, Syntax, required};
 use crate::graph::values::{ValueId, WeightMatrix};
 use crate::numbers::positive;
+use crate::simd::wide;
 
 /// torch's LayerNorm: `(x - mean(x)) / sqrt(var(x) + eps) * weight + bias`
 #[derive(Clone, Debug)]
@@ -99,24 +100,38 @@ impl Operation for RmsNorm {
     }
 }
 
-/// Computes either norm without weights; keeps the normalized values and the reciprocal deviation of each sample.
+/// Computes either norm; keeps the normalized values and the reciprocal deviation of each sample.
 fn normalized(run: &Forward<'_>, eps: f32, centred: bool) -> (Array2<f32>, Saved) {
-    let x = run.input(0);
-    let (weight, bias) = (&run.vectors[0], run.vectors.get(1));
-    let (mut hat, mut y) = (x.clone(), x.clone());
-    let mut inverses = Array2::zeros((x.nrows(), 1));
-    let rows = hat.rows_mut().into_iter().zip(y.rows_mut()).zip(&mut inverses);
-    for ((mut hat, mut y), inverse) in rows {
-        let n = hat.len() as f32;
-        let mean = if centred { hat.sum() / n } else { 0.0 };
-        let square = hat.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / n;
-        *inverse = 1.0 / (square + eps).sqrt();
-        for (k, (hat, y)) in hat.iter_mut().zip(y.iter_mut()).enumerate() {
-            *hat = (*hat - mean) * *inverse;
-            *y = *hat * weight[k] + bias.map_or(0.0, |bias| bias[k]);
-        }
+    let mut hat = run.input(0).clone();
+    let mut y = Array2::zeros(hat.raw_dim());
+    let mut inverses = Array2::zeros((hat.nrows(), 1));
+    let (weight, bias) = (&run.vectors[0][..], run.vectors.get(1).map_or(&[][..], Vec::as_slice));
+    for ((mut hat, mut y), inverse) in hat.rows_mut().into_iter().zip(y.rows_mut()).zip(&mut inverses) {
+        let (hat, y) = (contiguous_mut(&mut hat), contiguous_mut(&mut y));
+        *inverse = wide(
+            #[inline(always)]
+            || {
+                let inverse = normalize(hat, eps, centred);
+                y.iter_mut().zip(&*hat).zip(weight).for_each(|((y, hat), weight)| *y = hat * weight);
+                y.iter_mut().zip(bias).for_each(|(y, bias)| *y += bias);
+                inverse
+            },
+        );
     }
     (y, Saved { inner: vec![hat, inverses], ..Saved::default() })
+}
+
+/// Normalizes a sample; returns the reciprocal of its deviation.
+#[inline(always)]
+fn normalize(x: &mut [f32], eps: f32, centred: bool) -> f32 {
+    let n = x.len() as f32;
+    if centred {
+        let mean = sum(x, |v| v) / n;
+        x.iter_mut().for_each(|v| *v -= mean);
+    }
+    let inverse = 1.0 / (sum(x, |v| v * v) / n + eps).sqrt();
+    x.iter_mut().for_each(|v| *v *= inverse);
+    inverse
 }
 
 /// Goes back through either norm, except for the derivative by the bias.
@@ -124,16 +139,18 @@ fn back(run: &mut Backward<'_>, saved: &Saved, mut dy: Array2<f32>, centred: boo
     let weight = &run.vectors[0];
     let d_weight = &mut run.d_vectors[0];
     for ((mut d, hat), inverse) in dy.rows_mut().into_iter().zip(saved.inner[0].rows()).zip(&saved.inner[1]) {
-        let n = hat.len() as f32;
-        let (mut mean, mut along) = (0.0, 0.0);
-        for (k, (d, hat)) in d.iter_mut().zip(hat).enumerate() {
-            d_weight[k] += *d * hat;
-            *d *= weight[k];
-            mean += *d / n;
-            along += *d * hat / n;
-        }
-        let mean = if centred { mean } else { 0.0 };
-        d.iter_mut().zip(hat).for_each(|(d, hat)| *d = (*d - mean - hat * along) * inverse);
+        let (d, hat) = (contiguous_mut(&mut d), contiguous(&hat));
+        wide(
+            #[inline(always)]
+            || {
+                d_weight.iter_mut().zip(&*d).zip(hat).for_each(|((sum, d), hat)| *sum += d * hat);
+                d.iter_mut().zip(weight).for_each(|(d, weight)| *d *= weight);
+                let n = d.len() as f32;
+                let mean = if centred { sum(d, |d| d) / n } else { 0.0 };
+                let along = sum_of_products(d, hat) / n;
+                d.iter_mut().zip(hat).for_each(|(d, hat)| *d = (*d - mean - hat * along) * inverse);
+            },
+        );
     }
     run.give(0, dy);
 }

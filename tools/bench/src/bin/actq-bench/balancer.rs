@@ -1,11 +1,12 @@
 //! The balancing robot of `cargo demo`: a deploy bundle in closed loop, from raw sensor values to torques.
 
 use std::fs;
+use std::path::PathBuf;
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
-use actq::methods::{Method, Options};
-use actq::pipeline::quantize;
+use actq::methods::{Effort, Method, Options};
+use actq::pipeline;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_balancer::{EPISODE_STEPS, Outcome, RAW_LEN, bundle, run_episode};
 use actq_bench::qemu::Counter;
@@ -22,34 +23,39 @@ use crate::trials::{Column, Firmware, closed_loop, folder, mean, share, summary}
 const ROWS: [&str; 3] = ["closed-loop success", "speed error", "instructions per step"];
 /// Budgets in bits per weight.
 const BITS: [f64; 2] = [3.0, 2.0];
-/// Steps of distillation, and episodes of the f32 policy to learn from, from seed 0.
-const STEPS: usize = 2000;
+/// Episodes of the f32 policy to learn from, from seed 0.
 const RECORDED_EPISODES: usize = 40;
 
-/// Reads the bundle, quantizes it, and drives the robot with the images on the host and in QEMU; returns a report.
-pub(crate) fn run(counter: &Counter, episodes: u64, qemu_episodes: u64) -> Result<String> {
+/// Reads the bundle and writes its images; returns the raw values of the episodes that they learned from.
+pub(crate) fn quantize() -> Result<Dataset> {
+    fs::create_dir_all(folder())?;
     let policy = Deployment::load(bundle())?.policy;
-    let f32_bytes = 4 * policy.parameters;
-    println!("\nReading the balancer's bundle ({} parameters, {f32_bytes} bytes in f32)", policy.parameters);
-    let mut f32_policy = F32::open()?;
+    let bytes = 4 * policy.parameters;
+    println!("\nReading the balancer's bundle ({} parameters, {bytes} bytes in f32)", policy.parameters);
+    println!("Recording {RECORDED_EPISODES} episodes of the f32 policy to learn from");
+    let raw = F32::open()?.record()?;
+    let recordings = Recordings { calib: Some(observed(bundle(), &raw)?), heldout: None };
+    for bits in BITS {
+        println!("Quantizing to {} with distill", name(bits));
+        let options = Options { effort: Effort::Quick, ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
+        let image = pipeline::quantize(&policy, &recordings, &options, ())?.whole_image()?;
+        files::write(&path(bits), &image)?;
+    }
+    Ok(raw)
+}
 
-    println!("Closed loop in f32, {episodes} episodes");
+/// Drives the robot with the bundle in f32 and with the images of [`quantize`], on the host and in QEMU; returns a report.
+pub(crate) fn drive(counter: &Counter, raw: &Dataset, episodes: u64, qemu_episodes: u64) -> Result<String> {
+    let f32_bytes = 4 * Deployment::load(bundle())?.policy.parameters;
+    println!("\nBalancer: closed loop in f32, {episodes} episodes");
+    let mut f32_policy = F32::open()?;
     let outcomes = closed_loop(episodes, |seed| f32_policy.episode(seed, |_| ()))?;
     let mut columns = vec![Column::of_f32(f32_bytes, &[success(&outcomes), error(&outcomes)])];
-    println!("Recording {RECORDED_EPISODES} episodes of the f32 policy to learn from");
-    let raw = f32_policy.record()?;
-    let recordings = Recordings { calib: Some(observed(bundle(), &raw)?), heldout: None };
 
     let mut report = Vec::new();
-    fs::create_dir_all(folder())?;
     for bits in BITS {
-        let name = format!("{bits:.1} bits");
-        println!("Quantizing to {name} with distill");
-        let options = Options { steps: Some(STEPS), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
-        let bytes = quantize(&policy, &recordings, &options, ())?.whole_image()?;
-        let path = folder().join(format!("balancer-{bits:.1}-bits.actq"));
-        files::write(&path, &bytes)?;
-        let buffer = ImageBuffer::new(&bytes);
+        let (name, path) = (name(bits), path(bits));
+        let buffer = ImageBuffer::read(&path)?;
         let image = buffer.image(&path)?;
         println!("Closed loop at {name}, {episodes} episodes on the host");
         let outcomes = with_head(image, |head| {
@@ -68,6 +74,15 @@ pub(crate) fn run(counter: &Counter, episodes: u64, qemu_episodes: u64) -> Resul
         report.push(firmware.report(&name, &success(&firmware.outcomes), &elf, image)?);
     }
     Ok(format!("{}\n\n{}\n", summary("Balancer", &ROWS, &columns), report.join("\n")))
+}
+
+/// Returns the name of an image, and its file.
+fn name(bits: f64) -> String {
+    format!("{bits:.1} bits")
+}
+
+fn path(bits: f64) -> PathBuf {
+    folder().join(format!("balancer-{bits:.1}-bits.actq"))
 }
 
 /// The policy as its bundle describes it, in f32.

@@ -8,7 +8,7 @@ use std::thread;
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
 use actq::measure::eval;
-use actq::methods::{Method, Options};
+use actq::methods::{Effort, Method, Options};
 use actq::pipeline::Quantizer;
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
@@ -25,12 +25,10 @@ use ndarray::Array3;
 use crate::trials::{Column, Firmware, closed_loop, folder, mean, share, summary};
 use crate::{balancer, faults, heads, kernels};
 
-/// Limit of distillation steps: an eighth of the default of `actq quantize`, for a result within half a minute.
-const STEPS: usize = 1000;
-
-/// The same for the flow, whose step evaluates the network five times; and the divisor of the episodes that it drives.
+/// Distillation steps of the flow, whose step evaluates the network five times.
 const FLOW_STEPS: usize = 100;
-const FLOW_EPISODES_DIVISOR: u64 = 4;
+/// Divisor of the flow's episodes, and of the balancer's in QEMU, which have five times as many steps as the arm's.
+const EPISODES_DIVISOR: u64 = 4;
 
 /// Episodes of the f32 policy to learn from, from seed 0: the 12 of `calib.npz` cover only a narrow part of the
 /// observations that the policy meets.
@@ -77,19 +75,22 @@ const ROWS: [&str; 5] =
 pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     let eight = Options::new(Method::Gptq, Budget::Width(Width::W8));
     let distill =
-        |bits, steps| Options { steps: Some(steps), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
+        |bits| Options { effort: Effort::Quick, ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
+    let of_flow = |bits| Options { steps: Some(FLOW_STEPS), ..distill(bits) };
     let counter = Counter::build()?;
-    // The firmware compiles while policies learn: with the images that follow, little is left to build.
+    // Learning gains little from a second thread of one core, so the firmware compiles beside it. With the images that
+    // follow, little is left to build.
     thread::spawn(|| {
         // An error comes again where the firmware is needed.
         let _ = firmware::harness(Target::Fpu);
         let _ = firmware::controller(Target::Fpu, "");
         let _ = firmware::binary("bench", Target::Fpu);
     });
+    let some = |episodes: u64| (episodes / EPISODES_DIVISOR).max(1);
     let reach = Trial {
         name: "UR3 reach",
         dir: ur3(),
-        images: vec![("8 bits", eight), (CONTROLLER_IMAGE, distill(3.0, STEPS)), ("2.0 bits", distill(2.0, STEPS))],
+        images: vec![("8 bits", eight), (CONTROLLER_IMAGE, distill(3.0)), ("2.0 bits", distill(2.0))],
         recorded: true,
         episodes,
         qemu_episodes,
@@ -97,12 +98,19 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     let flow = Trial {
         name: "UR3 flow",
         dir: ur3_flow(),
-        images: vec![("3.0 bits", distill(3.0, FLOW_STEPS)), ("2.0 bits", distill(2.0, FLOW_STEPS))],
+        images: vec![("3.0 bits", of_flow(3.0)), ("2.0 bits", of_flow(2.0))],
         recorded: false,
-        episodes: (episodes / FLOW_EPISODES_DIVISOR).max(1),
-        qemu_episodes: (qemu_episodes / FLOW_EPISODES_DIVISOR).max(1),
+        episodes: some(episodes),
+        qemu_episodes: some(qemu_episodes),
     };
-    let reports = [reach.run(&counter)?, flow.run(&counter)?, balancer::run(&counter, episodes, qemu_episodes)?];
+    reach.quantize()?;
+    flow.quantize()?;
+    let recording = balancer::quantize()?;
+    let reports = [
+        reach.drive(&counter)?,
+        flow.drive(&counter)?,
+        balancer::drive(&counter, &recording, episodes, some(qemu_episodes))?,
+    ];
     println!("\n{}", reports.join("\n"));
     faults::some(&reach.path(CONTROLLER_IMAGE))?;
     println!();
@@ -120,27 +128,19 @@ impl Trial<'_> {
         folder().join(format!("{} {image}.actq", self.name).to_lowercase().replace(' ', "-"))
     }
 
-    /// Fills the table and runs the firmware.
-    fn run(&self, counter: &Counter) -> Result<String> {
-        let &Self { name: policy_name, recorded, episodes, qemu_episodes, .. } = self;
-        let policy_dir = &self.dir;
+    /// Writes the images.
+    fn quantize(&self) -> Result<()> {
         fs::create_dir_all(folder())?;
-        let policy = Policy::load(policy_dir)?;
-        let f32_bytes = 4 * policy.parameters;
-        println!("\nQuantizing {} ({} parameters, {f32_bytes} bytes in f32)", policy.name, policy.parameters);
-
-        println!("Closed loop in f32, {episodes} episodes");
-        let mut reference = PolicyF32::load(policy_dir)?;
-        let outcomes = closed_loop(episodes, |seed| {
-            reference.reset();
-            Ok(run_episode(seed, |obs| reference.act(obs)))
-        })?;
-        let mut columns = vec![Column::of_f32(f32_bytes, &["-".to_owned(), success(&outcomes), tracking(&outcomes)])];
-
-        let mut report = Vec::new();
-        let recordings = if recorded {
+        let policy = Policy::load(&self.dir)?;
+        println!(
+            "\nQuantizing {} ({} parameters, {} bytes in f32)",
+            policy.name,
+            policy.parameters,
+            f32_bytes(&policy)
+        );
+        let recordings = if self.recorded {
             println!("Recording {RECORDED_EPISODES} episodes of the f32 policy to learn from");
-            Recordings { calib: Some(record(&mut reference)?), heldout: None }
+            Recordings { calib: Some(record(&mut PolicyF32::load(&self.dir)?)?), heldout: None }
         } else {
             Recordings::load(&policy)?
         };
@@ -151,9 +151,28 @@ impl Trial<'_> {
             let reused = prepared.take().filter(|quantizer| quantizer.method().method() == &options.method);
             let new = || Quantizer::new(&policy, &recordings, options.method.clone(), None, |_| {});
             let quantizer = prepared.insert(reused.map_or_else(new, Ok)?);
+            heads::write_image(quantizer, options, &self.path(name))?;
+        }
+        Ok(())
+    }
+
+    /// Drives the robot with the policy in f32 and with the images, on the host and in QEMU; returns a report.
+    fn drive(&self, counter: &Counter) -> Result<String> {
+        let &Self { name: policy_name, episodes, qemu_episodes, .. } = self;
+        let policy = Policy::load(&self.dir)?;
+        let f32_bytes = f32_bytes(&policy);
+        println!("\n{policy_name}: closed loop in f32, {episodes} episodes");
+        let mut reference = PolicyF32::load(&self.dir)?;
+        let outcomes = closed_loop(episodes, |seed| {
+            reference.reset();
+            Ok(run_episode(seed, |obs| reference.act(obs)))
+        })?;
+        let mut columns = vec![Column::of_f32(f32_bytes, &["-".to_owned(), success(&outcomes), tracking(&outcomes)])];
+
+        let mut report = Vec::new();
+        for (name, _) in &self.images {
             let path = self.path(name);
-            let bytes = heads::write_image(quantizer, options, &path)?;
-            let buffer = ImageBuffer::new(&bytes);
+            let buffer = ImageBuffer::read(&path)?;
             let image = buffer.image(&path)?;
             println!("Closed loop at {name}, {episodes} episodes on the host");
             let outcomes = with_head(image, |head| closed_loop(episodes, |seed| episode_on_host(head, seed)))?;
@@ -162,7 +181,7 @@ impl Trial<'_> {
             let firmware = Firmware::run(&elf, image, qemu_episodes, |seed, step| {
                 episode(seed, |obs| step(obs)?.as_slice().try_into().context("an action must have six values"))
             })?;
-            let heldout = eval::heldout(policy_dir, &image)?;
+            let heldout = eval::heldout(&self.dir, &image)?;
             let instructions =
                 evaluation::count(counter, Target::Fpu, &elf, None, &image, heldout.episode(0))?.instructions;
             let nmse = eval::evaluate(image, &heldout)?.nmse;
@@ -183,6 +202,10 @@ impl Trial<'_> {
 
         Ok(format!("{}\n\n{}\n", summary(policy_name, &ROWS, &columns), report.join("\n")))
     }
+}
+
+fn f32_bytes(policy: &Policy) -> usize {
+    4 * policy.parameters
 }
 
 fn success(outcomes: &[Outcome]) -> String {
