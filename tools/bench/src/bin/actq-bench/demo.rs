@@ -32,7 +32,7 @@ const EPISODES_DIVISOR: u64 = 4;
 
 /// Episodes of the f32 policy to learn from, from seed 0: the 12 of `calib.npz` cover only a narrow part of the
 /// observations that the policy meets.
-const RECORDED_EPISODES: usize = 200;
+const RECORDED_EPISODES: usize = 100;
 
 /// Records the observations of the f32 policy's episodes.
 fn record(policy: &mut PolicyF32) -> Result<Dataset> {
