@@ -10,7 +10,7 @@ fn main() -> io::Result<()> {
     // The image that the examples include.
     let image = format!("{:?}", root.join("kernels/tests/valid.actq"));
     let mut examples = String::new();
-    for document in ["README.md", "firmware-demo/README.md"] {
+    for document in ["README.md", "kernels/README.md", "firmware-demo/README.md"] {
         let path = root.join(document);
         println!("cargo::rerun-if-changed={}", path.display());
         let text = fs::read_to_string(path)?;

@@ -2,10 +2,13 @@
 
 use std::fs;
 use std::path::PathBuf;
+use std::process::Command;
 
 use actq_bench::command::{actq, run, succeeded};
 use actq_bench::root;
-use anyhow::{Context, Result, ensure};
+use actq_deploy::Answers;
+use anyhow::{Context, Result, bail, ensure};
+use tempfile::TempDir;
 
 const GENERATED: &str = "<!-- Below, the help of every command. Do not edit; write it anew by\n     \
                          ACTQ_BLESS=1 cargo test --release -p actq-host-tests docs:: -->\n";
@@ -124,5 +127,44 @@ fn every_shown_command_is_known() -> Result<()> {
         }
     }
     ensure!(count > 50, "only {count} commands were found");
+    Ok(())
+}
+
+/// The listings of a document in a language.
+fn listings<'a>(text: &'a str, language: &str) -> Vec<&'a str> {
+    let begins = text.split(&format!("\n```{language}\n")).skip(1).collect::<Vec<_>>();
+    begins.into_iter().filter_map(|rest| rest.split("\n```").next()).collect()
+}
+
+#[test]
+fn shown_answers_are_read() -> Result<()> {
+    let text = read("docs/DEPLOY.md")?;
+    let answers = listings(&text, "toml");
+    ensure!(answers.len() == 2, "docs/DEPLOY.md has {} listings of answers", answers.len());
+    answers.into_iter().try_for_each(|answers| Ok(drop(Answers::parse(answers)?)))
+}
+
+#[test]
+fn shown_c_compiles() -> Result<()> {
+    let text = read("docs/C.md")?;
+    let &[listing] = &listings(&text, "c")[..] else { bail!("docs/C.md has one listing in C") };
+    let dir = TempDir::new()?;
+    let path = |name: &str| dir.path().join(name);
+    fs::copy(root().join("kernels/tests/valid.actq"), path("policy.actq"))?;
+    let [image, policy] = ["policy.actq", "policy"].map(|name| path(name).display().to_string());
+    succeeded(&run(actq(&["export-c", &image, "--out", &policy]), b"")?)?;
+    let program = format!(
+        "#include \"actq.h\"\n#include \"policy.h\"\n\
+         void act(const float *observation, float *action);\n\
+         void act(const float *observation, float *action) {{\n{listing}\n}}\n"
+    );
+    fs::write(path("listing.c"), program)?;
+    let mut compiler = Command::new("cc");
+    compiler.args(["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-fsyntax-only"]);
+    compiler.arg("-I").arg(root().join("capi/include")).arg("-I").arg(&policy).arg(path("listing.c"));
+    match compiler.output() {
+        Err(_) => println!("not run: cc is not installed"),
+        Ok(output) => ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr)),
+    }
     Ok(())
 }
