@@ -13,6 +13,8 @@ mod tests {
     use super::REVISION;
     use crate::budget::Budget;
     use crate::data::Recordings;
+    use crate::graph::Graph;
+    use crate::graph::ops::{LayerNorm, Linear};
     use crate::measure::size::hex;
     use crate::methods::{Method, Options};
     use crate::pipeline::quantize;
@@ -20,12 +22,22 @@ mod tests {
     use crate::testing;
 
     /// The SHA-256 of all images below, at this revision.
-    const DIGEST: (u32, &str) = (4, "07bd1df5ec4a250eb21b3c998642be72302f67c4c518ccaf69c34153ab636e20");
+    const DIGEST: (u32, &str) = (4, "a6c86fbb8d0beef11da29a48e0de20c94f8e7b4649f74f6da39d3f5adf6d9780");
+
+    /// Makes a network 3 -> 8, layer norm, -> 2.
+    fn normed() -> Graph {
+        let mut graph = Graph::new(3);
+        graph.matrices = testing::layers(&[3, 8, 2]).matrices;
+        graph.add(Linear { matrix: 0, bias: vec![0.1; 8] }, &[0]).expect("it fits");
+        graph.add(LayerNorm { weight: vec![1.2; 8], bias: vec![0.1; 8], eps: 1e-5 }, &[1]).expect("it fits");
+        graph.add(Linear { matrix: 1, bias: vec![0.1; 2] }, &[2]).expect("it fits");
+        graph
+    }
 
     #[test]
     fn a_change_of_images_raises_the_revision() {
         let mut all = Sha256::new();
-        for (name, graph) in [("mlp", testing::mlp()), ("lstm", testing::lstm())] {
+        for (name, graph) in [("mlp", testing::mlp()), ("normed", normed()), ("lstm", testing::lstm())] {
             let [calib, heldout] = [16, 4].map(|episodes| Some(testing::dataset(&graph, episodes, 20)));
             let (policy, recordings) = (Policy::of(name, graph), Recordings { calib, heldout });
             for method in [Method::Rtn, Method::Gptq, Method::Distill] {
