@@ -131,9 +131,9 @@ fn every_shown_command_is_known() -> Result<()> {
 }
 
 /// The listings of a document in a language.
-fn listings<'a>(text: &'a str, language: &str) -> Vec<&'a str> {
-    let begins = text.split(&format!("\n```{language}\n")).skip(1).collect::<Vec<_>>();
-    begins.into_iter().filter_map(|rest| rest.split("\n```").next()).collect()
+pub(crate) fn listings<'a>(document: &'a str, language: &str) -> Vec<&'a str> {
+    let parts = document.split(&format!("```{language}\n")).skip(1).collect::<Vec<_>>();
+    parts.into_iter().filter_map(|rest| rest.split("```").next()).collect()
 }
 
 #[test]

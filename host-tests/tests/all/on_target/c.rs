@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use crate::docs::listings;
 use actq::graph::ops::{Linear, Normalize, Pointwise};
 use actq::measure::eval;
 use actq::methods::Activations;
@@ -31,11 +32,6 @@ const CODE_LIMIT: u64 = 37 << 10;
 
 fn is_installed(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
-}
-
-/// The shell commands of a document: its listings marked `sh`.
-fn listings(document: &str) -> Vec<&str> {
-    document.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next()).collect()
 }
 
 /// The images that the library in the package runs.
@@ -92,7 +88,7 @@ fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
     let Some(dir) = folder(Runs::AnyImage)? else { return Ok(()) };
     let at = |name: &str| dir.path().join(name);
     let document = fs::read_to_string(root().join("docs/C.md"))?;
-    let listings = listings(&document);
+    let listings = listings(&document, "sh");
     ensure!(listings.len() == 4, "four listings in docs/C.md");
     let printed = shell(&dir, &listings.concat())?;
     let lines: Vec<&str> = printed.lines().collect();
@@ -134,7 +130,7 @@ const CODE_LIMIT_OF_ONE: u64 = 17 << 10;
 fn a_library_for_one_image_is_smaller_and_gives_the_same_bits() -> Result<()> {
     let Some(dir) = folder(Runs::ThisImage)? else { return Ok(()) };
     let document = fs::read_to_string(root().join("docs/C.md"))?;
-    let printed = shell(&dir, &listings(&document)[..2].concat())?;
+    let printed = shell(&dir, &listings(&document, "sh")[..2].concat())?;
     ensure!(printed.lines().count() == 2 && printed.lines().all(|line| line.ends_with("host's: 0")), "{printed}");
     let code = code_bytes(&dir.path().join("minimal.elf"))? - fs::metadata(firmware::built_in()?)?.len();
     let manifest = fs::read_to_string(dir.path().join("actq-cortex-m4f/manifest.json"))?;
@@ -184,7 +180,8 @@ fn a_library_for_an_mlp_takes_less_than_14_kb() -> Result<()> {
     let Some(dir) = folder_of(&file, None, Runs::ThisImage)? else { return Ok(()) };
     fs::write(dir.path().join("c/self_test.c"), SELF_TEST)?;
     let document = fs::read_to_string(root().join("docs/C.md"))?;
-    let settings = listings(&document)[0].lines().filter(|line| line.contains("=\"")).collect::<Vec<_>>().join("\n");
+    let settings =
+        listings(&document, "sh")[0].lines().filter(|line| line.contains("=\"")).collect::<Vec<_>>().join("\n");
     let build = "set -e
         for file in c/minimal.c c/self_test.c c/startup.c policy/policy.c; do
           arm-none-eabi-gcc $CORE $STRICT -std=c99 $INCLUDE -c $file -o $(basename $file .c).o
@@ -248,7 +245,7 @@ fn a_step_from_c_costs_what_one_from_rust_does() -> Result<()> {
     let build = format!(
         "{}\narm-none-eabi-gcc $CORE $STRICT -std=c99 -DSTEPS={steps} $INCLUDE -c c/counted.c -o counted.o\n\
          arm-none-eabi-gcc $CORE $LINK -T mps2-an386.ld counted.o $OBJECTS $LIBRARY -o counted.elf\n",
-        listings(&document).first().context("a listing")?
+        listings(&document, "sh").first().context("a listing")?
     );
     shell(&dir, &build)?;
     let elf = dir.path().join("counted.elf");
