@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use actq_bench::command::{actq, run, succeeded};
-use actq_bench::root;
+use actq_bench::{root, skipped};
 use actq_deploy::Answers;
 use anyhow::{Context, Result, bail, ensure};
 use tempfile::TempDir;
@@ -166,7 +166,7 @@ fn shown_c_compiles() -> Result<()> {
     compiler.args(["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-fsyntax-only"]);
     compiler.arg("-I").arg(root().join("capi/include")).arg("-I").arg(&policy).arg(path("listing.c"));
     match compiler.output() {
-        Err(_) => println!("not run: cc is not installed"),
+        Err(_) => skipped("cc is not installed"),
         Ok(output) => ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr)),
     }
     Ok(())
