@@ -76,7 +76,8 @@ fn commands(text: &str) -> impl Iterator<Item = Vec<&str>> {
     let spans = text.split('`').skip(1).step_by(2).flat_map(str::lines);
     let lines = text.lines().filter(|line| line.starts_with("    ")).chain(spans);
     let words = lines.map(|line| line.split_whitespace().skip_while(|word| *word == "$" || word.contains('=')));
-    words.map(Iterator::collect).filter(|words: &Vec<&str>| words.len() > 1 && ["actq", "cargo"].contains(&words[0]))
+    let programs = ["actq", "cargo", "sh"];
+    words.map(Iterator::collect).filter(move |words: &Vec<&str>| words.len() > 1 && programs.contains(&words[0]))
 }
 
 /// Checks the subcommands and options of `actq` against `docs/CLI.md`.
@@ -105,6 +106,11 @@ fn check_cargo(words: &[&str], aliases: &str, xtask: &str, manifests: &str) -> R
     Ok(())
 }
 
+fn check_script(path: &str) -> Result<()> {
+    ensure!(path == "-c" || root().join(path).is_file(), "no such script");
+    Ok(())
+}
+
 #[test]
 fn every_shown_command_is_known() -> Result<()> {
     let listed = fs::read_dir(root().join("docs"))?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
@@ -120,6 +126,7 @@ fn every_shown_command_is_known() -> Result<()> {
         for words in commands(text.split(GENERATED).next().unwrap_or(&text)) {
             let checked = match words[0] {
                 "actq" => check_actq(&words, &reference),
+                "sh" => check_script(words[1]),
                 _ => check_cargo(&words, &aliases, &xtask, &manifests),
             };
             checked.with_context(|| format!("{}: {}", path.display(), words.join(" ")))?;

@@ -1,6 +1,7 @@
 """What the tests share: the tree's policies, and the command."""
 
 import os
+import re
 import subprocess
 from pathlib import Path
 
@@ -20,6 +21,12 @@ else:
 ROOT = Path(__file__).resolve().parents[3]
 UR3 = ROOT / "examples/ur3/policy"
 FLOW = ROOT / "examples/ur3/flow"
+
+
+def listings(document):
+    """The listings in Python of a document in docs/."""
+    text = (ROOT / f"docs/{document}.md").read_text()
+    return re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S)
 
 
 @pytest.fixture(scope="session")

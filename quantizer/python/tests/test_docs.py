@@ -1,19 +1,15 @@
-"""The listings of docs/PYTHON.md run, in order."""
+"""The listings of docs/PYTHON.md run, in order; so does that of docs/IMPORT.md."""
 
 import re
-import sys
 from importlib.util import find_spec
 
+import numpy
 import pytest
 
 import actq
-from conftest import ROOT
+from conftest import ROOT, listings
 
 gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
-
-
-def listings():
-    return re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/PYTHON.md").read_text(), re.M | re.S)
 
 
 def shorter(listing):
@@ -25,7 +21,8 @@ def shorter(listing):
 def test_every_listing_runs(cart_pole, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names, skipped = {}, []
-    for i, listing in enumerate(listings()):
+    # The last one needs a controller: test_link.py runs it.
+    for i, listing in enumerate(listings("PYTHON")[:-1]):
         needed = re.findall(r"(torch|stable_baselines3)\b", listing)
         missing = [name for name in set(needed) if find_spec(name) is None]
         if missing and i == 0:
@@ -42,6 +39,14 @@ def test_every_listing_runs(cart_pole, tmp_path, monkeypatch):
     assert (tmp_path / "firmware/policy.h").exists() and (tmp_path / "cart-pole.actq").exists()
     if skipped:
         pytest.skip(f"{len(skipped)} of its listings: torch is not installed (requirements-optional.txt)")
+
+
+def test_a_recording_is_saved_as_documented(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (listing,) = listings("IMPORT")
+    exec(compile(listing, "IMPORT", "exec"), {"numpy": numpy, "observations": [[1.0, 2.0, 3.0]] * 4, "length": 3})
+    saved = numpy.load("obs.npy")
+    assert saved.shape == (4, 3) and saved.dtype == numpy.float32
 
 
 def test_a_head_steps_with_flat_memory(cart_pole, monkeypatch):

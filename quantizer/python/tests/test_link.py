@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import actq
-from conftest import UR3
+from conftest import UR3, listings
 
 
 @pytest.fixture
@@ -61,6 +61,15 @@ def test_a_controller_runs_an_image_with_its_bits(port):
             link.push(image, version=6)
     with pytest.raises(actq.Error, match="the link is closed; open another"):
         link.status()
+
+
+def test_the_listing_of_the_document_runs(port):
+    image = actq.quantize(actq.import_policy(UR3), bits=2, method="rtn", progress=False)
+    observation = np.ones(image.obs_len, dtype=np.float32)
+    names = {"actq": actq, "image": image, "observation": observation}
+    listing = listings("PYTHON")[-1].replace('"/dev/ttyACM0"', f'"{port}", timeout=60')
+    exec(compile(listing, "PYTHON", "exec"), names)
+    assert names["action"].tobytes() == actq.Head(image)(observation).tobytes()
 
 
 def test_a_port_that_cannot_be_opened_is_named(tmp_path):
