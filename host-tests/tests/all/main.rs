@@ -3,6 +3,7 @@
 mod accuracy;
 mod arrows;
 mod budgets;
+mod built_once;
 mod c_ports;
 mod cli;
 mod constants;

@@ -21,7 +21,7 @@ pub(crate) fn cargo_build(what: &str, arguments: &[&str], environment: &[(&str, 
 }
 
 /// Runs cargo, to make something, and returns its output.
-pub(crate) fn cargo(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<String> {
+pub fn cargo(what: &str, arguments: &[&str], environment: &[(&str, &str)]) -> Result<String> {
     let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
         .current_dir(root())
         .args(arguments)

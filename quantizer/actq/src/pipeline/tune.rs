@@ -82,8 +82,8 @@ impl Tuned {
 }
 
 /// Learns from the f32 policy's recordings, then `rounds` times from those and all rollouts before. `drive` receives
-/// each image with its number from 0, and returns its rollout. `watch` receives the present work and the share of it
-/// that is done.
+/// each image with its number from 0, and returns its rollout. `watch` receives the present work, with the last image's
+/// success, and the share of it that is done.
 ///
 /// # Errors
 ///
@@ -106,8 +106,10 @@ pub fn run(
         let round = rows.len();
         let started = Instant::now();
         let Learned { dataset, shares } = Learned::join(&mut parts, &policy.graph)?;
+        let success = rows.last().and_then(|row| row.driven.success());
+        let success = success.map_or_else(String::new, |success| format!(", success {success} before"));
         let quantized = learn(policy, dataset, options, |work: &str, share| {
-            watch.progress(&format!("round {round}: {work}"), share)
+            watch.progress(&format!("round {round}: {work}{success}"), share)
         })?;
         let buffer = quantized.buffer();
         let image = buffer.image(Path::new("the new image"))?;
@@ -180,7 +182,7 @@ mod tests {
             options: &options,
             rounds: 2,
         };
-        let mut images = Vec::new();
+        let (mut images, mut works) = (Vec::new(), Vec::new());
         let successes = [0.5, 0.75, 0.625];
         let tuned = run(
             plan(),
@@ -189,7 +191,7 @@ mod tests {
                 images.push(image.to_vec());
                 Ok(Driven { recordings: vec![elsewhere(round)], outcome: said(successes[round]) })
             },
-            (),
+            |work: &str, _| works.push(work.to_owned()),
         )
         .expect("tuned");
         let learned: Vec<_> = tuned.rounds.iter().map(|r| (r.round, r.recordings, r.episodes, r.frames)).collect();
@@ -198,6 +200,8 @@ mod tests {
         assert!(images[0] != images[1] && images[1] != images[2]);
         assert!(tuned.rounds.iter().all(|r| r.nmse > 0.0 && r.own_nmse.is_some_and(|n| n > 0.0)));
         assert_eq!(tuned.better().map(|r| r.round), Some(1));
+        assert!(works.iter().any(|work| work.starts_with("round 2: ") && work.ends_with(", success 0.75 before")));
+        assert!(works.iter().all(|work| !work.starts_with("round 0: ") || !work.contains("success")));
 
         let broken = |round: usize, _: &[u8]| -> Result<Driven> {
             ensure!(round == 0, "the robot fell over");
