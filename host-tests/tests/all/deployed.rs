@@ -31,7 +31,7 @@ pub(crate) const PUBLISHED: [(&str, &str); 5] = [
     ("limx_tron1_pf_isaaclab", ""),
     ("kinfer_zbot_walking", ""),
     ("falcon_g1", "action_scale = 0.25\nrate_hz = 50"),
-    ("holosoma_t1_fastsac", include_str!("../../../quantizer/deploy/tests/holosoma.toml")),
+    ("holosoma_t1_fastsac", include_str!("../../../quantizer/deploy/tests/all/holosoma.toml")),
 ];
 
 /// An image whose matrices are those of the policy.

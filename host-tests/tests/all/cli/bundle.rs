@@ -11,7 +11,8 @@ use tempfile::TempDir;
 
 use super::fixture::text;
 
-#[path = "../../../../quantizer/deploy/tests/common/onnx.rs"]
+#[allow(dead_code, reason = "one of its files is enough here")]
+#[path = "../../../../quantizer/deploy/tests/all/common/onnx.rs"]
 mod onnx;
 
 /// A robot of two joints whose motors are in the other order, and a history of two frames.

@@ -1,15 +1,10 @@
 //! LeRobot's policies of states against LeRobot's arithmetic, which this test writes out.
 
-#[path = "common/lerobot.rs"]
-mod files;
-#[path = "common/made.rs"]
-mod made;
-#[path = "common/onnx.rs"]
-mod onnx;
-
 use actq::error::{Result, ensure};
 use actq_deploy::description::TargetKind;
-use files::{Files, raw, statistics};
+
+use crate::common::lerobot::{Files, raw, statistics};
+use crate::common::onnx;
 
 /// LeRobot's arithmetic, in both versions: `buffers` is that of the policies' own buffers.
 fn normalized(x: f64, mode: &str, at: [f64; 2], buffers: bool) -> f64 {

@@ -3,9 +3,10 @@
 use actq::error::{Result, ensure};
 use actq_deploy::{Answers, Plan, read};
 
-use crate::made::{Made, message};
-use crate::upstream::{BASE, UPSTREAM, Upstream, WALK};
-use crate::{DANCE, agrees, edited, onnx, reading, robot};
+use super::upstream::{BASE, UPSTREAM, Upstream, WALK};
+use super::{DANCE, agrees, edited, reading, robot};
+use crate::common::made::{Made, message};
+use crate::common::onnx;
 
 #[test]
 fn rules_are_questions_until_accepted() -> Result<()> {
@@ -41,7 +42,7 @@ fn the_application_computes_what_needs_a_motion() -> Result<()> {
     let all = [("motion_command", 8), ("motion_anchor_ori_b", 6), ("ang_vel", 3), ("scan", 5)];
     ensure!(inputs == all.map(|(name, len)| (name, Some(len))), "{inputs:?}");
     Plan::new(&reading.description, &made.bundle()?)?;
-    let error = message(crate::reading(&made, &answers.replace("SCAN", "4")));
+    let error = message(super::reading(&made, &answers.replace("SCAN", "4")));
     ensure!(error.contains("21 values") && error.contains("22 values"), "{error}");
     Ok(())
 }

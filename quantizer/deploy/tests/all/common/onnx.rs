@@ -1,5 +1,4 @@
 //! Small ONNX files for tests.
-#![allow(dead_code, reason = "each test uses some of it")]
 
 /// Returns a file whose output "action" is a linear function of its input "actor_obs".
 pub(crate) fn linear(inputs: usize, outputs: usize, metadata: &[(&str, &str)]) -> Vec<u8> {

@@ -1,17 +1,12 @@
 //! Files of LeRobot's policies that contradict each other, are damaged, or are not supported.
 
-#[path = "common/lerobot.rs"]
-mod files;
-#[path = "common/made.rs"]
-mod made;
-#[path = "common/onnx.rs"]
-mod onnx;
-
 use actq::error::{Result, ensure};
-use files::{CONFIG, Files, STATE_FILES, with_statistic};
-use made::message;
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
+
+use crate::common::lerobot::{CONFIG, Files, STATE_FILES, with_statistic};
+use crate::common::made::message;
+use crate::common::onnx;
 
 /// A graph whose first or last operations are those of a normalizer.
 fn normalizing(nodes: &[(&str, &[&str], &str)]) -> Vec<u8> {

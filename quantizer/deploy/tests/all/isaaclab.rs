@@ -1,16 +1,11 @@
 //! Isaac Lab's exports: env.yaml, IO_descriptors.yaml, and both.
 
-#[path = "common/isaaclab.rs"]
-mod isaaclab;
-#[path = "common/made.rs"]
-mod made;
-#[path = "common/onnx.rs"]
-mod onnx;
-
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::{Answers, Plan, Reading, Runner, read};
-use isaaclab::{DESCRIPTORS, ENVIRONMENT, JOINTS, LEN};
-use made::{Made, message};
+
+use crate::common::isaaclab::{self, DESCRIPTORS, ENVIRONMENT, JOINTS, LEN};
+use crate::common::made::{Made, message};
+use crate::common::onnx;
 
 /// Observation and target of a tick.
 type Tick = (Vec<f64>, Vec<f64>);

@@ -1,16 +1,12 @@
 //! States that LEAPP's exports feed back: with any axes, and those of recurrent cells.
 
-#[path = "common/made.rs"]
-mod made;
-#[path = "common/onnx.rs"]
-mod onnx;
-
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::description::Description;
 use actq_deploy::{Answers, Deployment, Plan, Reading, Runner, read};
-use made::{Made, message};
-use onnx::{shaped, weights};
 use safetensors::tensor::{Dtype, TensorView, serialize};
+
+use crate::common::made::{Made, message};
+use crate::common::onnx::{shaped, weights};
 
 /// A port: its name and shape.
 type Port = (&'static str, &'static [usize]);

@@ -1,15 +1,13 @@
 //! Files of LeRobot's policies of states, as LeRobot writes them.
-#![allow(dead_code, reason = "each test uses some of it")]
-
-use std::collections::BTreeMap;
 
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::{Answers, Deployment, Plan, Reading, Runner, read};
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
+use std::collections::BTreeMap;
 
-use crate::made::Made;
-use crate::onnx;
+use super::made::Made;
+use super::onnx;
 
 pub(crate) const CONFIG: &str = r#"{
     "type": "act",

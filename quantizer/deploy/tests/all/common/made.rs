@@ -1,12 +1,10 @@
 //! Bundles that tests write, and published ones, which are in the folder that `ACTQ_SHARED` names.
-#![allow(dead_code, reason = "each test uses some of it")]
-
-use std::fs;
-use std::path::PathBuf;
 
 use actq::error::{Result, ensure};
 use actq_deploy::description::Description;
 use actq_deploy::{Answers, Bundle, Plan, Reading, Reference, read};
+use std::fs;
+use std::path::PathBuf;
 use tempfile::TempDir;
 
 /// Returns a file or folder of the shared folder, or nothing without it.

@@ -1,13 +1,10 @@
 //! Bundles of holosoma.
 
-#[path = "common/made.rs"]
-mod made;
-#[path = "common/onnx.rs"]
-mod onnx;
-
 use actq::error::{Result, ensure};
 use actq_deploy::Plan;
-use made::{Made, agrees, asked, refused};
+
+use crate::common::made::{Made, agrees, asked, refused};
+use crate::common::onnx;
 
 /// Answers for the Booster T1.
 const T1: &str = include_str!("holosoma.toml");

@@ -1,16 +1,14 @@
 //! Bundles of rl_sar, as its repository has them.
 
-#[path = "../common/made.rs"]
-mod made;
-#[path = "../common/onnx.rs"]
-mod onnx;
 mod questions;
 mod upstream;
 
 use actq::error::{Result, ensure};
 use actq_deploy::description::TargetKind;
 use actq_deploy::{Answers, Plan, Reading, Runner, read};
-use made::{Made, message};
+
+use crate::common::made::{Made, message};
+use crate::common::onnx;
 use upstream::{BASE, UPSTREAM, Upstream, WALK, raw};
 
 const TICKS: usize = 25;

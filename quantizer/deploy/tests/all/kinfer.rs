@@ -1,14 +1,11 @@
 //! K-Scale's bundles. The published one runs where `ACTQ_SHARED` names the folder of the bundles.
 
-#[path = "common/made.rs"]
-mod made;
-#[path = "common/onnx.rs"]
-mod onnx;
-
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::description::TargetKind;
 use actq_deploy::{Answers, Bundle, read};
-use made::{Made, agrees, asked, message, refused, shared};
+
+use crate::common::made::{Made, agrees, asked, message, refused, shared};
+use crate::common::onnx;
 
 const NAME: &str = "kinfer_zbot_walking";
 

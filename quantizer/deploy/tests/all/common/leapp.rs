@@ -1,14 +1,13 @@
 //! A pipeline of two models as LEAPP writes it, and the arithmetic of its runtime.
 
-use std::collections::BTreeMap;
-
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::{Answers, Deployment, Plan, Reading, Runner, read};
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use sha2::{Digest as _, Sha256};
+use std::collections::BTreeMap;
 
-use crate::made::Made;
-use crate::onnx::{graph, weights};
+use super::made::Made;
+use super::onnx::{graph, weights};
 
 /// The YAML file, in which `HASH observe.onnx` stands for that file's hash.
 pub(crate) const YAML: &str = "\

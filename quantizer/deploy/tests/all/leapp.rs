@@ -1,16 +1,10 @@
 //! LEAPP's exports against the arithmetic of its runtime, which this test writes out.
 
-#[path = "common/leapp.rs"]
-mod files;
-#[path = "common/made.rs"]
-mod made;
-#[path = "common/onnx.rs"]
-mod onnx;
-
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::description::{Description, Gains, Numbers, TargetKind};
-use files::{Files, KD, KP, SMOOTH, initial, policy, reference};
-use made::message;
+
+use crate::common::leapp::{self as files, Files, KD, KP, SMOOTH, initial, policy, reference};
+use crate::common::made::message;
 
 /// Returns the first tick that differs from the reference with these first values.
 fn differs(ticks: &[Vec<f64>], last: f32, smooth: [f32; 4]) -> Option<String> {

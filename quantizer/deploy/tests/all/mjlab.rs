@@ -1,15 +1,11 @@
 //! mjlab's bundles. The published one runs where `ACTQ_SHARED` names the folder of the bundles.
 
-#[path = "common/made.rs"]
-mod made;
-#[path = "common/onnx.rs"]
-mod onnx;
-
-use std::fs;
-
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::{Answers, Bundle, Plan, read};
-use made::{Made, agrees, asked, message, refused, shared, shared_file};
+use std::fs;
+
+use crate::common::made::{Made, agrees, asked, message, refused, shared, shared_file};
+use crate::common::onnx;
 
 const NAME: &str = "bitbots_walk_mjlab";
 

@@ -1,13 +1,10 @@
 //! Bundles of humanoidverse's sim2real code: FALCON and ASAP.
 
-#[path = "common/made.rs"]
-mod made;
-#[path = "common/onnx.rs"]
-mod onnx;
-
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::{Answers, Bundle, Plan, Runner, read};
-use made::{Made, agrees, asked, refused, shared};
+
+use crate::common::made::{Made, agrees, asked, refused, shared};
+use crate::common::onnx;
 
 const ANSWERS: &str = "action_scale = 0.25\nrate_hz = 50\n";
 

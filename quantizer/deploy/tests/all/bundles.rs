@@ -1,12 +1,10 @@
 //! Published bundles against the references of their deploy code. They run where `ACTQ_SHARED` names the folder of the
 //! bundles.
 
-#[path = "common/made.rs"]
-mod made;
-
 use actq::error::{Result, ensure};
 use actq_deploy::{Answers, Bundle, Plan, Reference, Variant, explain, read, variants};
-use made::{agrees, shared};
+
+use crate::common::made::{agrees, shared};
 
 #[test]
 fn unitree_rl_lab_agrees_with_its_deploy_code() -> Result<()> {

@@ -1,0 +1,7 @@
+//! What several families' tests share.
+
+pub(crate) mod isaaclab;
+pub(crate) mod leapp;
+pub(crate) mod lerobot;
+pub(crate) mod made;
+pub(crate) mod onnx;
