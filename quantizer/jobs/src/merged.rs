@@ -2,6 +2,7 @@
 
 use actq::budget::Budget;
 use actq::measure::eval::ErrorReport;
+use actq::measure::interval::wilson;
 use serde::{Deserialize, Serialize};
 
 use crate::figures::{Driven, Made};
@@ -91,17 +92,6 @@ impl Figures {
         let driven = self.driven.as_ref()?;
         Some(driven.successes? as f64 / driven.episodes.max(1) as f64)
     }
-}
-
-/// Returns the 95% interval of a share (Wilson: Probable inference, the law of succession, and statistical inference,
-/// 1927).
-fn wilson(successes: f64, trials: f64) -> [f64; 2] {
-    /// Quantile of the normal distribution.
-    const Z: f64 = 1.96;
-    let (share, z2) = (successes / trials, Z * Z / trials);
-    let middle = share + z2 / 2.0;
-    let reach = Z * (share * (1.0 - share) / trials + z2 / (4.0 * trials)).sqrt();
-    [-reach, reach].map(|side| ((middle + side) / (1.0 + z2)).clamp(0.0, 1.0))
 }
 
 impl MergedPolicy {

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use actq::measure::size::hex;
 use actq_kernels::Image;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -114,11 +115,4 @@ fn manifest(image: &Image<'_>, bytes: &[u8], files: &Files) -> Value {
 /// Returns the SHA-256 of bytes, as hexadecimal digits.
 pub fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }

@@ -40,55 +40,40 @@ demo, verify, bench, budgets, compare, faults, fit, firmware, python and stack s
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    // An error of the outer result is of the command line, one of the inner result of the work.
     let outcome = match &words[..] {
-        ["verify", options @ ..] => match verify::Options::parse(options) {
-            Ok(options) => options.run(),
-            Err(wrong) => {
-                eprintln!("{wrong}");
-                return ExitCode::from(2);
-            }
-        },
-        ["doctor"] => setup::ensure(&Target::ALL).map(|()| println!("nothing is missing")),
-        ["firmware", options @ ..] => match firmware::Options::parse(options) {
-            Ok(options) => options.run(),
-            Err(wrong) => {
-                eprintln!("{wrong}");
-                return ExitCode::from(2);
-            }
-        },
-        ["python", options @ ..] => match python::Options::parse(options) {
-            Ok(options) => options.run(),
-            Err(wrong) => {
-                eprintln!("{wrong}");
-                return ExitCode::from(2);
-            }
-        },
-        ["compare", ..] => measuring("actq-research", &words),
-        ["capi", ..] => Target::ALL
-            .iter()
-            .try_for_each(|target| setup::rust_target(target.triple()))
-            .and_then(|()| measuring("actq-bench", &words)),
-        ["stack", ..] => firmware::boards()
-            .try_for_each(|(target, _)| setup::rust_target(target.triple()))
-            .and_then(|()| measuring("actq-bench", &words)),
-        ["demo" | "bench" | "faults" | "fit", ..] => measure(&words, &[Target::Fpu]),
-        ["budgets", ..] => measure(&words, &[Target::Fpu, Target::M33]),
+        ["verify", options @ ..] => verify::Options::parse(options).map(|options| options.run()),
+        ["doctor"] => Ok(setup::ensure(&Target::ALL).map(|()| println!("nothing is missing"))),
+        ["firmware", options @ ..] => firmware::Options::parse(options).map(|options| options.run()),
+        ["python", options @ ..] => python::Options::parse(options).map(|options| options.run()),
+        ["compare", ..] => Ok(measuring("actq-research", &words)),
+        ["capi", ..] => Ok(measure_for(Target::ALL.iter().copied(), &words)),
+        ["stack", ..] => Ok(measure_for(firmware::boards().map(|(target, _)| target), &words)),
+        ["demo" | "bench" | "faults" | "fit", ..] => Ok(measure(&words, &[Target::Fpu])),
+        ["budgets", ..] => Ok(measure(&words, &[Target::Fpu, Target::M33])),
         ["help" | "-h" | "--help"] => {
             println!("{USAGE}");
-            Ok(())
+            Ok(Ok(()))
         }
-        _ => {
-            eprintln!("{USAGE}");
-            return ExitCode::from(2);
-        }
+        _ => Err(USAGE.to_owned()),
     };
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
+        Ok(Ok(())) => ExitCode::SUCCESS,
+        Ok(Err(error)) => {
             eprintln!("\nerror: {error:#}");
             ExitCode::FAILURE
         }
+        Err(wrong) => {
+            eprintln!("{wrong}");
+            ExitCode::from(2)
+        }
     }
+}
+
+/// Installs the compiler's part for these targets, and runs a command of `actq-bench`.
+fn measure_for(mut targets: impl Iterator<Item = Target>, arguments: &[&str]) -> Result<()> {
+    targets.try_for_each(|target| setup::rust_target(target.triple()))?;
+    measuring("actq-bench", arguments)
 }
 
 /// Installs the requirements of these targets, and runs a command of `actq-bench` in QEMU.

@@ -1,9 +1,9 @@
 //! Bundles of humanoidverse's sim2real code: FALCON and ASAP.
 
-use actq::error::{Context as _, Result, ensure};
-use actq_deploy::{Answers, Bundle, Plan, Runner, read};
+use actq::error::Result;
+use actq_deploy::{Answers, Bundle, read};
 
-use crate::common::made::{Made, agrees, asked, refused, shared};
+use crate::common::made::{Made, Tick, agrees, asked, refused, shared};
 use crate::common::onnx;
 
 const ANSWERS: &str = "action_scale = 0.25\nrate_hz = 50\n";
@@ -79,25 +79,9 @@ fn made(yaml: &str, networks: &[(&str, Vec<u8>)]) -> Result<Made> {
     Ok(made)
 }
 
-/// Values of ticks: the observation and the target.
-type Ticks = Vec<(Vec<f64>, Vec<f64>)>;
-
 /// Runs a bundle; each raw value is `raw(name, tick)`.
-fn run(yaml: &str, network: (&str, Vec<u8>), raw: fn(&str, usize) -> Vec<f64>, ticks: usize) -> Result<Ticks> {
-    let made = made(yaml, &[network])?;
-    let reading = made.reading(true, ANSWERS)?;
-    ensure!(reading.questions.is_empty(), "{:#?}", reading.questions);
-    ensure!(reading.unread.is_empty(), "{:#?}", reading.unread);
-    let mut runner = Runner::new(Plan::new(&reading.description, &made.bundle()?)?);
-    let names: Vec<String> = runner.plan().inputs().iter().map(|(name, _)| name.clone()).collect();
-    let mut all = Vec::new();
-    for tick in 0..ticks {
-        let raw: Vec<Vec<f64>> = names.iter().map(|name| raw(name, tick)).collect();
-        let tick = runner.step(&raw);
-        let target = tick.targets.into_iter().next().context("there is no target")?.1;
-        all.push((tick.observation, target));
-    }
-    Ok(all)
+fn run(yaml: &str, network: (&str, Vec<u8>), raw: fn(&str, usize) -> Vec<f64>, ticks: usize) -> Result<Vec<Tick>> {
+    made(yaml, &[network])?.run(ANSWERS, ticks, |name, _, tick| raw(name, tick))
 }
 
 fn raw(name: &str, tick: usize) -> Vec<f64> {

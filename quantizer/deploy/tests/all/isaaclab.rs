@@ -4,11 +4,8 @@ use actq::error::{Context as _, Result, ensure};
 use actq_deploy::{Answers, Plan, Reading, Runner, read};
 
 use crate::common::isaaclab::{self, DESCRIPTORS, ENVIRONMENT, JOINTS, LEN};
-use crate::common::made::{Made, message};
+use crate::common::made::{Made, Tick, message};
 use crate::common::onnx;
-
-/// Observation and target of a tick.
-type Tick = (Vec<f64>, Vec<f64>);
 
 /// Files of a bundle: text files by name, and the network.
 struct Files {
@@ -56,18 +53,7 @@ impl Files {
 
     /// Runs 20 ticks; returns observations and targets.
     fn run(&self, answers: &str) -> Result<Vec<Tick>> {
-        let made = self.made()?;
-        let reading = read(&made.bundle()?, true, Answers::parse(answers)?)?;
-        ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
-        let mut runner = Runner::new(Plan::new(&reading.description, &made.bundle()?)?);
-        let names: Vec<(String, usize)> = runner.plan().inputs().to_vec();
-        let mut ticks = Vec::new();
-        for tick in 0..20 {
-            let raw: Vec<Vec<f64>> = names.iter().map(|(name, len)| isaaclab::raw(name, *len, tick)).collect();
-            let made = runner.step(&raw);
-            ticks.push((made.observation, made.targets.into_iter().next().context("a target")?.1));
-        }
-        Ok(ticks)
+        self.made()?.run(answers, 20, isaaclab::raw)
     }
 }
 

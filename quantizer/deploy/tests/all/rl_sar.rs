@@ -5,7 +5,7 @@ mod upstream;
 
 use actq::error::{Result, ensure};
 use actq_deploy::description::TargetKind;
-use actq_deploy::{Answers, Plan, Reading, Runner, read};
+use actq_deploy::{Answers, Plan, Reading, read};
 
 use crate::common::made::{Made, message};
 use crate::common::onnx;
@@ -36,17 +36,8 @@ fn reading(made: &Made, answers: &str) -> Result<Reading> {
 
 /// Runs a bundle; returns the same as [`Upstream::run`].
 fn run(made: &Made, answers: &str) -> Result<Vec<Vec<f64>>> {
-    let reading = reading(made, answers)?;
-    ensure!(reading.questions.is_empty(), "{:#?}", reading.questions);
-    ensure!(reading.unread.is_empty(), "{:#?}", reading.unread);
-    let mut runner = Runner::new(Plan::new(&reading.description, &made.bundle()?)?);
-    let names: Vec<String> = runner.plan().inputs().iter().map(|(name, _)| name.clone()).collect();
-    let step = |tick: usize| {
-        let raw: Vec<Vec<f64>> = names.iter().map(|name| raw(name, tick)).collect();
-        let tick = runner.step(&raw);
-        tick.targets.into_iter().fold(tick.observation, |all, (_, values)| [all, values].concat())
-    };
-    Ok((0..TICKS).map(step).collect())
+    let ticks = made.run(answers, TICKS, |name, _, tick| raw(name, tick))?;
+    Ok(ticks.into_iter().map(|(observation, targets)| [observation, targets].concat()).collect())
 }
 
 /// Returns the largest difference; infinite if lengths differ.

@@ -79,9 +79,12 @@ pub(super) fn all(installed: Installed) -> Vec<Step> {
     steps.add("C header", &["test", "--release", "--package", C_HEADER]);
     let publish = ["publish", "--workspace", "--dry-run", "--no-verify", "--allow-dirty", "--locked"];
     steps.add("crates to publish", &publish);
-    steps.python(installed.python);
-    steps.narrow(installed.narrow);
-    steps.oldest(installed.oldest);
+    let python = ["run", "--release", "--package", "xtask", "--", "python"];
+    steps.add_if(installed.python, "Python package", cargo(), &python);
+    let kernels = ["test", "--release", "--package", "actq-kernels", "--features", "writer", "--target", TARGET_32_BIT];
+    steps.add_if(installed.narrow, "kernels' tests with words of 32 bits", cargo(), &kernels);
+    let check = [&["run", OLDEST, "cargo", "check", "--release"], &host_packages()[..]].concat();
+    steps.add_if(installed.oldest, &format!("oldest compiler, {OLDEST}"), Command::new("rustup"), &check);
     steps.0
 }
 
@@ -118,6 +121,16 @@ impl Steps {
     fn add_of_firmware(&mut self, name: &str, arguments: &[&str], environment: &[(&str, &str)]) {
         let image = root().join("kernels/tests/valid.actq").display().to_string();
         self.add_with(name, arguments, &[environment, &[("ACTQ_IMAGE", &image)]].concat());
+    }
+
+    /// Adds a command that needs what may be missing.
+    fn add_if(&mut self, installed: Result<(), String>, name: &str, program: Command, arguments: &[&str]) {
+        let command = installed.map(|()| {
+            let mut command = program;
+            command.current_dir(root()).args(arguments);
+            command
+        });
+        self.0.push(Step { name: name.to_owned(), command });
     }
 
     /// Adds lints and a test of the kernels with the features that every build has.
@@ -182,42 +195,5 @@ impl Steps {
         let firmware = FIRMWARE.map(|name| ["--package", name]).concat();
         let firmware = [&["doc", "--no-deps"], &build_for(Target::Fpu)[..], &firmware].concat();
         self.add_of_firmware("documentation of the firmware", &firmware, &deny);
-    }
-
-    fn python(&mut self, installed: Result<(), String>) {
-        let command = installed.map(|()| {
-            let mut command = cargo();
-            command.current_dir(root()).args(["run", "--release", "--package", "xtask", "--", "python"]);
-            command
-        });
-        self.0.push(Step { name: "Python package".to_owned(), command });
-    }
-
-    fn narrow(&mut self, installed: Result<(), String>) {
-        let command = installed.map(|()| {
-            let mut command = cargo();
-            command.current_dir(root());
-            command.args([
-                "test",
-                "--release",
-                "--package",
-                "actq-kernels",
-                "--features",
-                "writer",
-                "--target",
-                TARGET_32_BIT,
-            ]);
-            command
-        });
-        self.0.push(Step { name: "kernels' tests with words of 32 bits".to_owned(), command });
-    }
-
-    fn oldest(&mut self, installed: Result<(), String>) {
-        let command = installed.map(|()| {
-            let mut command = Command::new("rustup");
-            command.current_dir(root()).args(["run", OLDEST, "cargo", "check", "--release"]).args(host_packages());
-            command
-        });
-        self.0.push(Step { name: format!("oldest compiler, {OLDEST}"), command });
     }
 }

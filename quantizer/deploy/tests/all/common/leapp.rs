@@ -1,7 +1,7 @@
 //! A pipeline of two models as LEAPP writes it, and the arithmetic of its runtime.
 
 use actq::error::{Context as _, Result, ensure};
-use actq_deploy::{Answers, Deployment, Plan, Reading, Runner, read};
+use actq_deploy::{Answers, Reading, read};
 use safetensors::tensor::{Dtype, TensorView, serialize};
 use sha2::{Digest as _, Sha256};
 use std::collections::BTreeMap;
@@ -187,21 +187,7 @@ impl Files {
 
     /// Runs 20 ticks; returns the targets of each.
     pub(crate) fn run(&self, answers: &str) -> Result<Vec<Vec<f64>>> {
-        let bundle = self.made()?;
-        let bundle = bundle.bundle()?;
-        let reading = read(&bundle, true, Answers::parse(answers)?)?;
-        ensure!(reading.questions.is_empty() && reading.unread.is_empty(), "{reading:#?}");
-        let plan = Plan::new(&reading.description, &bundle)?;
-        Deployment::new("policy", 50.0, &plan).context("an image of it")?;
-        let mut runner = Runner::new(plan);
-        let inputs = runner.plan().inputs().to_vec();
-        let mut ticks = Vec::new();
-        for tick in 0..20 {
-            let raw: Vec<Vec<f64>> = inputs.iter().map(|(name, len)| raw(name, *len, tick)).collect();
-            let made = runner.step(&raw);
-            ticks.push(made.targets.into_iter().flat_map(|(_, values)| values).collect());
-        }
-        Ok(ticks)
+        Ok(self.made()?.run(answers, 20, raw)?.into_iter().map(|(_, targets)| targets).collect())
     }
 }
 

@@ -1,12 +1,12 @@
 //! Files of LeRobot's policies of states, as LeRobot writes them.
 
 use actq::error::{Context as _, Result, ensure};
-use actq_deploy::{Answers, Deployment, Plan, Reading, Runner, read};
+use actq_deploy::Reading;
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
 use std::collections::BTreeMap;
 
-use super::made::Made;
+use super::made::{Made, Tick};
 use super::onnx;
 
 pub(crate) const CONFIG: &str = r#"{
@@ -278,21 +278,8 @@ impl Files {
     }
 
     /// Runs 20 ticks with the raw values of [`raw`]: the observation and the target of each.
-    pub(crate) fn run(&self, answers: &str) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
-        let made = self.made()?;
-        let bundle = made.bundle()?;
-        let reading = read(&bundle, true, Answers::parse(answers)?)?;
-        ensure!(reading.questions.is_empty() && reading.unread.is_empty(), "{reading:#?}");
-        let plan = Plan::new(&reading.description, &bundle)?;
-        Deployment::new("policy", 30.0, &plan).context("an image of it")?;
-        let mut runner = Runner::new(plan);
-        let inputs = runner.plan().inputs().to_vec();
-        let step = |tick: usize| {
-            let given: Vec<Vec<f64>> = inputs.iter().map(|(_, len)| raw(tick, *len)).collect();
-            let result = runner.step(&given);
-            (result.observation, result.targets.into_iter().flat_map(|(_, values)| values).collect())
-        };
-        Ok((0..20).map(step).collect())
+    pub(crate) fn run(&self, answers: &str) -> Result<Vec<Tick>> {
+        self.made()?.run(answers, 20, |_, len, tick| raw(tick, len))
     }
 }
 

@@ -1,8 +1,8 @@
 //! Bundles that tests write, and published ones, which are in the folder that `ACTQ_SHARED` names.
 
-use actq::error::{Result, ensure};
+use actq::error::{Context as _, Result, ensure};
 use actq_deploy::description::Description;
-use actq_deploy::{Answers, Bundle, Plan, Reading, Reference, read};
+use actq_deploy::{Answers, Bundle, Deployment, Plan, Reading, Reference, Runner, read};
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -58,6 +58,9 @@ pub(crate) fn asked(reading: &Reading) -> Vec<&str> {
     reading.questions.iter().map(|question| question.key.as_str()).collect()
 }
 
+/// The observation of a tick, and its targets, one after the other.
+pub(crate) type Tick = (Vec<f64>, Vec<f64>);
+
 /// A bundle that a test writes.
 pub(crate) struct Made(TempDir);
 
@@ -89,5 +92,27 @@ impl Made {
 
     pub(crate) fn reading(&self, accepted: bool, answers: &str) -> Result<Reading> {
         read(&self.bundle()?, accepted, Answers::parse(answers)?)
+    }
+
+    /// Runs a bundle that has no questions besides `answers`, and of which an image can be made. `raw` gives an input's values by its
+    /// name, its length and the tick.
+    pub(crate) fn run(
+        &self,
+        answers: &str,
+        ticks: usize,
+        mut raw: impl FnMut(&str, usize, usize) -> Vec<f64>,
+    ) -> Result<Vec<Tick>> {
+        let reading = self.reading(true, answers)?;
+        ensure!(reading.questions.is_empty() && reading.unread.is_empty(), "{reading:#?}");
+        let plan = Plan::new(&reading.description, &self.bundle()?)?;
+        Deployment::new("policy", 50.0, &plan).context("an image of it")?;
+        let mut runner = Runner::new(plan);
+        let inputs = runner.plan().inputs().to_vec();
+        let step = |tick: usize| {
+            let given: Vec<Vec<f64>> = inputs.iter().map(|(name, len)| raw(name, *len, tick)).collect();
+            let made = runner.step(&given);
+            (made.observation, made.targets.into_iter().flat_map(|(_, values)| values).collect())
+        };
+        Ok((0..ticks).map(step).collect())
     }
 }
