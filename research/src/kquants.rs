@@ -205,8 +205,7 @@ impl Block {
     }
 
     fn error(&self, weights: &[f32], importance: &[f64]) -> f64 {
-        let errors = self.weights().into_iter().zip(weights).map(|(q, w)| f64::from(q - w).powi(2));
-        errors.zip(importance).map(|(error, h)| error * h).sum()
+        fit::error(weights, &self.weights(), importance)
     }
 
     fn weights(&self) -> Vec<f32> {
@@ -225,12 +224,8 @@ mod tests {
     use actq::random::Random;
     use actq_kernels::layout::Width;
 
+    use super::fit::error;
     use super::*;
-
-    fn error(weights: &[f32], rounded: &[f32], importance: &[f64]) -> f64 {
-        let terms = weights.iter().zip(rounded).zip(importance);
-        terms.map(|((w, q), h)| h * f64::from(q - w).powi(2)).sum()
-    }
 
     #[test]
     fn bits_per_weight_match_the_formats() {

@@ -17,6 +17,7 @@ mod tests;
 mod thinning;
 
 pub use arrays::arrays;
+pub(crate) use dataset::mean_and_variance;
 pub use dataset::{Dataset, Sizes};
 pub use joined::{Learned, MOST_FRAMES, Share, joined, longest_piece};
 pub use npy::npy_header;

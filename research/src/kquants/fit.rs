@@ -35,6 +35,12 @@ pub(super) fn least_squares(terms: impl Iterator<Item = Term>) -> (f64, f64) {
     (if aa > 0.0 { wa / aa } else { 0.0 }, 0.0)
 }
 
+/// Returns the weighted squared error of `rounded` weights.
+pub(super) fn error(weights: &[f32], rounded: &[f32], importance: &[f64]) -> f64 {
+    let errors = rounded.iter().zip(weights).map(|(q, w)| f64::from(q - w).powi(2));
+    errors.zip(importance).map(|(error, h)| error * h).sum()
+}
+
 /// Returns the codes nearest to the weights for `weight = s code - m`, and their weighted squared error.
 pub(super) fn codes(
     weights: &[f32],

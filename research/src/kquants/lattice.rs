@@ -202,8 +202,7 @@ impl Block {
     }
 
     fn error(&self, weights: &[f32], importance: &[f64]) -> f64 {
-        let errors = self.weights().into_iter().zip(weights).map(|(q, w)| f64::from(q - w).powi(2));
-        errors.zip(importance).map(|(error, h)| error * h).sum()
+        fit::error(weights, &self.weights(), importance)
     }
 
     fn weights(&self) -> Vec<f32> {

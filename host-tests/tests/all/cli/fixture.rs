@@ -47,6 +47,16 @@ impl Fixture {
         Ok(fixture)
     }
 
+    /// The same with a recording long enough to learn from.
+    pub(super) fn with_long_recording() -> Result<Self> {
+        let fixture = Self::new()?;
+        let random = &mut Random::new(8);
+        let obs = Array3::from_shape_simple_fn((1, 300, OBS), || 2.0 * random.unit());
+        fs::remove_file(fixture.policy().join("calib.npz"))?;
+        write_npy(&fixture.policy().join("calib.npy"), &obs)?;
+        Ok(fixture)
+    }
+
     pub(super) fn policy(&self) -> PathBuf {
         self.0.path().join("policy")
     }

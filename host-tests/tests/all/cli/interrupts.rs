@@ -8,21 +8,9 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use actq_bench::command::{actq, binary};
-use actq_bench::golden::Random;
 use anyhow::{Result, ensure};
-use ndarray::Array3;
 
-use super::fixture::{Fixture, OBS, text, write_npy};
-
-/// A policy with a recording long enough to learn from.
-fn fixture() -> Result<Fixture> {
-    let fixture = Fixture::new()?;
-    let random = &mut Random::new(8);
-    let obs = Array3::from_shape_simple_fn((1, 300, OBS), || 2.0 * random.unit());
-    fs::remove_file(fixture.policy().join("calib.npz"))?;
-    write_npy(&fixture.policy().join("calib.npy"), &obs)?;
-    Ok(fixture)
-}
+use super::fixture::{Fixture, text};
 
 /// Waits for a condition which shows that the command is at work.
 fn wait_for(child: &mut Child, is_so: impl Fn() -> Result<bool>) -> Result<()> {
@@ -44,7 +32,7 @@ fn send(signal: &str, child: &Child) -> Result<()> {
 #[cfg(target_os = "linux")]
 #[test]
 fn signals_leave_no_file_and_set_the_status() -> Result<()> {
-    let fixture = fixture()?;
+    let fixture = Fixture::with_long_recording()?;
     let out = fixture.out("image.actq");
     fs::write(&out, "an image that is in use")?;
     let before = fixture.snapshot()?;
@@ -83,7 +71,7 @@ fn names(folder: &Path) -> Result<Vec<String>> {
 
 #[test]
 fn a_signal_ends_all_processes_of_the_drive() -> Result<()> {
-    let fixture = fixture()?;
+    let fixture = Fixture::with_long_recording()?;
     let drive = "(sleep 60; touch survived) & touch started; wait";
     let child = start_tune(&fixture, actq(&[]), drive)?;
     send("TERM", &child)?;
@@ -97,7 +85,7 @@ fn a_signal_ends_all_processes_of_the_drive() -> Result<()> {
 /// Like a robot's driver, which disarms it at the end.
 #[test]
 fn a_drive_may_handle_the_signal() -> Result<()> {
-    let fixture = fixture()?;
+    let fixture = Fixture::with_long_recording()?;
     let drive = "trap 'touch disarmed; exit' TERM; touch started; while :; do sleep 0.01; done";
     let child = start_tune(&fixture, actq(&[]), drive)?;
     send("TERM", &child)?;
@@ -111,7 +99,7 @@ fn a_drive_may_handle_the_signal() -> Result<()> {
 #[cfg(target_os = "linux")]
 #[test]
 fn an_ignored_signal_stays_ignored() -> Result<()> {
-    let fixture = fixture()?;
+    let fixture = Fixture::with_long_recording()?;
     let mut command = Command::new("env");
     command.args(["--ignore-signal=HUP".as_ref(), binary()?.as_os_str()]);
     let child = start_tune(&fixture, command, "touch started; while :; do sleep 0.01; done")?;

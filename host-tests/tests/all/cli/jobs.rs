@@ -9,12 +9,11 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use actq_bench::command::{actq, binary, failed, run, succeeded};
-use actq_bench::{golden::Random, root};
+use actq_bench::root;
 use anyhow::{Context as _, Result, ensure};
-use ndarray::Array3;
 use serde_json::Value;
 
-use super::fixture::{Fixture, OBS, write_npy};
+use super::fixture::Fixture;
 use crate::folder::snapshot;
 
 /// A simulator of short episodes, whose observations depend on the seed.
@@ -57,12 +56,7 @@ struct Sweep(Fixture);
 
 impl Sweep {
     fn new() -> Result<Self> {
-        let fixture = Fixture::new()?;
-        let random = &mut Random::new(8);
-        let obs = Array3::from_shape_simple_fn((1, 300, OBS), || 2.0 * random.unit());
-        fs::remove_file(fixture.policy().join("calib.npz"))?;
-        write_npy(&fixture.policy().join("calib.npy"), &obs)?;
-        let sweep = Self(fixture);
+        let sweep = Self(Fixture::with_long_recording()?);
         fs::write(sweep.folder()?.join("simulator.sh"), SIMULATOR)?;
         fs::write(sweep.folder()?.join("sweep.toml"), SPEC)?;
         Ok(sweep)

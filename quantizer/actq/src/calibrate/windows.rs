@@ -5,7 +5,7 @@ use ndarray::{Array2, Axis, s};
 use rayon::prelude::*;
 
 use super::widening::{MEMORY, Widening};
-use crate::data::Dataset;
+use crate::data::{Dataset, mean_and_variance};
 use crate::graph::{Graph, Network, State, Weights, start_state, zero_state};
 use crate::random::Random;
 
@@ -259,16 +259,7 @@ fn last(episode: &mut Array2<f32>, steps: usize) {
 /// Returns the variance of every column over all rows of all arrays.
 fn column_variances(arrays: &[Array2<f32>]) -> Vec<f64> {
     let cols = arrays.first().map_or(0, Array2::ncols);
-    let rows = arrays.iter().map(Array2::nrows).sum::<usize>().max(1) as f64;
-    let mean = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
-        let mut sums = vec![0f64; cols];
-        for row in arrays.iter().flat_map(|a| a.rows()) {
-            sums.iter_mut().zip(row).enumerate().for_each(|(i, (sum, v))| *sum += f(i, f64::from(*v)));
-        }
-        sums.iter().map(|s| s / rows).collect()
-    };
-    let means = mean(&|_, v| v);
-    mean(&|i, v| (v - means[i]).powi(2))
+    mean_and_variance(cols, || arrays.iter().flat_map(|array| array.rows())).1
 }
 
 /// Returns the root of a variance as f32, with the same digits in any unit: f32 holds no squares from 1e20 on.

@@ -273,3 +273,22 @@ fn lengths(array: &Tensor, episodes: usize, steps: usize) -> Result<Vec<usize>> 
     };
     numbers.into_iter().enumerate().map(one).collect()
 }
+
+/// Returns the mean and the variance of each of the `values` in rows; zeros without rows. The sums are in f64, in the order of
+/// the rows.
+pub(crate) fn mean_and_variance<'a, R: Iterator<Item = ArrayView1<'a, f32>>>(
+    values: usize,
+    rows: impl Fn() -> R,
+) -> (Vec<f64>, Vec<f64>) {
+    let count = rows().count().max(1) as f64;
+    let mean_of = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
+        let mut sums = vec![0.0; values];
+        for row in rows() {
+            sums.iter_mut().zip(row).enumerate().for_each(|(i, (sum, v))| *sum += f(i, f64::from(*v)));
+        }
+        sums.into_iter().map(|sum| sum / count).collect()
+    };
+    let mean = mean_of(&|_, v| v);
+    let variance = mean_of(&|i, v| (v - mean[i]).powi(2));
+    (mean, variance)
+}

@@ -9,7 +9,7 @@ use std::collections::{BinaryHeap, HashSet};
 
 use ndarray::ArrayView1;
 
-use super::dataset::Dataset;
+use super::dataset::{Dataset, mean_and_variance};
 
 /// A frame of one of several recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,16 +121,7 @@ impl Grid {
     /// Makes a grid with cells one standard deviation wide.
     fn of(parts: &[Dataset]) -> Self {
         let values = parts.first().map_or(0, |part| part.obs.dim().2);
-        let frames = parts.iter().map(Dataset::frames).sum::<usize>().max(1) as f64;
-        let mean_of = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
-            let mut sums = vec![0.0; values];
-            for observation in observations(parts) {
-                sums.iter_mut().zip(observation).enumerate().for_each(|(i, (sum, v))| *sum += f(i, f64::from(*v)));
-            }
-            sums.into_iter().map(|sum| sum / frames).collect()
-        };
-        let mean = mean_of(&|_, v| v);
-        let variance = mean_of(&|i, v| (v - mean[i]).powi(2));
+        let (mean, variance) = mean_and_variance(values, || observations(parts));
         Self { cells: variance.into_iter().map(|v| if v > 0.0 { v.sqrt().recip() } else { 0.0 }).collect(), mean }
     }
 
