@@ -49,9 +49,12 @@ pub fn write(path: &Path, key: &SigningKey) -> Result<()> {
     let file = options.open(path);
     let mut file =
         file.with_context(|| format!("{name}: cannot create the key's file; an existing file is never replaced"))?;
-    file.write_all(pem.as_bytes())
-        .and_then(|()| file.sync_all())
-        .with_context(|| format!("{name}: cannot write the file"))
+    let written = file.write_all(pem.as_bytes()).and_then(|()| file.sync_all());
+    if written.is_err() {
+        // It is this call's own, and would block the next try.
+        drop(std::fs::remove_file(path));
+    }
+    written.with_context(|| format!("{name}: cannot write the file"))
 }
 
 /// Reads a private key: PKCS #8 as PEM, as `actq keygen` or `openssl genpkey -algorithm ed25519` writes it.

@@ -4,6 +4,7 @@ pub mod jobs;
 pub(crate) mod link;
 mod values;
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use actq::methods::{Effort, Method};
@@ -338,7 +339,7 @@ pub(crate) struct InspectArgs {
     /// The image
     pub(crate) image: PathBuf,
     /// The processor's clock, in Hz or as 168M
-    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = clock)]
+    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = clock, conflicts_with = "widths")]
     pub(crate) clock: f64,
     /// Print the predicted time of every operation and of the step as one JSON object
     #[arg(long, conflicts_with = "widths")]
@@ -392,7 +393,7 @@ pub(crate) struct DeployArgs {
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) recordings: Vec<PathBuf>,
     /// Fail if a target's NMSE over the reference is above this number
-    #[arg(long, value_name = "NMSE")]
+    #[arg(long, value_name = "NMSE", value_parser = positive, requires = "reference")]
     pub(crate) max_nmse: Option<f64>,
     #[command(flatten)]
     pub(crate) budget: BudgetArgs,
@@ -429,8 +430,8 @@ pub(crate) struct ExportCArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) golden: Option<PathBuf>,
     /// Observations of the golden run, at most
-    #[arg(long, default_value_t = 100, value_name = "N")]
-    pub(crate) steps: usize,
+    #[arg(long, default_value = "100", value_name = "N", requires = "golden")]
+    pub(crate) steps: NonZeroUsize,
 }
 
 #[derive(clap::Args)]
@@ -441,7 +442,7 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]
     pub(crate) reference: (PathBuf, PathBuf),
     /// Fail if a target's NMSE is above this number
-    #[arg(long, value_name = "NMSE")]
+    #[arg(long, value_name = "NMSE", value_parser = positive)]
     pub(crate) max_nmse: Option<f64>,
 }
 

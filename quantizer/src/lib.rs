@@ -46,7 +46,9 @@ pub fn run_work(work: impl FnOnce() -> Result<()>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("actq: {}", printable(&format!("{error:#}")));
+            let text = format!("{error:#}");
+            let lines: Vec<String> = text.trim_end().split('\n').map(|line| printable(line).to_string()).collect();
+            eprintln!("actq: {}", lines.join("\n"));
             match error.downcast_ref::<JobError>() {
                 Some(JobError { again: true, .. }) => AGAIN.into(),
                 _ => ExitCode::FAILURE,

@@ -32,7 +32,7 @@ fn suggest(error: &mut Error) {
 /// Returns the nearest option of the subcommand, if it differs by at most [`MOST_TYPOS`] letters.
 fn nearest(given: &str) -> Option<String> {
     let mut command = Cli::command();
-    for word in env::args().skip(1) {
+    for word in env::args_os().skip(1) {
         command = command.find_subcommand(&word).cloned().unwrap_or(command);
     }
     let longs = command.get_arguments().filter_map(|arg| arg.get_long());

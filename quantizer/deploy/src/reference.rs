@@ -6,7 +6,7 @@ use std::fmt;
 use std::path::Path;
 
 use actq::data::arrays;
-use actq::error::{Context as _, Error, Result, ensure};
+use actq::error::{Context as _, Error, Result, bail, ensure};
 
 use crate::conventions::{Variant, variants};
 use crate::description::Description;
@@ -124,6 +124,13 @@ impl Reference {
         ensure!(!expected.is_empty(), "{}: it has none of the arrays {}", expect.display(), KINDS.join(", "));
         let named = expected.iter().map(|(name, array)| (*name, array));
         ticks(named, Some(raw.ticks)).with_context(|| expect.display().to_string())?;
+        for (kind, array) in &expected {
+            let row = array.values.len() / raw.ticks.max(1);
+            if let Some(i) = array.values.iter().position(|value| !value.is_finite()) {
+                let (value, tick) = (array.values[i], i / row.max(1));
+                bail!("{}: array {kind:?} is {value} at tick {tick}, value {}", expect.display(), i % row.max(1));
+            }
+        }
         Ok(Self { raw, expected })
     }
 

@@ -42,7 +42,9 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     };
     note(deployment::unread(&reading.unread));
 
-    let Gathered { mut files, inputs } = Gathered::of(&bundle, &reading)?;
+    let Gathered { mut files, mut inputs } = Gathered::of(&bundle, &reading)?;
+    inputs.extend(args.calib.iter().chain(&args.reading.answers).cloned());
+    inputs.extend(args.reading.reference.iter().flat_map(|(raw, expect)| [raw, expect]).cloned());
     if let Some(raw) = &args.calib {
         files.push(("calib.npz".to_owned(), calibration(&reading.description, &bundle, raw)?));
     }
@@ -61,15 +63,35 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     print(&format!("written   {}\n", written.join(", ")))
 }
 
-/// Reads a bundle with the answers of a file and of the terminal.
-fn answered(bundle: &Bundle, args: &ReadingArgs) -> Result<Reading> {
-    let answers = match &args.answers {
+/// Checks a description that stays from an import before: its bundle and answers must be readable, and it must agree with the
+/// reference, if there is one.
+pub(crate) fn check_kept(bundle: &Path, policy: &Path, args: &ReadingArgs) -> Result<()> {
+    Bundle::open(bundle)?;
+    read_answers(args)?;
+    if let Some((raw, expect)) = &args.reference {
+        let path = policy.join(DESCRIPTION);
+        let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let description = Description::parse(&text).with_context(|| path.display().to_string())?;
+        let kept = Bundle::open(policy)?;
+        let plan = Plan::new(&description, &kept).with_context(|| path.display().to_string())?;
+        print(&compare(&description, plan, &kept, &Reference::read(raw, expect)?)?)?;
+    }
+    Ok(())
+}
+
+fn read_answers(args: &ReadingArgs) -> Result<Answers> {
+    match &args.answers {
         Some(path) => {
             let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
-            Answers::parse(&text).with_context(|| path.display().to_string())?
+            Ok(Answers::parse(&text).with_context(|| path.display().to_string())?)
         }
-        None => Answers::default(),
-    };
+        None => Ok(Answers::default()),
+    }
+}
+
+/// Reads a bundle with the answers of a file and of the terminal.
+fn answered(bundle: &Bundle, args: &ReadingArgs) -> Result<Reading> {
+    let answers = read_answers(args)?;
     if !args.ask {
         let reading = read(bundle, args.accept_profile, answers)?;
         if !reading.questions.is_empty() {

@@ -39,6 +39,7 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
     if description.exists() {
         // It may have been edited.
         print(&format!("{}: kept; remove the folder to import the bundle again\n", description.display()))?;
+        bundle::check_kept(&args.bundle, &policy, &args.reading)?;
     } else {
         bundle::run(&ImportArgs {
             model: args.bundle.clone(),

@@ -1,12 +1,16 @@
 //! `actq eval`
 
+use std::path::Path;
+
 use actq::data::{Range, Recording, Sizes, files_of};
 use actq::measure::{eval, own};
+use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
+use actq_kernels::Image;
 use anyhow::{Context as _, Result, ensure};
 
 use crate::args::EvalArgs;
-use crate::importers::load;
+use crate::importers::{load, source_files};
 use crate::report::notes::activation_share;
 use crate::terminal::{Progress, note, print};
 
@@ -22,7 +26,7 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
     let policy = args.policy.as_deref();
     let driven = files_of(&args.driven)?;
     let _progress = Progress::new(args.quiet, "running the image over the recordings")?;
-    let source = policy.and_then(|dir| load(dir).ok()).filter(|policy| policy.digest == image.digest());
+    let source = policy.map(|dir| source_of(dir, &image)).transpose()?.flatten();
     let dataset = eval::heldout_from(policy, args.heldout.as_deref(), source.as_ref(), &image)?;
     let report = eval::evaluate(image, &dataset)?;
     let own = (!driven.is_empty()).then(|| own::own_path(image, &driven, source.as_ref())).transpose()?;
@@ -60,4 +64,21 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
         report.bpw,
         report.bytes,
     ))
+}
+
+/// Returns the policy of a folder, if the image was made from it. A folder with recordings alone has none.
+fn source_of(dir: &Path, image: &Image<'_>) -> Result<Option<Policy>> {
+    if !source_files(dir).iter().any(|file| file.exists()) {
+        ensure!(dir.exists(), "{}: there is no such folder", dir.display());
+        return Ok(None);
+    }
+    let policy = load(dir)?;
+    if policy.digest != image.digest() {
+        note([format!(
+            "{}: the image was made from another policy; only recorded actions are compared",
+            dir.display()
+        )]);
+        return Ok(None);
+    }
+    Ok(Some(policy))
 }

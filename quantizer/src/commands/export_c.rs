@@ -16,7 +16,7 @@ use crate::terminal::{print, reserve};
 pub(crate) fn run(args: &ExportCArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
-    let golden = args.golden.as_deref().map(|recording| (recording, args.steps));
+    let golden = args.golden.as_deref().map(|recording| (recording, args.steps.get()));
     let paths = export(image, buffer.bytes(), &args.out, &args.name, golden, Some(&args.image))?;
     let list: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     print(&format!("{}\n", list.join("\n")))
@@ -50,11 +50,14 @@ fn replay(image: Image<'_>, recording: &Path, steps: usize) -> Result<Golden> {
     let recording = Dataset::load(recording, Sizes::of_image(&image))?;
     let mut golden = Golden { observations: Vec::new(), actions: Vec::new() };
     with_head::<_, anyhow::Error>(image, |head| {
-        for observation in recording.episode(0).take(steps) {
-            golden.actions.extend(head.step(&observation)?.iter().map(|value| value.to_bits()));
+        for row in recording.episode(0).take(steps) {
+            // The noise of an iterative head follows the observation; the image makes its own.
+            let observation = &row[..image.obs_len()];
+            golden.actions.extend(head.step(observation)?.iter().map(|value| value.to_bits()));
             golden.observations.extend(observation);
         }
         Ok(())
     })?;
+    ensure!(!golden.actions.is_empty(), "{}: its first episode is empty", recording.name());
     Ok(golden)
 }

@@ -1,7 +1,7 @@
 //! `actq sweep`
 
 use std::env;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use actq::data::{Recording, Recordings, Sizes, files_of};
 use actq_jobs::host::Host;
@@ -11,10 +11,11 @@ use actq_jobs::spec::Spec;
 use actq_jobs::store::Store;
 use anyhow::{Context as _, Result, ensure};
 
-use super::jobs::pool::{Pool, complete};
+use super::jobs::pool::{Pool, append, complete};
 use super::jobs::{merge, plan as plans};
 use crate::args::SweepArgs;
 use crate::importers::{learned, load, policy_files};
+use crate::outputs::files;
 use crate::outputs::unfinished::Scratch;
 use crate::report::notes;
 use crate::terminal::{Progress, note, reserve};
@@ -28,18 +29,26 @@ const BPW: [f64; 4] = [2.0, 2.5, 3.0, 4.0];
 pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> {
     let spec = spec_of(args, methods)?;
     let calib = files_of(&args.calib)?;
-    let inputs = match spec {
-        Some(spec) => vec![spec.to_owned()],
-        None => {
+    let spec_jobs = spec.map(|spec| plans::read(spec, host)).transpose()?;
+    let inputs: Vec<PathBuf> = match (spec, &spec_jobs) {
+        (Some(spec), Some(jobs)) => plans::inputs(spec, jobs),
+        _ => {
             let folders = args.policy_dirs.iter().flat_map(|dir| policy_files(dir));
             folders.chain(calib).chain(args.heldout.clone()).collect()
         }
     };
+    if let Some(store) = &args.pool.store {
+        merge::refuse_inside(store, args.svg.iter().chain(&args.json).chain(&args.pool.log))?;
+    }
+    if let Some(log) = &args.pool.log {
+        files::refuse_input(log, &inputs)?;
+        append(log, "")?;
+    }
     let outputs = reserve(args.svg.iter().chain(&args.json), inputs)?;
     let cores = if args.run.threads == 0 { allocation() } else { args.run.threads.into() };
     let progress = Progress::new(args.run.quiet, "planning")?;
-    let jobs = match spec {
-        Some(spec) => plans::read(spec, host)?,
+    let jobs = match spec_jobs {
+        Some(jobs) => jobs,
         None => planned(args, methods, cores, host)?,
     };
     drop(progress);

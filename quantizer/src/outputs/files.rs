@@ -93,21 +93,29 @@ pub struct Outputs(Vec<Output>);
 /// and one that cannot be written. An input that does not exist counts, too: the next run would read a file of its
 /// name.
 pub fn reserve(outputs: &[&Path], inputs: &[PathBuf]) -> Result<Outputs> {
-    let inputs: Vec<(Identity, &PathBuf)> = inputs.iter().filter_map(|path| Some((identity(path)?, path))).collect();
     let mut before: Vec<(Identity, &Path)> = Vec::new();
     for &output in outputs {
         place(output).with_context(|| cannot_write(output))?;
+        refuse_input(output, inputs)?;
         let Some(own) = identity(output) else { continue };
         let name = output.display();
-        if let Some((_, input)) = inputs.iter().find(|(input, _)| *input == own) {
-            bail!("{name}: is the same file as {}, an input; choose another output", input.display());
-        }
         if let Some((_, other)) = before.iter().find(|(other, _)| *other == own) {
             bail!("{name}: is the same file as {}, another output; choose another file", other.display());
         }
         before.push((own, output));
     }
     outputs.iter().map(|path| Output::new(path)).collect::<Result<_>>().map(Outputs)
+}
+
+/// Refuses an output that is one of the inputs, under any name.
+pub fn refuse_input(output: &Path, inputs: &[PathBuf]) -> Result<()> {
+    let Some(own) = identity(output) else { return Ok(()) };
+    match inputs.iter().find(|input| identity(input).is_some_and(|input| input == own)) {
+        Some(input) => {
+            bail!("{}: is the same file as {}, an input; choose another output", output.display(), input.display())
+        }
+        None => Ok(()),
+    }
 }
 
 impl Outputs {

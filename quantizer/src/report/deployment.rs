@@ -54,6 +54,9 @@ pub fn agreement(comparison: &Comparison) -> String {
     )
 }
 
+/// Largest error of a target's value that never varies, of 1 plus its magnitude.
+const CONSTANT: f64 = 1e-4;
+
 /// Error of a target over a reference.
 pub(crate) struct Target {
     name: String,
@@ -84,6 +87,9 @@ impl Target {
             }
             if energy > 0.0 {
                 (sum, count) = (sum + error / energy, count + 1);
+            } else if error > found.len() as f64 * (CONSTANT * (1.0 + mean.abs())).powi(2) {
+                // It has no variance to compare with, but is wrong.
+                (sum, count) = (f64::INFINITY, count + 1);
             }
         }
         Self { name: name.to_owned(), nmse: sum / f64::from(count.max(1)), largest, at }

@@ -104,7 +104,7 @@ pub fn error_warning(check: &Check) -> Option<String> {
     (nmse.is_nan() || nmse > USELESS).then(|| {
         format!(
             "the error is {nmse:.2} (0: the policy's actions, 1: no better than their mean): do not drive a robot with this image; allow \
-             more bits (--bpw, --flash), record more steps for --calib, or try --activations int16"
+             more bits (--bpw, --flash), record more steps for --calib, or try --activations 16"
         )
     })
 }

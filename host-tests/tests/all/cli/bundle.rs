@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 use actq::data::{NpzWriter, arrays};
 use actq_bench::command::{actq, failed, run, succeeded};
@@ -154,6 +154,23 @@ fn a_bundle_becomes_a_description_and_an_image() -> Result<()> {
     ensure!(report.contains("12 ticks"), "{report}");
     let exact = run(actq(&[&check[..], &["1e-12"]].concat()), b"")?;
     failed(&exact, 1, &["above 0.000000000001; quantize at more bits"])?;
+    // A target without a variance has an error, too, and one that is no number is refused.
+    let against = |value: f64| -> Result<Output> {
+        let mut npz = NpzWriter::new(File::create(robot.path("other.npz"))?);
+        npz.array("target", &[TICKS, 2], (0..2 * TICKS).map(|_| value))?;
+        npz.finish()?;
+        let other = format!("{}:{}", text(&robot.path("raw.npz")), text(&robot.path("other.npz")));
+        run(actq(&["check", &image, "--reference", &other, "--max-nmse", "1e-3"]), b"")
+    };
+    failed(&against(1000.0)?, 1, &["NMSE is inf"])?;
+    failed(&against(f64::NAN)?, 1, &["other.npz: array \"target\" is NaN at tick 0, value 0"])?;
+    failed(&run(actq(&[&check[..], &["inf"]].concat()), b"")?, 2, &["use a number above 0"])?;
+    // The raw values are an input that no output replaces.
+    fs::copy(robot.path("raw.npz"), robot.path("again/calib.npz"))?;
+    let raw = text(&robot.path("again/calib.npz"));
+    let forced = run(robot.import("again", &["--accept-profile", "--calib", &raw, "--force"]), b"")?;
+    failed(&forced, 1, &["is the same file as"])?;
+    ensure!(fs::read(robot.path("again/calib.npz"))? == fs::read(robot.path("raw.npz"))?, "the raw values are lost");
 
     // A recording of raw values makes what the network learns from.
     let recording = recording(&robot)?;
@@ -207,6 +224,14 @@ fn deploy_makes_everything_and_keeps_what_is_made() -> Result<()> {
         let source = fs::read_to_string(robot.path("deployed").join(file))?;
         ensure!(source.contains(part), "{part} is not in {file}:\n{source}");
     }
+    // A description that is kept is compared with the reference, and its bundle must be there.
+    expect(&robot.path("wrong.npz"), true)?;
+    let wrong = format!("{}:{}", text(&robot.path("raw.npz")), text(&robot.path("wrong.npz")));
+    let line = ["deploy", &bundle, "--out", &out, "--accept-profile", "--recordings", &recording, "--steps", "5"];
+    failed(&run(actq(&[&line[..], &["--reference", &wrong]].concat()), b"")?, 1, &["differs"])?;
+    let gone = text(&robot.path("gone"));
+    failed(&run(actq(&[&["deploy", &gone], &line[2..]].concat()), b"")?, 1, &["gone"])?;
+    failed(&run(actq(&[&line[..], &["--max-nmse", "1"]].concat()), b"")?, 2, &["--reference"])?;
     // Another option makes another image.
     let report = succeeded(&run(actq(&[&all[..], &["--bpw", "20"]].concat()), b"")?)?;
     ensure!(!report.contains("made before") && fs::read(robot.path("deployed/policy.actq"))? != image, "{report}");

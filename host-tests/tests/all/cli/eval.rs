@@ -80,5 +80,9 @@ fn eval_labels_a_named_recording_by_its_policy() -> Result<()> {
     let all: Value = serde_json::from_str(&succeeded(&eval(&["--policy", &policy])?)?)?;
     assert_eq!(all["steps"], json!(EPISODES * STEPS));
     edit(&fixture.policy(), "/control_hz", json!(26))?;
-    failed(&eval(&["--policy", &policy])?, 1, &["heldout.npy: array \"action\" is missing"])
+    let edited = eval(&["--policy", &policy])?;
+    failed(&edited, 1, &["was made from another policy", "heldout.npy: array \"action\" is missing"])?;
+    fs::write(fixture.policy().join("policy.json"), "{broken")?;
+    failed(&eval(&["--policy", &policy])?, 1, &["policy.json"])?;
+    failed(&eval(&["--policy", &text(&fixture.out("none"))])?, 1, &["there is no such folder"])
 }

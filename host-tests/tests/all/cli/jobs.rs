@@ -155,6 +155,17 @@ fn options_are_a_spec_in_memory() -> Result<()> {
     let log = fs::read(sweep.folder()?.join("log"))?;
     ensure!(succeeded(&sweep.run(&format!("{line} c.json --store store --log log"), "")?)? == table);
     ensure!(fs::read(sweep.folder()?.join("log"))? == log, "a job with a result ran again");
+    // No output replaces what the jobs read, or a file of the store.
+    let policy = fs::read(sweep.folder()?.join("policy/policy.json"))?;
+    let log = format!("{line} d.json --store store --log policy/policy.json");
+    failed(&sweep.run(&log, "")?, 1, &["is the same file as", "an input"])?;
+    fs::write(sweep.folder()?.join("one.toml"), "policies = [\"policy\"]\nmethods = [\"rtn\"]\nbpw = [4]\n")?;
+    let over = sweep.run("sweep one.toml --store one --quiet --json policy/policy.json", "")?;
+    failed(&over, 1, &["is the same file as", "an input"])?;
+    ensure!(fs::read(sweep.folder()?.join("policy/policy.json"))? == policy, "the policy has changed");
+    succeeded(&sweep.run("sweep one.toml --store one --quiet", "")?)?;
+    failed(&sweep.run("merge one.toml --store one --json one/store.json", "")?, 1, &["store.json: is in the store"])?;
+    succeeded(&sweep.run("merge one.toml --store one", "")?)?;
     // A spec of the same options has the same jobs; more budgets run in the same store.
     let spec = "policies = [\"policy\"]\nmethods = [\"rtn\", \"distill\"]\nbpw = [4, 5]\nsteps = 2\n";
     fs::write(sweep.folder()?.join("same.toml"), spec)?;

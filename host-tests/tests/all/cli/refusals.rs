@@ -123,6 +123,14 @@ fn a_misspelt_option_gets_a_suggestion() -> Result<()> {
         let answer = format!("a similar argument exists: '{meant}'");
         (line.join(" "), run(actq(line), b"").and_then(|output| failed(&output, 2, &[&answer])))
     }))?;
+    // A name that is no text does not hide the wrong option.
+    #[cfg(unix)]
+    {
+        let mut command = actq(&["inspect"]);
+        let name: &std::ffi::OsStr = std::os::unix::ffi::OsStrExt::from_bytes(b"x\xff");
+        command.arg(name).arg("--jsno");
+        failed(&run(command, b"")?, 2, &["'--json'"])?;
+    }
     // An option of another command is not an option of this one.
     let output = run(actq(&["inspect", "x", "--bwp", "2"]), b"")?;
     ensure!(!String::from_utf8_lossy(&output.stderr).contains("similar"), "{output:?}");

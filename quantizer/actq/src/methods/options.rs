@@ -173,6 +173,10 @@ impl Options {
             !self.relative || self.learns(),
             "--relative changes how method distill learns; remove it for other methods and for --steps 0"
         );
+        for (i, (name, width)) in self.forced.iter().enumerate() {
+            let other = self.forced[..i].iter().any(|(before, other)| before == name && other != width);
+            ensure!(!other, "{name:?} is given two widths by --width or --protect; remove one");
+        }
         ensure!(is_group(self.group), "group is {}; it must be 0 or one of {GROUPS:?}", self.group);
         Ok(())
     }
@@ -201,5 +205,21 @@ impl Options {
             seed: 1,
             forced: Vec::new(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_matrix_has_one_forced_width() {
+        let with = |forced: &[(&str, Width)]| {
+            let forced = forced.iter().map(|(name, width)| ((*name).to_owned(), *width)).collect();
+            Options { forced, ..Options::new(Method::Distill, Budget::BitsPerWeight(3.0)) }.check()
+        };
+        with(&[("a", Width::W2), ("b", Width::W8), ("a", Width::W2)]).expect("nothing contradicts");
+        let error = with(&[("a", Width::W2), ("b", Width::W8), ("a", Width::W8)]).expect_err("two widths").to_string();
+        assert_eq!(error, "\"a\" is given two widths by --width or --protect; remove one");
     }
 }

@@ -1,5 +1,8 @@
 //! `actq merge`
 
+use std::fs;
+use std::path::{Path, PathBuf};
+
 use actq_jobs::host::Host;
 use actq_jobs::job::Job;
 use actq_jobs::merged::Merged;
@@ -17,9 +20,10 @@ use crate::terminal::{print, reserve};
 
 /// Prints the results of a sweep.
 pub(crate) fn run(args: &MergeArgs) -> Result<()> {
-    let outputs = reserve(args.svg.iter().chain(&args.json), [&args.spec])?;
     let jobs = plan::read(&args.spec, &Command)?;
     let store = Store::open(&args.store, &Command)?;
+    refuse_inside(&args.store, args.svg.iter().chain(&args.json))?;
+    let outputs = reserve(args.svg.iter().chain(&args.json), plan::inputs(&args.spec, &jobs))?;
     let left = jobs.iter().filter(|job| job.work.kind() != "merge" && !store.has(&job.address)).count();
     ensure!(
         left == 0,
@@ -30,6 +34,20 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
         args.store.display()
     );
     report(&jobs, &store, &Command, outputs, args.svg.is_some(), args.json.is_some())
+}
+
+/// Refuses outputs among the files of a store.
+pub(crate) fn refuse_inside<'a>(store: &Path, outputs: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+    let whole = |path: &Path| fs::canonicalize(path).or_else(|_| std::path::absolute(path)).ok();
+    for output in outputs {
+        let folder = output.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+        ensure!(
+            whole(folder).is_none_or(|folder| Some(folder) != whole(store)),
+            "{}: is in the store; choose another folder",
+            output.display()
+        );
+    }
+    Ok(())
 }
 
 /// Prints the results of a plan that are in the store, and writes the outputs: a plot, then figures as JSON.

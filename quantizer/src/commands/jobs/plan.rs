@@ -1,7 +1,8 @@
 //! `actq plan`
 
+use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use actq_jobs::host::Host;
 use actq_jobs::job::Job;
@@ -23,6 +24,13 @@ pub(crate) fn run(args: &PlanArgs) -> Result<()> {
     }
     jobs.retain(|job| args.stage.is_none_or(|stage| job.stage == stage));
     print(&order::text(&jobs)?)
+}
+
+/// Returns the files that the jobs of a spec or plan read, and itself.
+pub(crate) fn inputs(spec: &Path, jobs: &[Job]) -> Vec<PathBuf> {
+    let files = jobs.iter().flat_map(|job| &job.inputs).map(|input| &input.path);
+    let files: BTreeSet<&PathBuf> = files.collect();
+    files.into_iter().cloned().chain([spec.to_owned()]).collect()
 }
 
 /// Plans a spec, or reads a plan.

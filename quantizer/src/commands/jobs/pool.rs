@@ -196,7 +196,8 @@ fn shell_status(status: std::process::ExitStatus) -> i32 {
     status.code().unwrap_or(1)
 }
 
-fn append(path: &Path, line: &str) -> Result<()> {
+/// Appends to a file, which is made if it does not exist.
+pub(crate) fn append(path: &Path, line: &str) -> Result<()> {
     let write = || OpenOptions::new().create(true).append(true).open(path)?.write_all(line.as_bytes());
     write().with_context(|| format!("{}: cannot write the file", path.display()))
 }
