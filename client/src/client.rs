@@ -74,9 +74,9 @@ impl Client {
             let sent = Instant::now();
             while sent.elapsed() < wait {
                 let (mut answer, events) = (None, &mut self.events);
-                self.connection.poll(|event| match answer.take().or_else(|| wanted(&event, &numbers)) {
-                    Some(found) => answer = Some(found),
-                    None => events.push_back(event),
+                self.connection.poll(|event| match wanted(&event, &numbers) {
+                    Some(found) if answer.is_none() => answer = Some(found),
+                    _ => events.push_back(event),
                 })?;
                 if let Some(answer) = answer {
                     return Ok(answer);
@@ -172,11 +172,19 @@ impl Client {
     ///
     /// Fails if the controller refuses, or without an answer.
     pub fn arm(&mut self) -> Result<()> {
-        // The controller refuses the token of a repeated request whose first answer was lost.
-        let outcome = self.with_token(|token| Message::Arm { token })?;
-        if !(outcome == Err(Refusal::Token) && self.status()?.state == State::Armed) {
-            outcome.context("not armed")?;
+        let mut outcome = Err(Refusal::Token);
+        for _ in 0..ATTEMPTS {
+            outcome = self.with_token(|token| Message::Arm { token })?;
+            if outcome != Err(Refusal::Token) {
+                break;
+            }
+            // The token of a repeated request whose first answer was lost, or one that has been renewed since.
+            if self.status()?.state == State::Armed {
+                outcome = Ok(());
+                break;
+            }
         }
+        outcome.context("not armed")?;
         // Earlier statuses describe the earlier state.
         self.events.retain(|event| !matches!(event, Event::Status(_)));
         Ok(())

@@ -97,9 +97,14 @@ def test_other_threads_run_during_a_step(image):
     head(rows)
     thread = threading.Thread(target=count)
     thread.start()
-    before = counted[0]
-    head(rows)
-    during = counted[0] - before
+    during = 0
+    for _ in range(100):
+        # A busy machine may give the other thread no core during one step.
+        before = counted[0]
+        head(rows)
+        during = max(during, counted[0] - before)
+        if during > 1000:
+            break
     stop.set()
     thread.join()
     assert during > 1000

@@ -33,7 +33,9 @@ fn start() -> Result<(Controller, NamedTempFile)> {
 fn link(controller: &Controller, words: &[&str], input: &[u8]) -> Result<Output> {
     let port = controller.address().to_string();
     let [command, more @ ..] = words else { anyhow::bail!("the command line is empty") };
-    run(actq(&[&["link", command, &port], more].concat()), input)
+    // QEMU may not run for seconds on a busy machine.
+    let patience: &[&str] = if more.contains(&"--timeout") { &[] } else { &["--timeout", "600"] };
+    run(actq(&[&["link", command, &port], more, patience].concat()), input)
 }
 
 /// The first observation of the image's self-test, and the bits of its action.

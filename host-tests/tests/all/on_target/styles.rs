@@ -46,8 +46,9 @@ fn every_style_has_at_most_sixty_lines() -> Result<()> {
 #[test]
 fn a_closed_output_ends_the_run() -> Result<()> {
     let mut command = qemu::command(&firmware::style("bare")?, None, "")?;
-    let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn()?;
-    drop(child.stdout.take());
+    let (reader, writer) = std::io::pipe()?;
+    drop(reader);
+    let mut child = command.stdin(Stdio::null()).stdout(writer).spawn()?;
     let begun = Instant::now();
     let status = loop {
         match child.try_wait()? {

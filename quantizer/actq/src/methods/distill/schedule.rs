@@ -183,7 +183,8 @@ mod tests {
             std::thread::sleep(Duration::from_millis(1));
             schedule.took(1.0 / (schedule.steps() + 1) as f32);
         }
-        assert!((10..=50).contains(&schedule.steps()), "{}", schedule.steps());
+        // A busy machine takes fewer; a sleep is never shorter than asked.
+        assert!((1..=50).contains(&schedule.steps()), "{}", schedule.steps());
     }
 
     #[test]
