@@ -1,14 +1,20 @@
 //! Requests over a good and a faulty line.
 
+use std::io::{Read as _, Write as _};
+use std::net::TcpListener;
 use std::sync::atomic::Ordering;
+use std::thread;
 use std::time::Duration;
 
 use actq_client::client::Client;
+use actq_client::connection::Connection;
+use actq_client::event::Event;
 use actq_client::port::Address;
 use actq_controller::Output;
 use actq_controller::slots::Anyone;
 use actq_link::code::{Crash, Fault, Parameter, Refusal, ResetCause, State};
 use actq_link::report::BUILT_IN;
+use actq_link::{Message, Receiver, Sender, frame};
 
 use crate::simulated::{OBSERVATION, Simulated};
 
@@ -117,4 +123,40 @@ fn addresses_parse_as_displayed() {
         assert!(text.parse::<Address>().is_err(), "{text}");
     }
     actq_client::port::list().expect("the system lists its serial ports");
+}
+
+/// A controller that is late sends an answer and what follows it at once.
+#[test]
+fn events_behind_an_answer_are_kept() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let controller = thread::spawn(move || {
+        let (mut stream, _) = listener.accept().expect("the client opens the port");
+        let (mut receiver, mut byte) = (Receiver::<{ frame::bytes(64) }>::new(), [0]);
+        let of = loop {
+            stream.read_exact(&mut byte).expect("a request");
+            if let Some(received) = receiver.push(byte[0]) {
+                break received.sequence;
+            }
+        };
+        let (mut sender, mut bytes) = (Sender::new(1), Vec::new());
+        for of in [of, 1234] {
+            let answer = Message::Ack { of, refusal: None, written: 0 };
+            bytes.extend_from_slice(sender.frame(&answer, 0, &mut [0; 64]).expect("it fits"));
+        }
+        stream.write_all(&bytes).expect("the client reads");
+        // Until the client closes the port.
+        let _ = stream.read_to_end(&mut bytes);
+    });
+    let hang = Duration::from_secs(600);
+    let connection = Connection::open(Address::Tcp(address), hang).expect("the port is open");
+    let mut client = Client::new(connection, hang);
+    client.disarm().expect("it is acknowledged");
+    let mut events = Vec::new();
+    while events.is_empty() {
+        events.extend(client.events().expect("the port is open"));
+    }
+    assert!(matches!(events[..], [Event::Ack { of: 1234, .. }]), "{events:?}");
+    drop(client);
+    controller.join().expect("the controller ends");
 }
