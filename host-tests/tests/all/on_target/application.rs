@@ -255,15 +255,28 @@ fn a_hard_fault_leaves_its_address() -> Result<()> {
 #[test]
 fn a_stack_overflow_leaves_its_place() -> Result<()> {
     for target in BOARDS {
-        let (elf, crumb) = crumb_of(target, b's')?;
-        // The record must survive: its memory is the nearest below the stack.
-        assert_eq!((crumb.crash, crumb.count), (Some(Crash::StackOverflow), 1), "{target:?}");
-        let code = Code::read(&elf)?;
-        let holds = |f: &&Function| (f.address..f.address + f.size).contains(&crumb.pc.into());
-        let function = code.functions().iter().find(holds).with_context(|| format!("{target:?}: {crumb:?}"))?;
-        assert!(function.name.contains("recurse"), "{target:?}: {crumb:?} is in {}", function.name);
+        let mut place = overflow_place(target)?;
+        // A tick that interrupts one of the last calls finds the stack full itself.
+        for _ in 0..10 {
+            if place != "SysTick" {
+                break;
+            }
+            place = overflow_place(target)?;
+        }
+        assert!(place.contains("recurse"), "{target:?}: it is in {place}");
     }
     Ok(())
+}
+
+/// Makes the stack of a board overflow; returns the function at the place in the record.
+fn overflow_place(target: Target) -> Result<String> {
+    let (elf, crumb) = crumb_of(target, b's')?;
+    // The record must survive: its memory is the nearest below the stack.
+    assert_eq!((crumb.crash, crumb.count), (Some(Crash::StackOverflow), 1), "{target:?}");
+    let code = Code::read(&elf)?;
+    let holds = |f: &&Function| (f.address..f.address + f.size).contains(&crumb.pc.into());
+    let function = code.functions().iter().find(holds).with_context(|| format!("{target:?}: {crumb:?}"))?;
+    Ok(function.name.clone())
 }
 
 /// The stack has room for every call and every interrupt, and no frame skips the guard, 4 KB, on boards without a stack
