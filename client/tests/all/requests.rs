@@ -127,7 +127,7 @@ fn addresses_parse_as_displayed() {
 
 /// A controller that is late sends an answer and what follows it at once.
 #[test]
-fn events_behind_an_answer_are_kept() {
+fn events_after_an_answer_are_kept() {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let address = listener.local_addr().expect("an address").to_string();
     let controller = thread::spawn(move || {
