@@ -20,7 +20,7 @@ mod threads;
 
 use std::process::ExitCode;
 
-use actq::text::printable;
+use actq::text::printable_lines;
 use actq_jobs::error::{AGAIN, JobError};
 use anyhow::Result;
 
@@ -46,9 +46,7 @@ pub fn run_work(work: impl FnOnce() -> Result<()>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let text = format!("{error:#}");
-            let lines: Vec<String> = text.trim_end().split('\n').map(|line| printable(line).to_string()).collect();
-            eprintln!("actq: {}", lines.join("\n"));
+            eprintln!("actq: {}", printable_lines(format!("{error:#}").trim_end()));
             match error.downcast_ref::<JobError>() {
                 Some(JobError { again: true, .. }) => AGAIN.into(),
                 _ => ExitCode::FAILURE,

@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use actq::text::printable;
+use actq::text::{printable, printable_lines};
 use anyhow::{Context as _, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -46,8 +46,7 @@ pub(crate) fn note(notes: impl IntoIterator<Item = String>) {
 
 /// Prints a result. A reader that has closed its end (as `head` does) is not an error.
 pub(crate) fn print(text: &str) -> Result<()> {
-    let lines: Vec<_> = text.split('\n').map(printable).collect();
-    let text = lines.join("\n");
+    let text = printable_lines(text);
     let written = beside_bar(|| match STDOUT_IS_TAKEN.load(Ordering::Relaxed) {
         true => io::stderr().write_all(text.as_bytes()),
         false => io::stdout().write_all(text.as_bytes()),

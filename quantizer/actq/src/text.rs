@@ -29,6 +29,12 @@ pub fn quoted(word: &OsStr) -> Result<String> {
     Ok(format!("'{}'", text.replace('\'', "'\"'\"'")))
 }
 
+/// Returns text of several lines, each [`printable`].
+pub fn printable_lines(text: &str) -> String {
+    let lines: Vec<_> = text.split('\n').map(printable).collect();
+    lines.join("\n")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -125,10 +125,9 @@ impl Reference {
         let named = expected.iter().map(|(name, array)| (*name, array));
         ticks(named, Some(raw.ticks)).with_context(|| expect.display().to_string())?;
         for (kind, array) in &expected {
-            let row = array.values.len() / raw.ticks.max(1);
             if let Some(i) = array.values.iter().position(|value| !value.is_finite()) {
-                let (value, tick) = (array.values[i], i / row.max(1));
-                bail!("{}: array {kind:?} is {value} at tick {tick}, value {}", expect.display(), i % row.max(1));
+                let ((_, row), value) = (array.rows()?, array.values[i]);
+                bail!("{}: array {kind:?} is {value} at tick {}, value {}", expect.display(), i / row, i % row);
             }
         }
         Ok(Self { raw, expected })

@@ -69,11 +69,9 @@ pub(crate) fn check_kept(bundle: &Path, policy: &Path, args: &ReadingArgs) -> Re
     Bundle::open(bundle)?;
     read_answers(args)?;
     if let Some((raw, expect)) = &args.reference {
-        let path = policy.join(DESCRIPTION);
-        let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-        let description = Description::parse(&text).with_context(|| path.display().to_string())?;
         let kept = Bundle::open(policy)?;
-        let plan = Plan::new(&description, &kept).with_context(|| path.display().to_string())?;
+        let description = read(&kept, args.accept_profile, Answers::default())?.description;
+        let plan = Plan::new(&description, &kept).context(DESCRIPTION)?;
         print(&compare(&description, plan, &kept, &Reference::read(raw, expect)?)?)?;
     }
     Ok(())

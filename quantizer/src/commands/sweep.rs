@@ -29,6 +29,7 @@ const BPW: [f64; 4] = [2.0, 2.5, 3.0, 4.0];
 pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> {
     let spec = spec_of(args, methods)?;
     let calib = files_of(&args.calib)?;
+    let progress = Progress::new(args.run.quiet, "planning")?;
     let spec_jobs = spec.map(|spec| plans::read(spec, host)).transpose()?;
     let inputs: Vec<PathBuf> = match (spec, &spec_jobs) {
         (Some(spec), Some(jobs)) => plans::inputs(spec, jobs),
@@ -46,7 +47,6 @@ pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> 
     }
     let outputs = reserve(args.svg.iter().chain(&args.json), inputs)?;
     let cores = if args.run.threads == 0 { allocation() } else { args.run.threads.into() };
-    let progress = Progress::new(args.run.quiet, "planning")?;
     let jobs = match spec_jobs {
         Some(jobs) => jobs,
         None => planned(args, methods, cores, host)?,
