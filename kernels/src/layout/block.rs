@@ -216,7 +216,7 @@ impl<'a> Block<'a> {
         }
         let Cell { rows, cols, .. } = self.shape.layout().cell;
         let cell = self.cell(row, div_down(col, cols));
-        with_format!(self.shape, extract::<_>(&cell, row & (rows - 1), col & (cols - 1)))
+        with_format!(self.shape, extract::<_>(cell, row & (rows - 1), col & (cols - 1)))
     }
 
     /// Returns the words of the cell that holds `row` in unit `unit`.
@@ -250,6 +250,6 @@ impl<'a> Block<'a> {
 }
 
 #[cfg(feature = "writer")]
-fn extract<F: Format>(words: &[u32; 3], row: usize, col: usize) -> u8 {
+fn extract<F: Format>(words: [u32; 3], row: usize, col: usize) -> u8 {
     F::extract(words, row, col)
 }

@@ -20,12 +20,6 @@ pub struct W2;
 
 const _: () = assert!(W2::CELL.is_full(W2::WIDTH.bits()));
 
-/// Returns the first bit of a column's code in the word's ring of bits.
-#[cfg(feature = "writer")]
-const fn bit(col: usize) -> u32 {
-    (1 + 2 * (col as u32 / 2) + 16 * (col as u32 % 2)) % 32
-}
-
 impl Format for W2 {
     const WIDTH: Width = Width::W2;
     const CELL: Cell = Cell { rows: 1, cols: 16, words: 1 };
@@ -34,13 +28,8 @@ impl Format for W2 {
     const X: XLayout = XLayout::single(-3);
 
     #[cfg(feature = "writer")]
-    fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
-        words[0] |= (code as u32 & 3).rotate_left(bit(col));
-    }
-
-    #[cfg(feature = "writer")]
-    fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
-        (words[0].rotate_right(bit(col)) & 3) as u8
+    fn place(_row: usize, col: usize) -> (usize, usize, u32) {
+        (0, 1 + 2 * (col / 2) + 16 * (col % 2), 0)
     }
 
     #[inline(always)]

@@ -36,13 +36,6 @@ const _: () = assert!(W2Paired::CELL.is_full(W2Paired::WIDTH.bits()));
 const _: () = assert!(2 * 3 * 127 * 255 * (MAX_PAIRED_GROUPED as i64) < 1 << 31);
 const _: () = assert!(W2Paired::X.starts[0].factor.abs() * 127 * (W2Paired::X.chunk as i32) < 0x8000);
 
-/// Returns the first bit of a code in the word's ring of bits, and the offset that makes it signed.
-#[cfg(feature = "writer")]
-const fn field(row: usize, col: usize) -> (u32, u32) {
-    let bit = 4 * (col as u32 / 2) + 16 * (col as u32 % 2);
-    if row == 0 { (bit, 0) } else { ((bit + 14) % 32, 2) }
-}
-
 impl Format for W2Paired {
     const WIDTH: Width = Width::W2;
     const CELL: Cell = Cell { rows: 2, cols: 8, words: 1 };
@@ -59,15 +52,9 @@ impl Format for W2Paired {
     };
 
     #[cfg(feature = "writer")]
-    fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
-        let (bit, sign) = field(row, col);
-        words[0] |= (code as u32 & 3 ^ sign).rotate_left(bit);
-    }
-
-    #[cfg(feature = "writer")]
-    fn extract(words: &[u32; 3], row: usize, col: usize) -> u8 {
-        let (bit, sign) = field(row, col);
-        (words[0].rotate_right(bit) & 3 ^ sign) as u8
+    fn place(row: usize, col: usize) -> (usize, usize, u32) {
+        let bit = 4 * (col / 2) + 16 * (col % 2);
+        if row == 0 { (0, bit, 0) } else { (0, bit + 14, 2) }
     }
 
     #[inline(always)]

@@ -27,19 +27,6 @@ pub struct W3;
 
 const _: () = assert!(W3::CELL.is_full(W3::WIDTH.bits()));
 
-/// Returns the word and first bit of a column's code, for the pairs 0 to 14.
-#[cfg(feature = "writer")]
-const fn field(col: usize) -> (usize, u32) {
-    let (word, field) = (col / 2 / FIELDS, col / 2 % FIELDS);
-    (word, (word as u32 + 2 + 3 * field as u32 + 16 * (col as u32 % 2)) % 32)
-}
-
-/// Returns the spare bit of word `k` in the lane of `col`.
-#[cfg(feature = "writer")]
-const fn spare(k: usize, col: usize) -> u32 {
-    k as u32 + 1 + 16 * (col as u32 % 2)
-}
-
 impl Format for W3 {
     const WIDTH: Width = Width::W3;
     const CELL: Cell = Cell { rows: 1, cols: 32, words: 3 };
@@ -48,25 +35,22 @@ impl Format for W3 {
     const X: XLayout = XLayout::single(-7);
 
     #[cfg(feature = "writer")]
-    fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
-        if col / 2 < FIELDS * W3::CELL.words {
-            let (word, bit) = field(col);
-            words[word] |= (code as u32 & 7).rotate_left(bit);
-        } else {
-            for (k, word) in words.iter_mut().enumerate().take(W3::CELL.words) {
-                *word |= (code as u32 >> k & 1) << spare(k, col);
-            }
-        }
+    fn place(_row: usize, col: usize) -> (usize, usize, u32) {
+        let (word, field) = (col / 2 / FIELDS, col / 2 % FIELDS);
+        // The last pair is doubled.
+        let first = if word == W3::CELL.words { 1 } else { word + 2 + 3 * field };
+        (word, first + 16 * (col % 2), 0)
     }
 
     #[cfg(feature = "writer")]
-    fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
-        if col / 2 < FIELDS * W3::CELL.words {
-            let (word, bit) = field(col);
-            (words[word].rotate_right(bit) & 7) as u8
-        } else {
-            (0..W3::CELL.words).map(|k| ((words[k] >> spare(k, col) & 1) << k) as u8).sum()
-        }
+    fn parts([w0, w1, w2]: [u32; 3]) -> [u32; 8] {
+        let last = w0 & SPARE | w1 & SPARE << 1 | w2 & SPARE << 2;
+        [w0, w1, w2, last, 0, 0, 0, 0]
+    }
+
+    #[cfg(feature = "writer")]
+    fn whole([w0, w1, w2, last, ..]: [u32; 8]) -> [u32; 3] {
+        [w0 | last & SPARE, w1 | last & SPARE << 1, w2 | last & SPARE << 2]
     }
 
     #[inline(always)]

@@ -37,7 +37,7 @@ pub struct W3Paired;
 const _: () = assert!(W3Paired::CELL.is_full(W3Paired::WIDTH.bits()));
 const _: () = assert!(W3Paired::X.starts[0].factor.abs() * 127 * (W3Paired::X.chunk as i32) < 0x8000);
 
-/// Returns the sets of a cell.
+/// Returns the sets of a cell, its parts.
 const fn sets([w0, w1, w2]: [u32; 3]) -> [u32; 8] {
     [
         w0 & MASK,
@@ -49,27 +49,6 @@ const fn sets([w0, w1, w2]: [u32; 3]) -> [u32; 8] {
         (w0 ^ w1.rotate_right(2)).rotate_right(10) & MASK,
         (w2 ^ w1.rotate_right(4)).rotate_right(10) & MASK,
     ]
-}
-
-/// Returns the words of a cell: the inverse of [`sets`].
-#[cfg(feature = "writer")]
-const fn words(sets: [u32; 8]) -> [u32; 3] {
-    let mut w0 = sets[0] | sets[1].rotate_left(6);
-    let mut w1 = sets[2] | sets[3].rotate_left(6);
-    let mut w2 = sets[4] | sets[5].rotate_left(6);
-    let (last0, last2) = (sets[6].rotate_left(10), sets[7].rotate_left(10));
-    w1 |= ((last0 ^ w0) & TAKEN).rotate_left(2) | ((last2 ^ w2) & TAKEN).rotate_left(4);
-    w0 |= (last0 ^ w1.rotate_right(2)) & SPARE;
-    w2 |= (last2 ^ w1.rotate_right(4)) & SPARE;
-    [w0, w1, w2]
-}
-
-/// Returns the set, first bit and sign of a code.
-#[cfg(feature = "writer")]
-const fn field(row: usize, col: usize) -> (usize, u32, u32) {
-    let set = 2 * (col / 2) + row / 2;
-    let lane = 16 * (col as u32 % 2);
-    if row.is_multiple_of(2) { (set, lane, 0) } else { (set, lane + 13, 4) }
 }
 
 impl Format for W3Paired {
@@ -88,17 +67,26 @@ impl Format for W3Paired {
     };
 
     #[cfg(feature = "writer")]
-    fn insert(cell: &mut [u32; 3], row: usize, col: usize, code: u8) {
-        let (set, bit, sign) = field(row, col);
-        let mut all = sets(*cell);
-        all[set] |= (code as u32 & 7 ^ sign) << bit;
-        *cell = words(all);
+    fn place(row: usize, col: usize) -> (usize, usize, u32) {
+        let (set, bit) = (2 * (col / 2) + row / 2, 16 * (col % 2));
+        if row.is_multiple_of(2) { (set, bit, 0) } else { (set, bit + 13, 4) }
     }
 
     #[cfg(feature = "writer")]
-    fn extract(cell: &[u32; 3], row: usize, col: usize) -> u8 {
-        let (set, bit, sign) = field(row, col);
-        (sets(*cell)[set & 7] >> bit & 7 ^ sign) as u8
+    fn parts(words: [u32; 3]) -> [u32; 8] {
+        sets(words)
+    }
+
+    #[cfg(feature = "writer")]
+    fn whole(sets: [u32; 8]) -> [u32; 3] {
+        let mut w0 = sets[0] | sets[1].rotate_left(6);
+        let mut w1 = sets[2] | sets[3].rotate_left(6);
+        let mut w2 = sets[4] | sets[5].rotate_left(6);
+        let (last0, last2) = (sets[6].rotate_left(10), sets[7].rotate_left(10));
+        w1 |= ((last0 ^ w0) & TAKEN).rotate_left(2) | ((last2 ^ w2) & TAKEN).rotate_left(4);
+        w0 |= (last0 ^ w1.rotate_right(2)) & SPARE;
+        w2 |= (last2 ^ w1.rotate_right(4)) & SPARE;
+        [w0, w1, w2]
     }
 
     #[inline(always)]

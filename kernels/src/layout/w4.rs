@@ -19,12 +19,6 @@ pub struct W4;
 
 const _: () = assert!(W4::CELL.is_full(W4::WIDTH.bits()));
 
-/// Returns the first bit of a column's code in the word's ring of bits.
-#[cfg(feature = "writer")]
-const fn bit(col: usize) -> u32 {
-    (1 + 4 * (col as u32 / 2) + 16 * (col as u32 % 2)) % 32
-}
-
 impl Format for W4 {
     const WIDTH: Width = Width::W4;
     const CELL: Cell = Cell { rows: 1, cols: 8, words: 1 };
@@ -33,13 +27,8 @@ impl Format for W4 {
     const X: XLayout = XLayout::single(-15);
 
     #[cfg(feature = "writer")]
-    fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
-        words[0] |= (code as u32 & 15).rotate_left(bit(col));
-    }
-
-    #[cfg(feature = "writer")]
-    fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
-        (words[0].rotate_right(bit(col)) & 15) as u8
+    fn place(_row: usize, col: usize) -> (usize, usize, u32) {
+        (0, 1 + 4 * (col / 2) + 16 * (col % 2), 0)
     }
 
     #[inline(always)]

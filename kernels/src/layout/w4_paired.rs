@@ -34,17 +34,6 @@ pub struct W4Paired;
 const _: () = assert!(W4Paired::CELL.is_full(W4Paired::WIDTH.bits()));
 const _: () = assert!(Width::W4.max_level() * 127 * (W4Paired::X.chunk as i32) < 1 << 19);
 
-/// Returns the first bit and sign of a code.
-#[cfg(feature = "writer")]
-const fn field(row: usize, col: usize) -> (u32, u32) {
-    match row {
-        0 => (16 * col as u32, 0),
-        1 => (16 * col as u32 + 12, 8),
-        2 => (16 * col as u32 + 8, 0),
-        _ => (20 - 16 * col as u32, 8),
-    }
-}
-
 impl Format for W4Paired {
     const WIDTH: Width = Width::W4;
     const CELL: Cell = Cell { rows: 4, cols: 2, words: 1 };
@@ -62,15 +51,13 @@ impl Format for W4Paired {
     };
 
     #[cfg(feature = "writer")]
-    fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
-        let (bit, sign) = field(row, col);
-        words[0] |= (code as u32 & 15 ^ sign) << bit;
-    }
-
-    #[cfg(feature = "writer")]
-    fn extract(words: &[u32; 3], row: usize, col: usize) -> u8 {
-        let (bit, sign) = field(row, col);
-        (words[0] >> bit & 15 ^ sign) as u8
+    fn place(row: usize, col: usize) -> (usize, usize, u32) {
+        match row {
+            0 => (0, 16 * col, 0),
+            1 => (0, 16 * col + 12, 8),
+            2 => (0, 16 * col + 8, 0),
+            _ => (0, 20 - 16 * col, 8),
+        }
     }
 
     fn start(starts: &[u32]) -> Sums {

@@ -16,12 +16,6 @@ pub struct W8;
 
 const _: () = assert!(W8::CELL.is_full(W8::WIDTH.bits()));
 
-/// Returns the first bit of a column's code in the word.
-#[cfg(feature = "writer")]
-const fn bit(col: usize) -> u32 {
-    8 * (col as u32 / 2) + 16 * (col as u32 % 2)
-}
-
 /// Sign-extends bytes 0 and 2 into the two lanes, as SXTB16 does.
 #[inline(always)]
 fn sxtb16(word: u32) -> u32 {
@@ -36,13 +30,8 @@ impl Format for W8 {
     const X: XLayout = XLayout::single(0);
 
     #[cfg(feature = "writer")]
-    fn insert(words: &mut [u32; 3], _row: usize, col: usize, code: u8) {
-        words[0] |= (code as u32) << bit(col);
-    }
-
-    #[cfg(feature = "writer")]
-    fn extract(words: &[u32; 3], _row: usize, col: usize) -> u8 {
-        (words[0] >> bit(col)) as u8
+    fn place(_row: usize, col: usize) -> (usize, usize, u32) {
+        (0, 8 * (col / 2) + 16 * (col % 2), 0)
     }
 
     #[inline(always)]

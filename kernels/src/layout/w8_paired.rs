@@ -24,13 +24,6 @@ pub struct W8Paired;
 const _: () = assert!(W8Paired::CELL.is_full(W8Paired::WIDTH.bits()));
 const _: () = assert!(Width::W8.max_level() * 127 * (W8Paired::X.chunk as i32) < 1 << 23);
 
-/// Returns the first bit and offset of a code.
-#[cfg(feature = "writer")]
-const fn field(row: usize, col: usize) -> (u32, u32) {
-    let bit = 16 * col as u32;
-    if row == 0 { (bit, 0x80) } else { (bit + 8, 0) }
-}
-
 impl Format for W8Paired {
     const WIDTH: Width = Width::W8;
     const CELL: Cell = Cell { rows: 2, cols: 2, words: 1 };
@@ -47,15 +40,8 @@ impl Format for W8Paired {
     };
 
     #[cfg(feature = "writer")]
-    fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
-        let (bit, offset) = field(row, col);
-        words[0] |= (code as u32 ^ offset) << bit;
-    }
-
-    #[cfg(feature = "writer")]
-    fn extract(words: &[u32; 3], row: usize, col: usize) -> u8 {
-        let (bit, offset) = field(row, col);
-        ((words[0] >> bit) as u8) ^ offset as u8
+    fn place(row: usize, col: usize) -> (usize, usize, u32) {
+        if row == 0 { (0, 16 * col, 0x80) } else { (0, 16 * col + 8, 0) }
     }
 
     #[inline(always)]
