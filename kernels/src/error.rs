@@ -128,163 +128,127 @@ impl ImageError {
 
 impl core::error::Error for ImageError {}
 
-/// Why [`crate::Head::new`] refused the scratch memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum HeadError {
-    /// The scratch memory has fewer words than the image needs.
-    ScratchTooSmall {
-        /// Words needed.
-        needed: usize,
-        /// Words given.
-        given: usize,
-    },
-}
-
-impl HeadError {
-    /// Returns the error's number, the same in all versions: 64 to 69.
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::ScratchTooSmall { .. } => 64,
+/// Declares an error with fields, each variant with its number and its text.
+macro_rules! errors {
+    ($(#[$doc:meta])* $error:ident, $numbers:literal {
+        $($(#[$variant_doc:meta])* $variant:ident $({ $($(#[$field_doc:meta])* $field:ident: $type:ty,)* })? = $code:literal, $text:literal;)*
+    }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        #[non_exhaustive]
+        pub enum $error {
+            $($(#[$variant_doc])* $variant $({ $($(#[$field_doc])* $field: $type,)* })?,)*
         }
-    }
-}
 
-impl fmt::Display for HeadError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::ScratchTooSmall { needed, given } => {
-                write!(f, "scratch memory has {given} words; the image needs {needed}")
+        impl $error {
+            #[doc = concat!("Returns the error's number, the same in all versions: ", $numbers, ".")]
+            pub const fn code(self) -> u8 {
+                match self {
+                    $(Self::$variant { .. } => $code,)*
+                }
             }
         }
+
+        impl fmt::Display for $error {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                match self {
+                    $(Self::$variant $({ $($field),* })? => write!(f, $text),)*
+                }
+            }
+        }
+
+        impl core::error::Error for $error {}
+    };
+}
+
+errors! {
+    /// Why [`crate::Head::new`] refused the scratch memory.
+    HeadError, "64 to 69" {
+        /// The scratch memory has fewer words than the image needs.
+        ScratchTooSmall {
+            /// Words needed.
+            needed: usize,
+            /// Words given.
+            given: usize,
+        } = 64, "scratch memory has {given} words; the image needs {needed}";
     }
 }
 
-impl core::error::Error for HeadError {}
-
-/// Why the state of a head was not saved or restored. The head is unchanged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum SavedError {
-    /// The length differs from that of the image's state.
-    Length {
-        /// Bytes needed: [`crate::Head::saved_len`].
-        needed: usize,
-        /// Bytes given.
-        given: usize,
-    },
-    /// The bytes are not a saved state of this version.
-    Version,
-    /// The state belongs to another image.
-    Image,
-    /// The checksum differs, or a number is impossible: the bytes are damaged.
-    Damaged,
-    /// A step has begun and is not ready: poll it to its end, or reset.
-    Begun,
-}
-
-impl SavedError {
-    /// Returns the error's number, the same in all versions: 70 to 79.
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::Length { .. } => 70,
-            Self::Version => 71,
-            Self::Image => 72,
-            Self::Damaged => 73,
-            Self::Begun => 74,
-        }
+errors! {
+    /// Why the state of a head was not saved or restored. The head is unchanged.
+    SavedError, "70 to 79" {
+        /// The length differs from that of the image's state.
+        Length {
+            /// Bytes needed: [`crate::Head::saved_len`].
+            needed: usize,
+            /// Bytes given.
+            given: usize,
+        } = 70, "saved state has {given} bytes; the image's has {needed}";
+        /// The bytes are not a saved state of this version.
+        Version = 71, "not a saved state of this version; reset instead";
+        /// The state belongs to another image.
+        Image = 72, "saved state belongs to another image; reset instead";
+        /// The checksum differs, or a number is impossible: the bytes are damaged.
+        Damaged = 73, "saved state is damaged; reset instead";
+        /// A step has begun and is not ready: poll it to its end, or reset.
+        Begun = 74, "a step is not ready; poll it to its end before saving the state";
     }
 }
 
-impl fmt::Display for SavedError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Length { needed, given } => write!(f, "saved state has {given} bytes; the image's has {needed}"),
-            Self::Version => f.write_str("not a saved state of this version; reset instead"),
-            Self::Image => f.write_str("saved state belongs to another image; reset instead"),
-            Self::Damaged => f.write_str("saved state is damaged; reset instead"),
-            Self::Begun => f.write_str("a step is not ready; poll it to its end before saving the state"),
-        }
-    }
-}
-
-impl core::error::Error for SavedError {}
-
-/// Why a step gave no action. The recurrent state and the chunk are reset; the last action stays, so that the step
-/// limit holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum StepError {
-    /// The observation's length differs from the image's.
-    ObservationLength {
-        /// Values expected.
-        expected: usize,
-        /// Values given.
-        given: usize,
-    },
-    /// An observation value is NaN or infinite.
-    ObservationNotFinite {
-        /// Its position.
-        index: usize,
-    },
-    /// A value inside the network or an action exceeded the range of f32.
-    NotFinite,
-    /// The image's memory has changed since its check: the flash decayed or was rewritten.
-    Damaged,
-    /// A self-test step gave other bits than the image records.
-    SelfTest {
-        /// The self-test step that differed, from 0.
-        step: usize,
-    },
-    /// The slice budget is below the image's least budget.
-    Budget {
-        /// Modelled instructions needed: [`crate::Image::least_budget`].
-        needed: u32,
-        /// Modelled instructions given.
-        given: u32,
-    },
-    /// A poll without a step that has begun.
-    NotBegun,
-    /// The noise's length differs from the image's.
-    NoiseLength {
-        /// Values expected: [`crate::Image::noise_len`].
-        expected: usize,
-        /// Values given.
-        given: usize,
-    },
-    /// A value of the noise is NaN or infinite.
-    NoiseNotFinite {
-        /// Its position.
-        index: usize,
-    },
-    /// Every action is older than its deadline, or its period has passed.
-    Stale,
-    /// A value of the observation is outside the range of its raw input ([`crate::Image::ports`]).
-    ObservationRange {
-        /// Its position.
-        index: usize,
-    },
-}
-
-impl StepError {
-    /// Returns the error's number, the same in all versions: 80 to 127.
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::ObservationLength { .. } => 80,
-            Self::ObservationNotFinite { .. } => 81,
-            Self::NotFinite => 82,
-            Self::Damaged => 83,
-            Self::SelfTest { .. } => 84,
-            Self::Budget { .. } => 85,
-            Self::NotBegun => 86,
-            Self::NoiseLength { .. } => 87,
-            Self::NoiseNotFinite { .. } => 88,
-            Self::Stale => 89,
-            Self::ObservationRange { .. } => 90,
-        }
+errors! {
+    /// Why a step gave no action. The recurrent state and the chunk are reset; the last action stays, so that the step
+    /// limit holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
+    StepError, "80 to 127" {
+        /// The observation's length differs from the image's.
+        ObservationLength {
+            /// Values expected.
+            expected: usize,
+            /// Values given.
+            given: usize,
+        } = 80, "observation has {given} values; the policy takes {expected}";
+        /// An observation value is NaN or infinite.
+        ObservationNotFinite {
+            /// Its position.
+            index: usize,
+        } = 81, "observation value {index} is not finite";
+        /// A value inside the network or an action exceeded the range of f32.
+        NotFinite = 82, "the network produced a value that is not finite";
+        /// The image's memory has changed since its check: the flash decayed or was rewritten.
+        Damaged = 83, "the image's memory has changed since it was checked";
+        /// A self-test step gave other bits than the image records.
+        SelfTest {
+            /// The self-test step that differed, from 0.
+            step: usize,
+        } = 84, "self-test step {step} gave other bits than the image records";
+        /// The slice budget is below the image's least budget.
+        Budget {
+            /// Modelled instructions needed: [`crate::Image::least_budget`].
+            needed: u32,
+            /// Modelled instructions given.
+            given: u32,
+        } = 85, "a poll has {given} instructions; the image needs at least {needed}";
+        /// A poll without a step that has begun.
+        NotBegun = 86, "no step has begun; call begin with an observation, then poll";
+        /// The noise's length differs from the image's.
+        NoiseLength {
+            /// Values expected: [`crate::Image::noise_len`].
+            expected: usize,
+            /// Values given.
+            given: usize,
+        } = 87, "noise has {given} values; the policy takes {expected}";
+        /// A value of the noise is NaN or infinite.
+        NoiseNotFinite {
+            /// Its position.
+            index: usize,
+        } = 88, "noise value {index} is not finite";
+        /// Every action is older than its deadline, or its period has passed.
+        Stale = 89, "no action is young enough to play";
+        /// A value of the observation is outside the range of its raw input ([`crate::Image::ports`]).
+        ObservationRange {
+            /// Its position.
+            index: usize,
+        } = 90, "observation value {index} is outside the range of its raw input";
     }
 }
 
@@ -314,32 +278,6 @@ impl From<NotFinite> for Fault {
         Self::NotFinite
     }
 }
-
-impl fmt::Display for StepError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::ObservationLength { expected, given } => {
-                write!(f, "observation has {given} values; the policy takes {expected}")
-            }
-            Self::ObservationNotFinite { index } => write!(f, "observation value {index} is not finite"),
-            Self::ObservationRange { index } => {
-                write!(f, "observation value {index} is outside the range of its raw input")
-            }
-            Self::NotFinite => f.write_str("the network produced a value that is not finite"),
-            Self::Damaged => f.write_str("the image's memory has changed since it was checked"),
-            Self::SelfTest { step } => write!(f, "self-test step {step} gave other bits than the image records"),
-            Self::Budget { needed, given } => {
-                write!(f, "a poll has {given} instructions; the image needs at least {needed}")
-            }
-            Self::NotBegun => f.write_str("no step has begun; call begin with an observation, then poll"),
-            Self::NoiseLength { expected, given } => write!(f, "noise has {given} values; the policy takes {expected}"),
-            Self::NoiseNotFinite { index } => write!(f, "noise value {index} is not finite"),
-            Self::Stale => f.write_str("no action is young enough to play"),
-        }
-    }
-}
-
-impl core::error::Error for StepError {}
 
 #[cfg(test)]
 mod tests {
