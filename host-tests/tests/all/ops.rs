@@ -124,9 +124,20 @@ fn follow(mut reference: Reference<'_>) -> impl FnMut(&[f64], bool) -> Vec<f64> 
     }
 }
 
-#[test]
-fn functions_match_the_reference() -> Result<()> {
-    let ops = json!([
+/// Declares tests that [`check`] a policy: its lengths of observation and action, and its ops.
+macro_rules! checks {
+    ($($name:ident: $obs:literal, $act:literal, $ops:tt;)*) => {
+        $(
+            #[test]
+            fn $name() -> Result<()> {
+                check($obs, $act, json!($ops))
+            }
+        )*
+    };
+}
+
+checks! {
+    functions_match_the_reference: 11, 88, [
         {"op": "relu", "input": "obs", "save": "a"},
         {"op": "elu", "input": "obs", "save": "b"},
         {"op": "silu", "input": "obs", "save": "c"},
@@ -136,20 +147,73 @@ fn functions_match_the_reference() -> Result<()> {
         {"op": "tanh", "input": "obs", "save": "g"},
         {"op": "sigmoid", "input": "obs", "save": "h"},
         {"op": "identity", "input": ["a", "b", "c", "d", "e", "f", "g", "h"]},
-    ]);
-    check(11, 88, ops)
-}
+    ];
 
-#[test]
-fn normalize_accepts_either_clip_both_or_none() -> Result<()> {
-    let ops = json!([
+    normalize_accepts_either_clip_both_or_none: 7, 28, [
         {"op": "normalize", "mean": "m 7", "scale": "s 7", "input": "obs", "save": "a"},
         {"op": "normalize", "mean": "m 7", "scale": "s 7", "pre_clip": 1.5, "input": "obs", "save": "b"},
         {"op": "normalize", "mean": "m 7", "scale": "s 7", "clip": 0.7, "input": "obs", "save": "c"},
         {"op": "normalize", "mean": "n 7", "scale": "t 7", "pre_clip": 2.0, "clip": 1.0, "input": "obs", "save": "d"},
         {"op": "identity", "input": ["a", "b", "c", "d"]},
-    ]);
-    check(7, 28, ops)
+    ];
+
+    slots_and_slices_are_concatenated_in_order: 12, 37, [
+        {"op": "tanh", "input": "obs[3:10]", "save": "a"},
+        {"op": "sigmoid", "input": ["a[:4]", "obs", "a[2:]", "a[:]"], "save": "b"},
+        // A repeated name refers to the later value.
+        {"op": "relu", "input": "b[7:14]", "save": "a"},
+        {"op": "identity", "input": ["b", "a[1:2]", "obs[11:]", "a"]},
+    ];
+
+    add_accepts_observation_slots_and_itself: 6, 6, [
+        {"op": "add", "with": "obs", "save": "twice"},
+        {"op": "tanh", "save": "t"},
+        {"op": "add", "with": "twice", "save": "s"},
+        {"op": "add", "with": "s"},
+        {"op": "add", "with": "t", "input": "s"},
+        {"op": "add", "with": "obs"},
+    ];
+
+    a_policy_without_weights_returns_its_observation: 5, 5, [{"op": "identity"}];
+
+    // One more and one less than quads, pairs, units and groups; one row, one column; with bias and without.
+    linear_handles_all_remainders: 65, 40, [
+        {"op": "linear", "w": "a 5x33", "b": "b 5", "input": "obs[:33]", "save": "a"},
+        {"op": "linear", "w": "c 31x65", "input": "obs", "save": "b"},
+        {"op": "linear", "w": "d 1x31", "b": "e 1", "save": "c"},
+        {"op": "linear", "w": "f 6x1"},
+        {"op": "identity", "input": ["a", "b", "c", "obs[:2]"], "save": "d"},
+        {"op": "linear", "w": "g 40x39", "b": "h 40"},
+    ];
+
+    two_operations_may_share_a_matrix: 12, 12, [
+        {"op": "linear", "w": "w 12x12", "b": "a 12", "save": "x"},
+        {"op": "elu"},
+        {"op": "linear", "w": "w 12x12", "b": "b 12"},
+        {"op": "add", "with": "x"},
+    ];
+
+    values_in_use_survive_operations_in_place: 8, 58, [
+        {"op": "linear", "w": "a 10x8", "b": "b 10", "save": "x"},
+        {"op": "tanh", "save": "y"},
+        {"op": "add", "with": "x", "save": "z"},
+        {"op": "relu"},
+        {"op": "add", "with": "y"},
+        {"op": "layernorm", "w_ln": "c 10", "b_ln": "d 10"},
+        {"op": "add", "with": "z"},
+        {"op": "rmsnorm", "w_ln": "e 10", "save": "v"},
+        {"op": "silu", "input": "x", "save": "u"},
+        {"op": "gelu", "input": "x"},
+        {"op": "add", "with": "u"},
+        {"op": "identity", "input": ["x", "y", "z", "u", "v", "obs"]},
+    ];
+
+    two_lstms_run_in_series: 9, 5, [recurrent("lstm", 28, 9, 7, "first"), recurrent("lstm", 20, 7, 5, "second")];
+
+    gru_runs_with_and_without_biases: 8, 5, [
+        recurrent("gru", 18, 8, 6, "first"),
+        {"op": "gru", "hidden": 5, "gates": "r,z,n", "w_ih": "w 15x6", "w_hh": "v 15x5"},
+    ];
 }
 
 #[test]
@@ -169,101 +233,12 @@ fn norms_use_a_given_or_the_default_eps() -> Result<()> {
     check(9, 45, ops)
 }
 
-#[test]
-fn slots_and_slices_are_concatenated_in_order() -> Result<()> {
-    let ops = json!([
-        {"op": "tanh", "input": "obs[3:10]", "save": "a"},
-        {"op": "sigmoid", "input": ["a[:4]", "obs", "a[2:]", "a[:]"], "save": "b"},
-        // A repeated name refers to the later value.
-        {"op": "relu", "input": "b[7:14]", "save": "a"},
-        {"op": "identity", "input": ["b", "a[1:2]", "obs[11:]", "a"]},
-    ]);
-    check(12, 37, ops)
-}
-
-#[test]
-fn add_accepts_observation_slots_and_itself() -> Result<()> {
-    let ops = json!([
-        {"op": "add", "with": "obs", "save": "twice"},
-        {"op": "tanh", "save": "t"},
-        {"op": "add", "with": "twice", "save": "s"},
-        {"op": "add", "with": "s"},
-        {"op": "add", "with": "t", "input": "s"},
-        {"op": "add", "with": "obs"},
-    ]);
-    check(6, 6, ops)
-}
-
-#[test]
-fn a_policy_without_weights_returns_its_observation() -> Result<()> {
-    check(5, 5, json!([{"op": "identity"}]))
-}
-
-#[test]
-fn linear_handles_all_remainders() -> Result<()> {
-    // One more and one less than quads, pairs, units and groups; one row, one column; with bias and without.
-    let ops = json!([
-        {"op": "linear", "w": "a 5x33", "b": "b 5", "input": "obs[:33]", "save": "a"},
-        {"op": "linear", "w": "c 31x65", "input": "obs", "save": "b"},
-        {"op": "linear", "w": "d 1x31", "b": "e 1", "save": "c"},
-        {"op": "linear", "w": "f 6x1"},
-        {"op": "identity", "input": ["a", "b", "c", "obs[:2]"], "save": "d"},
-        {"op": "linear", "w": "g 40x39", "b": "h 40"},
-    ]);
-    check(65, 40, ops)
-}
-
-#[test]
-fn two_operations_may_share_a_matrix() -> Result<()> {
-    let ops = json!([
-        {"op": "linear", "w": "w 12x12", "b": "a 12", "save": "x"},
-        {"op": "elu"},
-        {"op": "linear", "w": "w 12x12", "b": "b 12"},
-        {"op": "add", "with": "x"},
-    ]);
-    check(12, 12, ops)
-}
-
-#[test]
-fn values_in_use_survive_operations_in_place() -> Result<()> {
-    let ops = json!([
-        {"op": "linear", "w": "a 10x8", "b": "b 10", "save": "x"},
-        {"op": "tanh", "save": "y"},
-        {"op": "add", "with": "x", "save": "z"},
-        {"op": "relu"},
-        {"op": "add", "with": "y"},
-        {"op": "layernorm", "w_ln": "c 10", "b_ln": "d 10"},
-        {"op": "add", "with": "z"},
-        {"op": "rmsnorm", "w_ln": "e 10", "save": "v"},
-        {"op": "silu", "input": "x", "save": "u"},
-        {"op": "gelu", "input": "x"},
-        {"op": "add", "with": "u"},
-        {"op": "identity", "input": ["x", "y", "z", "u", "v", "obs"]},
-    ]);
-    check(8, 58, ops)
-}
-
 fn recurrent(op: &str, rows: usize, cols: usize, hidden: usize, name: &str) -> Value {
     json!({
         "op": op, "hidden": hidden, "save": name,
         "w_ih": format!("{name}.ih {rows}x{cols}"), "w_hh": format!("{name}.hh {rows}x{hidden}"),
         "b_ih": format!("{name}.bi {rows}"), "b_hh": format!("{name}.bh {rows}"),
     })
-}
-
-#[test]
-fn two_lstms_run_in_series() -> Result<()> {
-    let ops = json!([recurrent("lstm", 28, 9, 7, "first"), recurrent("lstm", 20, 7, 5, "second")]);
-    check(9, 5, ops)
-}
-
-#[test]
-fn gru_runs_with_and_without_biases() -> Result<()> {
-    let ops = json!([
-        recurrent("gru", 18, 8, 6, "first"),
-        {"op": "gru", "hidden": 5, "gates": "r,z,n", "w_ih": "w 15x6", "w_hh": "v 15x5"},
-    ]);
-    check(8, 5, ops)
 }
 
 #[test]
