@@ -6,53 +6,56 @@ use super::exp2::{EXP, EXPONENT, FIXED_ONE, QUARTER, exp_fraction, exp2, fractio
 use super::limits::zero_or_nan;
 use crate::round::ROUND;
 
-/// The elementwise functions of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Function {
+macro_rules! functions {
+    ($($(#[$doc:meta])* $function:ident = $code:literal, $name:literal;)*) => {
+        /// The elementwise functions of an image.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum Function {
+            $($(#[$doc])* $function = $code,)*
+        }
+
+        impl Function {
+            /// All functions, in the order of their codes.
+            pub const ALL: [Self; [$($code),*].len()] = [$(Self::$function),*];
+
+            /// Returns the name, as in policy.json.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$function => $name,)*
+                }
+            }
+        }
+    };
+}
+functions! {
     /// `max(x, 0)`
-    Relu = 0,
+    Relu = 0, "relu";
     /// `x` if positive, otherwise `exp(x) - 1`
-    Elu = 1,
+    Elu = 1, "elu";
     /// `x * sigmoid(x)`
-    Silu = 2,
+    Silu = 2, "silu";
     /// `x * Phi(x)` with the exact normal distribution
-    Gelu = 3,
+    Gelu = 3, "gelu";
     /// GELU by its tanh approximation, as torch's `approximate="tanh"`
-    GeluTanh = 4,
+    GeluTanh = 4, "gelu_tanh";
     /// Hyperbolic tangent
-    Tanh = 5,
+    Tanh = 5, "tanh";
     /// `1 / (1 + exp(-x))`
-    Sigmoid = 6,
+    Sigmoid = 6, "sigmoid";
     /// `e^x`
-    Exp = 7,
+    Exp = 7, "exp";
     /// Sine, of radians
-    Sin = 8,
+    Sin = 8, "sin";
     /// Cosine, of radians
-    Cos = 9,
+    Cos = 9, "cos";
     /// `ln(1 + exp(x))`
-    Softplus = 10,
+    Softplus = 10, "softplus";
     /// `x * tanh(softplus(x))`
-    Mish = 11,
+    Mish = 11, "mish";
 }
 
 impl Function {
-    /// All functions, in the order of their codes.
-    pub const ALL: [Self; 12] = [
-        Self::Relu,
-        Self::Elu,
-        Self::Silu,
-        Self::Gelu,
-        Self::GeluTanh,
-        Self::Tanh,
-        Self::Sigmoid,
-        Self::Exp,
-        Self::Sin,
-        Self::Cos,
-        Self::Softplus,
-        Self::Mish,
-    ];
-
     /// Returns the function of a code in an image.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.get(usize::from(code)).copied()
@@ -61,24 +64,6 @@ impl Function {
     /// Returns `true` for the functions that every build has.
     pub(crate) const fn is_basic(self) -> bool {
         matches!(self, Self::Relu | Self::Elu | Self::Tanh | Self::Sigmoid)
-    }
-
-    /// Returns the name, as in policy.json.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Relu => "relu",
-            Self::Elu => "elu",
-            Self::Silu => "silu",
-            Self::Gelu => "gelu",
-            Self::GeluTanh => "gelu_tanh",
-            Self::Tanh => "tanh",
-            Self::Sigmoid => "sigmoid",
-            Self::Exp => "exp",
-            Self::Sin => "sin",
-            Self::Cos => "cos",
-            Self::Softplus => "softplus",
-            Self::Mish => "mish",
-        }
     }
 
     /// Applies the function to every element.
