@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::fields::{Field, Reader, Writer};
+
 macro_rules! codes {
     ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $code:literal, $text:literal;)* }) => {
         $(#[$doc])*
@@ -23,6 +25,16 @@ macro_rules! codes {
             /// Returns the variant with this number, or `None` for an unknown number.
             pub fn from_code(code: u8) -> Option<Self> {
                 Self::ALL.iter().copied().find(|one| one.code() == code)
+            }
+        }
+
+        impl Field<'_> for $name {
+            fn write(&self, w: &mut Writer<'_>) {
+                self.code().write(w);
+            }
+
+            fn read(r: &mut Reader<'_>) -> Option<Self> {
+                Self::from_code(r.field()?)
             }
         }
 
@@ -191,7 +203,21 @@ codes! {
     }
 }
 
-/// Reads an optional code, 0 for none. The outer `None` is an unknown number.
-pub(crate) fn optional<T>(code: u8, from_code: impl Fn(u8) -> Option<T>) -> Option<Option<T>> {
-    if code == 0 { Some(None) } else { from_code(code).map(Some) }
+macro_rules! optional {
+    ($($name:ident)*) => {
+        // 0 is none.
+        $(impl Field<'_> for Option<$name> {
+            fn write(&self, w: &mut Writer<'_>) {
+                self.map_or(0, $name::code).write(w);
+            }
+
+            fn read(r: &mut Reader<'_>) -> Option<Self> {
+                match r.field()? {
+                    0 => Some(None),
+                    code => $name::from_code(code).map(Some),
+                }
+            }
+        })*
+    };
 }
+optional! { Fault Refusal Crash }

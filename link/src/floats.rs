@@ -1,5 +1,7 @@
 //! Values of an observation or an action.
 
+use crate::fields::{Field, Reader, Writer};
+
 /// f32 values, from memory or from the wire.
 #[derive(Clone, Copy, Debug)]
 pub enum Floats<'a> {
@@ -10,12 +12,6 @@ pub enum Floats<'a> {
 }
 
 impl<'a> Floats<'a> {
-    /// Reads `bytes` as values; `None` if they are not whole values.
-    pub(crate) fn of_wire(bytes: &'a [u8]) -> Option<Self> {
-        let (values, rest) = bytes.as_chunks();
-        rest.is_empty().then_some(Self::Wire(values))
-    }
-
     /// Returns the number of values.
     pub const fn len(&self) -> usize {
         match self {
@@ -36,6 +32,21 @@ impl<'a> Floats<'a> {
             Self::Wire(wire) => (&[], wire),
         };
         values.iter().copied().chain(wire.iter().map(|bytes| f32::from_le_bytes(*bytes)))
+    }
+}
+
+/// All values up to the end of the payload.
+impl<'a> Field<'a> for Floats<'a> {
+    fn write(&self, w: &mut Writer<'_>) {
+        match self {
+            Self::Values(values) => values.iter().for_each(|value| value.write(w)),
+            Self::Wire(values) => w.bytes(values.as_flattened()),
+        }
+    }
+
+    fn read(r: &mut Reader<'a>) -> Option<Self> {
+        let (values, rest) = r.rest().as_chunks();
+        rest.is_empty().then_some(Self::Wire(values))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The messages and their payloads.
 
-use crate::code::{Parameter, Refusal, Report, optional};
-use crate::fields::{Reader, Writer};
+use crate::code::{Parameter, Refusal, Report};
+use crate::fields::{Field, Reader, Writer};
 use crate::floats::Floats;
 use crate::report::{Breadcrumb, Status, Timing};
 
@@ -98,119 +98,57 @@ pub enum Message<'a> {
     },
 }
 
-/// Declares each message's kind number once: a constant to parse by, and [`Message::kind`].
-macro_rules! kinds {
-    ($($message:ident: $kind:ident = $number:literal;)*) => {
-        $(const $kind: u8 = $number;)*
-
-        impl Message<'_> {
+/// Declares each message's kind number and, in the order of the payload, its fields.
+macro_rules! messages {
+    ($($message:ident $(($value:ident))? $({ $($field:ident),* })? = $kind:literal;)*) => {
+        impl<'a> Message<'a> {
             /// The number of the message's kind in a frame.
             pub const fn kind(&self) -> u8 {
                 match self {
                     $(Self::$message { .. } => $kind,)*
                 }
             }
+
+            pub(crate) fn write(&self, w: &mut Writer<'_>) {
+                match self {
+                    $(Self::$message $(($value))? $({ $($field),* })? => {
+                        $($value.write(w);)?
+                        $($($field.write(w);)*)?
+                    })*
+                }
+            }
+
+            /// Parses a payload of this kind; `None` if the kind is unknown or the payload does not match it.
+            pub(crate) fn parse(kind: u8, payload: &'a [u8]) -> Option<Self> {
+                let r = &mut Reader(payload);
+                let message = match kind {
+                    $($kind => {
+                        $(let $value = r.field()?;)?
+                        Self::$message $(($value))? $({ $($field: r.field()?),* })?
+                    })*
+                    _ => return None,
+                };
+                r.is_empty().then_some(message)
+            }
         }
     };
 }
 
-kinds! {
-    Observation: OBSERVATION = 1;
-    Arm: ARM = 2;
-    Disarm: DISARM = 3;
-    Get: GET = 4;
-    Set: SET = 5;
-    Ask: ASK = 6;
-    Begin: BEGIN = 7;
-    Chunk: CHUNK = 8;
-    Commit: COMMIT = 9;
-    Abort: ABORT = 10;
-    Action: ACTION = 128;
-    Status: STATUS = 129;
-    Timing: TIMING = 130;
-    Breadcrumb: BREADCRUMB = 131;
-    Value: VALUE = 132;
-    Ack: ACK = 133;
-}
-
-impl<'a> Message<'a> {
-    pub(crate) fn write(&self, w: &mut Writer<'_>) {
-        match *self {
-            Self::Observation(values) => values.iter().for_each(|value| w.f32(value)),
-            Self::Arm { token } => w.u32(token),
-            Self::Disarm | Self::Abort => {}
-            Self::Get { parameter, axis } => {
-                w.u8(parameter.code());
-                w.u8(axis);
-            }
-            Self::Set { token, parameter, axis, value } => {
-                w.u32(token);
-                w.u8(parameter.code());
-                w.u8(axis);
-                w.f32(value);
-            }
-            Self::Ask(report) => w.u8(report.code()),
-            Self::Begin { token, length, crc, version } => {
-                [token, length, crc, version].into_iter().for_each(|n| w.u32(n));
-            }
-            Self::Chunk { offset, bytes } => {
-                w.u32(offset);
-                w.bytes(bytes);
-            }
-            Self::Commit { signature } => w.bytes(signature.map_or(&[], |bytes| bytes)),
-            Self::Action { of, applied, values } => {
-                w.u32(of);
-                w.u8(applied.into());
-                values.iter().for_each(|value| w.f32(value));
-            }
-            Self::Status(status) => status.write(w),
-            Self::Timing(timing) => timing.write(w),
-            Self::Breadcrumb(breadcrumb) => breadcrumb.write(w),
-            Self::Value { parameter, axis, value } => {
-                w.u8(parameter.code());
-                w.u8(axis);
-                w.f32(value);
-            }
-            Self::Ack { of, refusal, written } => {
-                w.u32(of);
-                w.u8(refusal.map_or(0, Refusal::code));
-                w.u32(written);
-            }
-        }
-    }
-
-    /// Parses a payload of this kind; `None` if the kind is unknown or the payload does not match it.
-    pub(crate) fn parse(kind: u8, payload: &'a [u8]) -> Option<Self> {
-        let r = &mut Reader(payload);
-        let message = match kind {
-            OBSERVATION => Self::Observation(Floats::of_wire(r.rest())?),
-            ARM => Self::Arm { token: r.u32()? },
-            DISARM => Self::Disarm,
-            GET => Self::Get { parameter: Parameter::from_code(r.u8()?)?, axis: r.u8()? },
-            SET => {
-                Self::Set { token: r.u32()?, parameter: Parameter::from_code(r.u8()?)?, axis: r.u8()?, value: r.f32()? }
-            }
-            ASK => Self::Ask(Report::from_code(r.u8()?)?),
-            BEGIN => Self::Begin { token: r.u32()?, length: r.u32()?, crc: r.u32()?, version: r.u32()? },
-            CHUNK => Self::Chunk { offset: r.u32()?, bytes: r.rest() },
-            COMMIT => Self::Commit { signature: if r.is_empty() { None } else { Some(r.array()?) } },
-            ABORT => Self::Abort,
-            ACTION => Self::Action { of: r.u32()?, applied: flag(r.u8()?)?, values: Floats::of_wire(r.rest())? },
-            STATUS => Self::Status(Status::read(r)?),
-            TIMING => Self::Timing(Timing::read(r)?),
-            BREADCRUMB => Self::Breadcrumb(Breadcrumb::read(r)?),
-            VALUE => Self::Value { parameter: Parameter::from_code(r.u8()?)?, axis: r.u8()?, value: r.f32()? },
-            ACK => Self::Ack { of: r.u32()?, refusal: optional(r.u8()?, Refusal::from_code)?, written: r.u32()? },
-            _ => return None,
-        };
-        r.is_empty().then_some(message)
-    }
-}
-
-fn flag(byte: u8) -> Option<bool> {
-    match byte {
-        0 => Some(false),
-        1 => Some(true),
-        _ => None,
-    }
+messages! {
+    Observation(values) = 1;
+    Arm { token } = 2;
+    Disarm = 3;
+    Get { parameter, axis } = 4;
+    Set { token, parameter, axis, value } = 5;
+    Ask(report) = 6;
+    Begin { token, length, crc, version } = 7;
+    Chunk { offset, bytes } = 8;
+    Commit { signature } = 9;
+    Abort = 10;
+    Action { of, applied, values } = 128;
+    Status(status) = 129;
+    Timing(timing) = 130;
+    Breadcrumb(breadcrumb) = 131;
+    Value { parameter, axis, value } = 132;
+    Ack { of, refusal, written } = 133;
 }

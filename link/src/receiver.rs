@@ -84,9 +84,9 @@ impl<const N: usize> Default for Receiver<N> {
 
 fn parse(content: &[u8]) -> Option<Received<'_>> {
     let mut r = Reader(content);
-    if r.u8()? != VERSION {
+    if r.field::<u8>()? != VERSION {
         return None;
     }
-    let (kind, sequence, micros) = (r.u8()?, r.u32()?, r.u32()?);
+    let (kind, sequence, micros) = (r.field()?, r.field()?, r.field()?);
     Some(Received { sequence, micros, message: Message::parse(kind, r.rest())? })
 }

@@ -1,6 +1,6 @@
 //! Sender from messages to bytes.
 
-use crate::fields::Writer;
+use crate::fields::{Field as _, Writer};
 use crate::frame::VERSION;
 use crate::message::Message;
 
@@ -25,10 +25,10 @@ impl Sender {
     /// the buffer is smaller than [`crate::frame::wire_bytes`]; the number is then not used.
     pub fn frame<'b>(&mut self, message: &Message<'_>, micros: u32, buffer: &'b mut [u8]) -> Option<&'b [u8]> {
         let mut w = Writer::new(buffer);
-        w.u8(VERSION);
-        w.u8(message.kind());
-        w.u32(self.next);
-        w.u32(micros);
+        VERSION.write(&mut w);
+        message.kind().write(&mut w);
+        self.next.write(&mut w);
+        micros.write(&mut w);
         message.write(&mut w);
         let len = w.finish()?;
         *buffer.get_mut(len)? = 0;
