@@ -3,7 +3,6 @@
 //! the bits of host and target. Published bundles run where `ACTQ_SHARED` names their folder.
 
 use std::path::{Path, PathBuf};
-use std::task::Poll;
 
 use actq::budget::Budget;
 use actq::data::Recordings;
@@ -24,6 +23,8 @@ use actq_kernels::image::OpKind;
 use actq_kernels::ops::run_whole;
 use actq_kernels::{Image, PortKind, Width};
 use anyhow::{Context as _, Result, ensure};
+
+use crate::slices::{in_polls, whole};
 
 /// Published bundles with the answers that they need.
 pub(crate) const PUBLISHED: [(&str, &str); 5] = [
@@ -128,152 +129,7 @@ fn published_bundles_in_an_image_give_the_targets_of_their_deploy_code() -> Resu
 /// A description with every operation, and its files.
 pub(crate) struct Made;
 
-const MADE: &str = r#"
-schema = 1
-name = "every operation"
-rate_hz = 50
-action = "second.out"
-joints = { robot = ["a", "b", "c"], policy = ["c", "a", "b"] }
-constants = { default = [0.1, -0.2, 0.3] }
-
-[[input]]
-name = "q"
-joints = "robot"
-[[input]]
-name = "quaternion"
-len = 4
-[[input]]
-name = "angles"
-len = 3
-[[input]]
-name = "command"
-len = 2
-
-[[state]]
-name = "last"
-len = 3
-start = [0.5, 0.0, -0.5]
-next = "limited"
-[[state]]
-name = "before_last"
-len = 3
-next = "last"
-
-[[clock]]
-name = "gait"
-start = [0.0, 0.5]
-advance = 0.07
-when = "before"
-restart_above = 1.0
-standing = { of = ["command", "speed"], below = 0.6, at = [0.25, 0.75] }
-[[clock]]
-name = "wave"
-start = [0.0]
-advance = 0.3
-wrap = [-1.5, 1.5]
-[[clock]]
-name = "time"
-start = [0.25]
-advance = 0.02
-
-[[motion]]
-name = "hold"
-file = "motion.npz"
-array = "rows"
-lag = 2
-[[motion]]
-name = "repeat"
-file = "motion.npz"
-array = "rows"
-lag = 1
-end = "repeat"
-
-[[value]]
-name = "relative"
-from = "q"
-do = [{ subtract = "default" }, { scale = 2.0 }, { select = "policy" }, { add = [0.1, 0.2, 0.3] }]
-[[value]]
-name = "gravity"
-from = "quaternion"
-do = [{ gravity = "xyzw" }]
-[[value]]
-name = "tilt"
-from = "angles"
-do = [{ gravity = "rpy" }]
-[[value]]
-name = "wrapped"
-from = "angles"
-do = [{ scale = 5.0 }, "wrap"]
-[[value]]
-name = "speed"
-from = "command"
-do = ["norm"]
-[[value]]
-name = "sines"
-from = ["gait", "wave"]
-do = [{ scale = 6.2 }, "sin"]
-[[value]]
-name = "cosines"
-from = "time"
-do = [{ divide = 0.5 }, "cos"]
-[[value]]
-name = "mixed"
-from = "relative"
-do = [{ scale = "hold" }, { subtract = "speed" }, { clip = [-1.0, 1.0] }, { add = "tilt" }]
-[[value]]
-name = "frame"
-from = ["relative", "speed"]
-[[value]]
-name = "frames"
-from = "frame"
-do = [{ history = { length = 3, stride = 2, first = "newest", fill = "first" } }]
-[[value]]
-name = "zero_filled"
-from = "gravity"
-do = [{ history = { length = 2, current = false } }]
-[[value]]
-name = "lasts"
-from = "last"
-do = [{ history = { length = 4 } }]
-[[value]]
-name = "read"
-from = ["first.out", "gravity", "wrapped", "mixed", "sines", "cosines", "repeat", "zero_filled", "lasts", "before_last"]
-
-[[network]]
-name = "first"
-file = "first"
-inputs = { frames = "frames" }
-[[network]]
-name = "second"
-file = "second"
-inputs = { read = "read" }
-states = { kept = "state" }
-
-[[value]]
-name = "ordered"
-from = "second.out"
-do = [{ place = [2, 0, 1] }]
-[[value]]
-name = "highest"
-from = "q"
-do = [{ add = 1.0 }]
-[[value]]
-name = "limited"
-from = "ordered"
-do = [{ clip = [[-0.5, -0.6, -0.7], "highest"] }]
-[[value]]
-name = "target"
-from = "limited"
-do = [{ scale = 0.25 }, { add = "default" }, { add = "q" }]
-
-[[target]]
-kind = "position"
-value = "target"
-limits = [-0.4, [0.3, 0.4, 0.5]]
-[[target]]
-kind = "velocity"
-value = "mixed"
-"#;
+const MADE: &str = include_str!("deployed.toml");
 
 /// Networks with random weights, by the names of their files: one linear function for each output.
 #[derive(Debug)]
@@ -441,8 +297,7 @@ fn slices_resets_and_restored_states_of_a_description_have_the_same_bits() -> Re
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(Path::new("new"))?;
     let raw: Vec<Vec<f32>> = Made::raw(60).iter().map(|raw| raw.concat().iter().map(|x| *x as f32).collect()).collect();
-    let expected =
-        with_head(image, |head| raw.iter().map(|raw| Ok(bits(head.step(raw)?))).collect::<Result<Vec<_>>>())?;
+    let expected = with_head(image, |head| whole(head, &raw))?;
     with_head(image, |head| {
         let mut saved = vec![0; head.saved_len()];
         for (tick, (raw, expected)) in raw.iter().zip(&expected).enumerate() {
@@ -453,15 +308,8 @@ fn slices_resets_and_restored_states_of_a_description_have_the_same_bits() -> Re
                 head.step(raw)?;
                 head.restore(&saved)?;
             }
-            head.begin(raw)?;
             let budget = head.least_budget();
-            let mut polls = 1;
-            let action = loop {
-                if let Poll::Ready(action) = head.poll(budget)? {
-                    break bits(action);
-                }
-                polls += 1;
-            };
+            let (action, polls) = in_polls(head, raw, || budget)?;
             ensure!(polls > 10 && action == *expected, "tick {tick}: {polls} polls");
         }
         head.reset();
