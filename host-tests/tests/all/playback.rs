@@ -17,6 +17,8 @@ use actq_kernels::{Head, SavedError, StepError, Width};
 use anyhow::{Result, ensure};
 use proptest::prelude::*;
 
+use crate::ops::wide;
+
 /// Length of an action.
 const ACT: usize = 2;
 
@@ -107,10 +109,6 @@ impl<'c> Oracle<'c> {
         self.last = Some(action.clone());
         action
     }
-}
-
-fn wide(values: &[f32]) -> Vec<f64> {
-    values.iter().map(|v| f64::from(*v)).collect()
 }
 
 fn close(ours: &[f32], expected: &[f64]) -> bool {

@@ -24,7 +24,7 @@ use actq_kernels::math::Function;
 use actq_link::code::State;
 use actq_ur3::{ACT_DIM, OBS_DIM};
 use anyhow::{Context as _, Result, bail, ensure};
-use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
+use object::{Object as _, ObjectSymbol as _};
 use tempfile::TempDir;
 
 /// Bytes that opening, checking and running an image with any operation may take, at -Os.
@@ -104,7 +104,7 @@ fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
     ensure!(document.contains(&format!("    {replayed}\n")), "docs/C.md shows another line");
 
     let image_bytes = fs::metadata(firmware::built_in()?)?.len();
-    let code = code_bytes(&at("minimal.elf"))? - image_bytes;
+    let code = firmware::flash_bytes(&at("minimal.elf"))? - image_bytes;
     println!("{code} bytes of code beside the image");
     ensure!(code <= CODE_LIMIT, "{code} bytes of code, more than {CODE_LIMIT}");
     // Nothing panics, and nothing formats text.
@@ -132,7 +132,7 @@ fn a_library_for_one_image_is_smaller_and_gives_the_same_bits() -> Result<()> {
     let document = fs::read_to_string(root().join("docs/C.md"))?;
     let printed = shell(&dir, &listings(&document, "sh")[..2].concat())?;
     ensure!(printed.lines().count() == 2 && printed.lines().all(|line| line.ends_with("host's: 0")), "{printed}");
-    let code = code_bytes(&dir.path().join("minimal.elf"))? - fs::metadata(firmware::built_in()?)?.len();
+    let code = firmware::flash_bytes(&dir.path().join("minimal.elf"))? - fs::metadata(firmware::built_in()?)?.len();
     let manifest = fs::read_to_string(dir.path().join("actq-cortex-m4f/manifest.json"))?;
     let manifest: serde_json::Value = serde_json::from_str(&manifest)?;
     println!("{code} bytes of code with the features {}", manifest["features"]);
@@ -191,7 +191,7 @@ fn a_library_for_an_mlp_takes_less_than_14_kb() -> Result<()> {
           qemu-system-arm -M mps2-an386 -display none -semihosting -kernel $program.elf
         done";
     shell(&dir, &format!("{settings}\n{build}"))?;
-    let code = code_bytes(&dir.path().join("minimal.elf"))? - image_bytes;
+    let code = firmware::flash_bytes(&dir.path().join("minimal.elf"))? - image_bytes;
     let manifest = fs::read_to_string(dir.path().join("actq-cortex-m4f/manifest.json"))?;
     let manifest: serde_json::Value = serde_json::from_str(&manifest)?;
     println!("{code} bytes of code with the features {}", manifest["features"]);
@@ -259,13 +259,6 @@ fn a_step_from_c_costs_what_one_from_rust_does() -> Result<()> {
     println!("a step that evaluates the network: {rust} instructions from Rust, {c} from C");
     ensure!(c <= rust + CALL_LIMIT, "{c} instructions from C, {rust} from Rust");
     Ok(())
-}
-
-/// Returns the bytes of flash of a program.
-fn code_bytes(elf: &Path) -> Result<u64> {
-    let bytes = fs::read(elf)?;
-    let elf = object::File::parse(&*bytes)?;
-    Ok([".text", ".data"].iter().filter_map(|name| elf.section_by_name(name)).map(|section| section.size()).sum())
 }
 
 fn text(path: &Path) -> String {
