@@ -14,6 +14,7 @@ mod heads;
 mod link;
 mod linked;
 mod logs;
+mod packages;
 mod portable;
 pub(crate) mod qemu;
 mod start;

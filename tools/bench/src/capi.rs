@@ -51,6 +51,31 @@ impl Core {
         CORES.iter().find(|core| core.name == name).copied()
     }
 
+    /// Name of the core in Arduino's `build.mcu`, which is gcc's: `None` if it is not a Cortex-M.
+    fn mcu(self) -> Option<&'static str> {
+        self.flags.iter().find_map(|flag| flag.strip_prefix("-mcpu="))
+    }
+
+    /// Templates of the package's files for build systems (in `capi/package`), and their names in the package.
+    fn templates(self) -> Vec<(&'static str, &'static str)> {
+        let mut all = vec![
+            ("actqConfig.cmake", "lib/cmake/actq/actqConfig.cmake"),
+            ("actqConfigVersion.cmake", "lib/cmake/actq/actqConfigVersion.cmake"),
+            ("actq.pc", "lib/pkgconfig/actq.pc"),
+            ("zephyr/module.yml", "zephyr/module.yml"),
+            ("zephyr/Kconfig", "zephyr/Kconfig"),
+            ("zephyr/CMakeLists.txt", "zephyr/CMakeLists.txt"),
+            ("library.json", "library.json"),
+        ];
+        if self.mcu().is_some() {
+            all.push(("library.properties", "library.properties"));
+        }
+        if self.target == Some(Target::Riscv) {
+            all.extend(["CMakeLists.txt", "idf_component.yml"].map(|name| (name, name)));
+        }
+        all
+    }
+
     /// Builds the library for this core with these features, and returns its path.
     ///
     /// # Errors
@@ -85,22 +110,20 @@ impl Core {
         let mut files = Files::default();
         let features =
             image.map_or_else(|| "default".to_owned(), |image| image.features().collect::<Vec<_>>().join(" "));
-        files.put("lib/libactq.a", &fs::read(self.library(&features)?)?);
+        let library = fs::read(self.library(&features)?)?;
+        files.put("lib/libactq.a", &library);
         let capi = root().join("capi");
         for header in ["actq.h", "actq.hpp"] {
             files.put(&format!("include/{header}"), &fs::read(capi.join("include").join(header))?);
         }
-        for (from, to) in [
-            ("CMakeLists.txt", "CMakeLists.txt"),
-            ("actqConfig.cmake", "lib/cmake/actq/actqConfig.cmake"),
-            ("actqConfigVersion.cmake", "lib/cmake/actq/actqConfigVersion.cmake"),
-            ("actq.pc", "lib/pkgconfig/actq.pc"),
-            ("zephyr/module.yml", "zephyr/module.yml"),
-            ("zephyr/Kconfig", "zephyr/Kconfig"),
-            ("zephyr/CMakeLists.txt", "zephyr/CMakeLists.txt"),
-            ("library.json", "library.json"),
-            ("library.properties", "library.properties"),
-        ] {
+        if let Some(mcu) = self.mcu() {
+            // Arduino looks only below `src`.
+            files.put(&format!("src/{mcu}/libactq.a"), &library);
+            for header in ["actq.h", "actq.hpp"] {
+                files.put(&format!("src/{header}"), format!("#include \"../include/{header}\"\n").as_bytes());
+            }
+        }
+        for (from, to) in self.templates() {
             let text = fs::read_to_string(capi.join("package").join(from)).with_context(|| from.to_owned())?;
             files.put(to, text.replace("@VERSION@", VERSION).replace("@CORE@", self.name).as_bytes());
         }
@@ -117,7 +140,7 @@ impl Core {
             "parts": parts,
             "sha256": digests,
             "not_measured": ["time, stack and power on a real board"],
-            "not_run": ["the files for Zephyr, ESP-IDF, PlatformIO and Arduino"],
+            "not_run": ["builds by Zephyr, ESP-IDF and Arduino"],
         });
         files.put("manifest.json", format!("{manifest:#}\n").as_bytes());
         let write = || if is_archive { files.write_archive(out, self.name) } else { files.write_folder(out) };

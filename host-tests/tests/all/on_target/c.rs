@@ -30,20 +30,20 @@ use tempfile::TempDir;
 /// Bytes that opening, checking and running an image with any operation may take, at -Os.
 const CODE_LIMIT: u64 = 37 << 10;
 
-fn is_installed(program: &str) -> bool {
+pub(super) fn is_installed(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
 }
 
 /// The images that the library in the package runs.
 #[derive(Clone, Copy, PartialEq)]
-enum Runs {
+pub(super) enum Runs {
     AnyImage,
     /// Those that need no more than the image in the folder.
     ThisImage,
 }
 
 /// A folder with the package, the examples and the built-in image as C source; `None`, with a note, without a compiler.
-fn folder(runs: Runs) -> Result<Option<TempDir>> {
+pub(super) fn folder(runs: Runs) -> Result<Option<TempDir>> {
     folder_of(firmware::built_in()?, Some(&ur3().join("heldout.npz")), runs)
 }
 
@@ -76,7 +76,7 @@ fn folder_of(file: &Path, recording: Option<&Path>, runs: Runs) -> Result<Option
 }
 
 /// Runs shell commands in a folder, and returns what they print.
-fn shell(dir: &TempDir, commands: &str) -> Result<String> {
+pub(super) fn shell(dir: &TempDir, commands: &str) -> Result<String> {
     let output = Command::new("sh").arg("-c").arg(commands).current_dir(dir.path()).output()?;
     let printed = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
     ensure!(output.status.success(), "{printed}");
