@@ -217,6 +217,11 @@ impl Spec {
             self.widths.is_empty() || distills,
             "widths: only method distill has them; add \"distill\" to methods, or remove widths"
         );
+        let of_learning =
+            [("steps", self.steps.is_some()), ("effort", self.effort != Effort::Default), ("relative", self.relative)];
+        for (key, _) in of_learning.into_iter().filter(|(_, is_given)| *is_given) {
+            ensure!(distills, "{key}: only method distill learns; add \"distill\" to methods, or remove {key}");
+        }
         ensure!(self.cpus > 0, "cpus: 0; a job takes at least 1");
         ensure!(self.evaluate.per_job != Some(0), "evaluate.per_job: 0; use 1 or more episodes");
         if let Some(drive) = &self.drive {

@@ -38,6 +38,7 @@ pub fn run(
     }
     let options = options(args, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }));
     options.check()?;
+    options.check_length()?;
     check_budget(&source, &options)?;
     let (calib, shares) = learned_from(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
     let shares = shares.unwrap_or_default();

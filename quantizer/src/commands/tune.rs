@@ -21,6 +21,15 @@ use crate::threads::start_threads;
 
 /// Quantizes in on-policy rounds: rolls out, labels, and learns again.
 pub(crate) fn run(args: &TuneArgs) -> Result<()> {
+    let budget = match args.bpw {
+        Some(bits) => Budget::BitsPerWeight(bits),
+        None => Budget::Width(args.bits.unwrap_or(Width::W3)),
+    };
+    let LearnArgs { distill: DistillArgs { effort, steps, relative }, minutes } = args.learn;
+    let options =
+        Options { effort, steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Distill, budget) };
+    options.check()?;
+    options.check_length()?;
     let mut calib = files_of(&args.calib)?;
     let inputs = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned());
     let outputs = reserve([&args.out].into_iter().chain(&args.json), inputs)?;
@@ -42,13 +51,6 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     let folder = Folder::new(args.keep.as_deref())?;
     let drive = Drive::new(&args.drive, &policy, folder.path())?;
     start_threads(args.run.threads)?;
-    let budget = match args.bpw {
-        Some(bits) => Budget::BitsPerWeight(bits),
-        None => Budget::Width(args.bits.unwrap_or(Width::W3)),
-    };
-    let LearnArgs { distill: DistillArgs { effort, steps, relative }, minutes } = args.learn;
-    let options =
-        Options { effort, steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Distill, budget) };
     let plan = TunePlan { policy: &policy, calib, heldout, options: &options, rounds: args.rounds };
     let tuned = tune::run(
         plan,

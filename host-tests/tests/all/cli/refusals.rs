@@ -50,6 +50,29 @@ fn a_wrong_command_line_has_status_2() -> Result<()> {
 }
 
 #[test]
+fn lengths_of_learning_require_learning() -> Result<()> {
+    let fixture = Fixture::new()?;
+    fs::remove_file(fixture.policy().join("calib.npz"))?;
+    let before = fixture.snapshot()?;
+    let (policy, out) = (text(&fixture.policy()), text(&fixture.out("image.actq")));
+    let lines = [
+        ("quantize --method rtn --steps 0", "--steps: method rtn does not learn; remove --steps"),
+        ("quantize --method rtn --effort quick", "--effort: method rtn does not learn"),
+        ("quantize --method gptq --minutes 1 --steps 5", "--steps and --minutes: method gptq does not learn"),
+        // Without a recording, the default method is rtn.
+        ("quantize --steps 500", "pass --method distill and a recording"),
+        ("quantize --method distill --steps 0 --minutes 1", "--minutes: --steps 0 does not learn"),
+        ("tune --steps 0 --minutes 1 --drive true", "--minutes: --steps 0 does not learn"),
+    ];
+    all(lines.map(|(line, message)| {
+        let words = line.split_whitespace().chain([&*policy, "--out", &out]).collect::<Vec<_>>();
+        (line.to_owned(), run(actq(&words), b"").and_then(|output| failed(&output, 1, &[message])))
+    }))?;
+    ensure!(fixture.snapshot()? == before, "files changed");
+    Ok(())
+}
+
+#[test]
 fn unwritable_outputs_leave_no_file() -> Result<()> {
     let fixture = Fixture::new()?;
     fs::create_dir(fixture.out("folder"))?;

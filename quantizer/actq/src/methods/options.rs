@@ -181,6 +181,25 @@ impl Options {
         Ok(())
     }
 
+    /// Refuses options that say how long to learn if nothing learns. [`Self::check`] accepts them, as searches set the
+    /// steps of every method.
+    pub fn check_length(&self) -> Result<()> {
+        let lengths = [
+            ("--steps", self.steps.is_some() && self.method != Method::Distill),
+            ("--effort", self.effort != Effort::Default),
+            ("--minutes", self.minutes.is_some()),
+        ];
+        let given: Vec<&str> = lengths.into_iter().filter(|(_, is_given)| *is_given).map(|(name, _)| name).collect();
+        let given = given.join(" and ");
+        ensure!(
+            given.is_empty() || self.method == Method::Distill,
+            "{given}: method {} does not learn; remove {given}, or pass --method distill and a recording",
+            self.method
+        );
+        ensure!(given.is_empty() || self.learns(), "{given}: --steps 0 does not learn; remove one of them");
+        Ok(())
+    }
+
     /// Returns `true` if the method learns.
     pub fn learns(&self) -> bool {
         self.method == Method::Distill && self.steps != Some(0)
