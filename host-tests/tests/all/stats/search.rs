@@ -49,6 +49,9 @@ fn learning_methods_search_with_few_steps() -> Result<()> {
     ensure!(fixture.nmse("a.actq")? <= 0.05, "{printed}");
     succeeded(&fixture.quantize(&format!("--out b.actq {options} --threads 1"))?)?;
     ensure!(fs::read(fixture.path("a.actq"))? == fs::read(fixture.path("b.actq"))?, "two runs differ");
+    // The search ends at the image of 8 bits by rounding, to which the options of learning do not apply.
+    succeeded(&fixture.quantize(&format!("--out b.actq {options} --relative"))?)?;
+    ensure!(fixture.nmse("b.actq")? <= 0.05, "the limit is not kept");
     // Without steps there is no eighth of them.
     let printed = succeeded(&fixture.quantize("--out c.actq --method distill --steps 0 --max-nmse 0.3")?)?;
     let steps = steps_tried(&printed);

@@ -120,7 +120,7 @@ pub(super) fn smallest(
 
 /// Returns the first budget with room for 8 bits everywhere, in steps of the search.
 fn top(policy: &Policy, options: &Options) -> Result<usize> {
-    let plain = Options { method: Method::Rtn, forced: Vec::new(), ..options.clone() };
+    let plain = Options { method: Method::Rtn, relative: false, forced: Vec::new(), ..options.clone() };
     let (_, outcomes) = methods::quantize(&policy.graph, None, Rate::Width(Width::W8), &plain)?;
     let bytes: usize = outcomes.iter().map(Outcome::bytes).sum();
     Ok((PER_BIT * 8 * bytes).div_ceil(policy.graph.weights().max(1)))
