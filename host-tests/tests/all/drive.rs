@@ -371,9 +371,8 @@ fn tune_drives_and_learns_again() -> Result<()> {
     // A folder whose name a shell would split.
     let fixture = Fixture::new(Network::Chunk)?;
     let drive = driver(&fixture)?;
-    let mut command =
-        fixture.command("tune policy --bits 3 --steps 8 --rounds 2 --out tuned.actq --json tuned.json --keep");
-    command.arg("it's kept").arg("--drive").arg(&drive);
+    let mut command = fixture.command("tune policy --bits 3 --steps 8 --rounds 2 --out tuned.actq");
+    command.args(["--keep", "it's kept", "--json", "it's kept/tuned.json", "--drive", &drive]);
     let output = run(command, b"")?;
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     let table = succeeded(&output)?;
@@ -385,7 +384,7 @@ fn tune_drives_and_learns_again() -> Result<()> {
     }
     ensure!(rows[0].join(" ").contains("tracking error mm") && rows[3].contains(&"1.500"), "{table}");
 
-    let json: Value = serde_json::from_slice(&fs::read(fixture.path("tuned.json"))?)?;
+    let json: Value = serde_json::from_slice(&fs::read(fixture.path("it's kept/tuned.json"))?)?;
     let rounds = json["rounds"].as_array().context("rounds")?;
     assert_eq!(rounds.len(), 3);
     assert_eq!(rounds[2]["driven"]["success"], 0.7);

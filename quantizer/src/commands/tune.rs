@@ -14,7 +14,7 @@ use anyhow::{Context as _, Result, ensure};
 use super::drive::Drive;
 use crate::args::{DistillArgs, LearnArgs, TuneArgs};
 use crate::importers::{load, policy_files};
-use crate::outputs::unfinished::Scratch;
+use crate::outputs::unfinished::{OutputFolder, Scratch};
 use crate::report;
 use crate::terminal::{Progress, note, print, reserve};
 use crate::threads::start_threads;
@@ -31,6 +31,11 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     options.check()?;
     options.check_length()?;
     let mut calib = files_of(&args.calib)?;
+    // Before the outputs, which may be in this folder.
+    let folder = Folder::new(args.keep.as_deref())?;
+    for output in [&args.out].into_iter().chain(&args.json) {
+        folder.refuse_output(output)?;
+    }
     let inputs = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned());
     let outputs = reserve([&args.out].into_iter().chain(&args.json), inputs)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
@@ -48,7 +53,6 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     let load = |file: &PathBuf| Dataset::load(file, sizes);
     let calib = calib.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, sizes)?;
-    let folder = Folder::new(args.keep.as_deref())?;
     let drive = Drive::new(&args.drive, &policy, folder.path())?;
     start_threads(args.run.threads)?;
     let plan = TunePlan { policy: &policy, calib, heldout, options: &options, rounds: args.rounds };
@@ -82,7 +86,11 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
 
 /// The folder of images and recordings during the rounds.
 enum Folder {
-    Kept(PathBuf),
+    Kept {
+        path: PathBuf,
+        /// Its drop removes the folder if it is still empty.
+        _made: OutputFolder,
+    },
     Temporary(Scratch),
 }
 
@@ -94,17 +102,28 @@ impl Folder {
             return Ok(Self::Temporary(Scratch::new().context("cannot create a temporary folder for recordings")?));
         };
         let name = dir.display();
-        if !dir.exists() {
-            fs::create_dir(dir).with_context(|| format!("{name}: cannot create the folder"))?;
-        }
+        let _made = OutputFolder::new(dir).with_context(|| format!("{name}: cannot create the folder"))?;
         let mut entries = fs::read_dir(dir).with_context(|| format!("{name}: cannot read the folder"))?;
         ensure!(entries.next().is_none(), "{name}: is not empty; pass a new or empty folder to --keep");
-        Ok(Self::Kept(dir.to_owned()))
+        Ok(Self::Kept { path: dir.to_owned(), _made })
+    }
+
+    /// Refuses an output in the folder with the name of a round's image or recordings.
+    fn refuse_output(&self, output: &Path) -> Result<()> {
+        let parent = output.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let is_inside = fs::canonicalize(parent).ok() == fs::canonicalize(self.path()).ok();
+        let is_of_round = output.file_name().is_some_and(|name| name.to_string_lossy().starts_with("round-"));
+        ensure!(
+            !is_inside || !is_of_round,
+            "{}: round-... in the folder of --keep is the name of a round's image or recordings; choose another name",
+            output.display()
+        );
+        Ok(())
     }
 
     fn path(&self) -> &Path {
         match self {
-            Self::Kept(path) => path,
+            Self::Kept { path, .. } => path,
             Self::Temporary(folder) => folder.path(),
         }
     }

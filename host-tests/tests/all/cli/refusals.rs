@@ -89,7 +89,7 @@ fn unwritable_outputs_leave_no_file() -> Result<()> {
 #[test]
 fn outputs_are_refused_before_any_work() -> Result<()> {
     let fixture = Fixture::new()?;
-    let (policy, good) = (text(&fixture.out("no-policy")), text(&fixture.out("good")));
+    let [policy, good, kept] = ["no-policy", "good", "kept"].map(|name| text(&fixture.out(name)));
     fs::write(fixture.out("file"), "")?;
     let before = fixture.snapshot()?;
     let mut bad =
@@ -104,6 +104,7 @@ fn outputs_are_refused_before_any_work() -> Result<()> {
             ["quantize", &policy, "--out", &good, "--save-stats", bad].map(str::to_owned).to_vec(),
             ["tune", &policy, "--drive", "true", "--out", bad].map(str::to_owned).to_vec(),
             ["tune", &policy, "--drive", "true", "--out", &good, "--json", bad].map(str::to_owned).to_vec(),
+            ["tune", &policy, "--drive", "true", "--out", bad, "--keep", &kept].map(str::to_owned).to_vec(),
             ["sweep", &policy, "--svg", bad].map(str::to_owned).to_vec(),
             ["sweep", &policy, "--svg", &good, "--json", bad].map(str::to_owned).to_vec(),
         ]
@@ -113,6 +114,12 @@ fn outputs_are_refused_before_any_work() -> Result<()> {
         let refused = run(actq(&words), b"").and_then(|output| failed(&output, 1, &[bad, "cannot write the file"]));
         (command.join(" "), refused)
     }))?;
+    // The folder that tune keeps has files of its own.
+    for file in ["round-0.actq", "round-1"] {
+        let out = text(&fixture.out("kept").join(file));
+        let line = ["tune", &policy, "--drive", "true", "--out", &out, "--keep", &kept];
+        failed(&run(actq(&line), b"")?, 1, &[&out, "choose another name"])?;
+    }
     ensure!(fixture.snapshot()? == before, "files changed");
     Ok(())
 }
