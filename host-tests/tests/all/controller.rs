@@ -12,11 +12,13 @@ use std::time::Duration;
 use std::{fs, thread};
 
 use actq::data::arrays;
+use actq::methods::Activations;
+use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq_bench::bits;
 use actq_bench::command::{actq, failed, run, succeeded};
 use actq_bench::golden::Random;
 use actq_bench::networks::{Builder, with_wrong_self_test};
+use actq_bench::{bits, rtn};
 use actq_boards::ram::Ram;
 use actq_controller::breadcrumb::Record;
 use actq_controller::endpoint::Facts;
@@ -29,9 +31,10 @@ use actq_link::report::{BUILT_IN, Timing};
 use anyhow::{Context, Result, ensure};
 use embedded_storage::nor_flash::ReadNorFlash as _;
 use ndarray::Array3;
+use serde_json::json;
 use tempfile::TempDir;
 
-use crate::folder::write_observations;
+use crate::folder::{write_observations, write_policy};
 
 const OBS: usize = 24;
 const ACT: usize = 3;
@@ -47,8 +50,23 @@ fn image(name: &str, seed: u64) -> Result<Vec<u8>> {
     let mut builder = Builder::new(OBS);
     // The seed changes the weights.
     builder.values(seed as usize);
-    builder.linear((ACT, OBS), actq::methods::Activations::Int8, |_| Some(Width::W3), 0, true)?;
+    builder.linear((ACT, OBS), Activations::Int8, |_| Some(Width::W3), 0, true)?;
     builder.image(name)
+}
+
+/// The image of a flow that makes chunks of two actions, with random weights.
+fn flow() -> Result<Vec<u8>> {
+    let folder = TempDir::new()?;
+    let json = json!({
+        "name": "flow", "kind": "flow", "steps": 2, "chunk": 2, "execute": 2, "obs_dim": OBS, "act_dim": ACT,
+        "time": {"freq": "frequencies"},
+        "ops": [{"op": "linear", "w": "weights", "input": ["obs", "tfeat", "x"]}],
+    });
+    let (rows, cols, mut random) = (2 * ACT, OBS + 2 + 2 * ACT, Random::new(6));
+    let weights = (0..rows * cols).map(|_| 0.2 * random.unit()).collect();
+    let tensors = [("weights", vec![rows, cols], weights), ("frequencies", vec![1], vec![0.5])];
+    write_policy(folder.path(), &json, tensors)?;
+    rtn(&Policy::load(folder.path())?, Width::W8, 0, Activations::Int8)
 }
 
 struct Controller {
@@ -263,6 +281,21 @@ fn the_command_watches_streams_and_updates() -> Result<()> {
     let arguments = [&path("new.actq"), &recording, "--rate", "50", "--log", &log];
     succeeded(&controller.actq("stream", &arguments)?)?;
     check_log(&log, &new)?;
+    controller.end()
+}
+
+/// The noise of a recorded flow stays on the host: the controller takes observations alone, and draws its own.
+#[test]
+fn the_observations_of_a_flow_are_streamed_without_noise() -> Result<()> {
+    let (folder, recording) = folder()?;
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let image = flow()?;
+    fs::write(path("flow.actq"), &image)?;
+    let controller = Controller::start(image.clone(), [0; 32])?;
+    let (recording, log) = (recording.display().to_string(), path("log.npz"));
+    let arguments = [&path("flow.actq"), &recording, "--rate", "50", "--log", &log];
+    succeeded(&controller.actq("stream", &arguments)?)?;
+    check_log(&log, &image)?;
     controller.end()
 }
 

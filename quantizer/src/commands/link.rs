@@ -101,7 +101,8 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     let frames = recording.frames();
     let observations = recording.observations().enumerate().map(|(i, observation)| {
         progress.set_share(i as f64 / frames as f64);
-        observation.to_vec()
+        // The noise of an iterative head follows the observation; the controller makes its own.
+        observation.iter().take(image.obs_len()).copied().collect()
     });
     let outcome =
         stream(&mut client, observations, &pace, &mut log, |status| progress.set_work(&status.state.to_string()));
