@@ -8,6 +8,7 @@ mod c_ports;
 mod cli;
 mod constants;
 mod controller;
+mod demo;
 mod denoising;
 mod deployed;
 mod digests;
