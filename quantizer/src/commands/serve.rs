@@ -1,7 +1,7 @@
 //! `actq serve`
 
-use std::io;
 use std::path::Path;
+use std::{env, io};
 
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
@@ -18,17 +18,25 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let (input, output) = (io::stdin().lock(), io::stdout().lock());
-    let Some(path) = &args.record else { return serve(image, input, output, |_| {}) };
-    // An action of raw values has no label: `actq quantize` makes the networks' observations of them.
+    let Some(path) = &args.record else {
+        // The variable is set for every command of a rollout.
+        let is_option =
+            args.policy.as_ref().is_some_and(|policy| env::var_os("ACTQ_POLICY").is_none_or(|of| of != **policy));
+        ensure!(!is_option, "--policy labels the recording of --record FILE.npz; add that, or remove --policy");
+        return serve(image, input, output, |_| {});
+    };
+    // An action of raw values has no label: `actq quantize` makes the networks' observations of them. Neither has one from
+    // noise: whoever reads the recording draws noise, and labels the observations with it.
+    let is_labelled = !image.has_around() && image.noise_len() == 0;
     let source = if image.has_around() { None } else { source(args, &image)? };
-    if source.is_none() && !image.has_around() {
+    if source.is_none() && is_labelled {
         note([
             "the image's folder does not hold the policy that the image was made from, so the recording gets no array \
                \"action\" (quantize and eval then compute it); pass the policy folder to --policy"
                 .to_owned(),
         ]);
     }
-    let plan = RecordPlan { path, source: source.as_ref() };
+    let plan = RecordPlan { path, source: source.as_ref().filter(|_| is_labelled) };
     serve_recorded(image, plan, input, output, |text| note([text]))
 }
 

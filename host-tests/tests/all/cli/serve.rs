@@ -1,11 +1,14 @@
 //! `actq serve`: the pipe protocol as a simulator uses it.
 
 use std::io::{Read as _, Write as _};
+use std::path::Path;
 use std::process::Stdio;
 
+use actq::data::arrays;
 use actq::runtime::{ImageBuffer, with_head};
-use actq_bench::command::{actq, all, failed, run};
+use actq_bench::command::{actq, all, failed, run, succeeded};
 use actq_bench::qemu::step_request;
+use actq_bench::ur3_flow;
 use actq_link::{RESET, STEP};
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
@@ -117,4 +120,35 @@ fn serve_answers_non_finite_values_without_an_action() -> Result<()> {
         ensure!(answers.iter().eq(right), "{what}: {answers:02x?}");
     }
     Ok(())
+}
+
+/// The recording of a flow has no noise, so it has no actions either: a reader draws noise, and labels it.
+#[test]
+fn a_flow_is_recorded_without_actions() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let (policy, image, recording) = (text(&ur3_flow()), fixture.out("flow.actq"), fixture.out("drive.npz"));
+    let [image, recording] = [image, recording].map(|path| text(&path));
+    succeeded(&run(actq(&["quantize", &policy, "--method", "rtn", "--bits", "4", "--out", &image]), b"")?)?;
+    let observations = draw_observations(9, 18);
+    let requests: Vec<Vec<u8>> = observations.rows().into_iter().map(|row| step_request(&row.to_vec())).collect();
+    let serve = ["serve", &image, "--policy", &policy, "--record", &recording];
+    let output = run(actq(&serve), &requests.concat())?;
+    ensure!(output.status.code() == Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    ensure!(output.stdout.len() == requests.len() * 4 * 6, "{} bytes of answers", output.stdout.len());
+    let recorded = arrays(Path::new(&recording))?;
+    ensure!(recorded["obs"].shape.iter().product::<usize>() == observations.len() && !recorded.contains_key("action"));
+    let eval = ["eval", &image, "--policy", &policy, "--driven", &recording];
+    ensure!(succeeded(&run(actq(&eval), b"")?)?.contains("own path"));
+    Ok(())
+}
+
+#[test]
+fn a_policy_without_a_recording_is_refused() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let (image, policy) = (text(&fixture.image("")?), text(&fixture.policy()));
+    failed(&run(actq(&["serve", &image, "--policy", &policy]), b"")?, 1, &["--policy", "--record FILE.npz"])?;
+    // Every command of a rollout has it in its environment.
+    let mut command = actq(&["serve", &image]);
+    command.env("ACTQ_POLICY", &policy);
+    succeeded(&run(command, b"")?).map(drop)
 }
