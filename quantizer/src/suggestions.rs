@@ -2,7 +2,7 @@
 
 use std::env;
 
-use clap::error::{ContextKind, ContextValue};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, Error, Parser as _};
 
 use crate::args::Cli;
@@ -20,7 +20,8 @@ pub(crate) fn parse() -> Cli {
 
 /// Adds a suggestion that clap misses: its similarity measure finds swapped letters in long names only.
 fn suggest(error: &mut Error) {
-    if error.get(ContextKind::SuggestedArg).is_some() {
+    // Errors of other kinds, as a conflict, name options that exist.
+    if error.kind() != ErrorKind::UnknownArgument || error.get(ContextKind::SuggestedArg).is_some() {
         return;
     }
     let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return };

@@ -329,6 +329,10 @@ fn missing_controllers_and_wrong_command_lines_are_reported() -> Result<()> {
     {
         failed(&link(arguments)?, 2, &["error"])?;
     }
+    for arguments in [&["get", "deadline"][..], &["set", "max-age", "5"]] {
+        let line = [&[arguments[0], "tcp:127.0.0.1:1"], &arguments[1..], &["--axis", "1"]].concat();
+        failed(&link(&line)?, 1, &["--axis 1", "remove --axis"])?;
+    }
     // A listener that is no controller.
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let port = format!("tcp:{}", listener.local_addr()?);

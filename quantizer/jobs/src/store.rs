@@ -40,6 +40,12 @@ impl Store {
         let name = folder.display();
         let folder = std::path::absolute(folder).map_err(JobError::never)?;
         let store = Self { folder };
+        let is_other = store.folder.exists() && !store.folder.is_dir();
+        if is_other {
+            return Err(JobError::never(Error::input(format!(
+                "{name}: is not a folder; choose the folder of the results"
+            ))));
+        }
         let path = store.folder.join(HEADER);
         match fs::read(&path) {
             Ok(bytes) => store.check(&bytes).map_err(|error| JobError::never(error.context(name.to_string())))?,

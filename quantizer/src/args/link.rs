@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use actq_client::port::Address;
 use actq_link::code::Parameter;
+use anyhow::{Result, ensure};
 use clap::{Subcommand, ValueEnum};
 
 #[derive(clap::Args)]
@@ -114,6 +115,24 @@ pub(crate) struct GetArgs {
     /// The axis, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) axis: u8,
+}
+
+impl GetArgs {
+    /// Returns the parameter and its axis.
+    ///
+    /// # Errors
+    ///
+    /// If an axis is given for a parameter that all axes share.
+    pub(crate) fn checked(&self) -> Result<(Parameter, u8)> {
+        let parameter = Parameter::from(self.parameter);
+        let is_shared = matches!(parameter, Parameter::Deadline | Parameter::MaxAge | Parameter::StatusPeriod);
+        ensure!(
+            !is_shared || self.axis == 0,
+            "--axis {}: the {parameter} is not of one axis; remove --axis",
+            self.axis
+        );
+        Ok((parameter, self.axis))
+    }
 }
 
 #[derive(clap::Args)]

@@ -70,6 +70,7 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
 fn source_of(dir: &Path, image: &Image<'_>) -> Result<Option<Policy>> {
     if !source_files(dir).iter().any(|file| file.exists()) {
         ensure!(dir.exists(), "{}: there is no such folder", dir.display());
+        ensure!(dir.is_dir(), "{}: not a folder; name a policy folder, or an .onnx file", dir.display());
         return Ok(None);
     }
     let policy = load(dir)?;

@@ -40,10 +40,14 @@ pub(crate) fn run(args: &LinkArgs) -> Result<()> {
         LinkCommand::Arm(port) => connect(port)?.arm(),
         LinkCommand::Disarm(port) => connect(port)?.disarm(),
         LinkCommand::Get(args) => {
-            let value = connect(&args.port)?.get(args.parameter.into(), args.axis)?;
+            let (parameter, axis) = args.checked()?;
+            let value = connect(&args.port)?.get(parameter, axis)?;
             print(&format!("{value}\n"))
         }
-        LinkCommand::Set { of, value } => connect(&of.port)?.set(of.parameter.into(), of.axis, *value),
+        LinkCommand::Set { of, value } => {
+            let (parameter, axis) = of.checked()?;
+            connect(&of.port)?.set(parameter, axis, *value)
+        }
         LinkCommand::Stream(args) => run_stream(args),
         LinkCommand::Serve { port, arm } => {
             serve::serve(&mut connect(port)?, *arm, io::stdin().lock(), io::stdout().lock())

@@ -82,7 +82,9 @@ fn eval_labels_a_named_recording_by_its_policy() -> Result<()> {
     edit(&fixture.policy(), "/control_hz", json!(26))?;
     let edited = eval(&["--policy", &policy])?;
     failed(&edited, 1, &["was made from another policy", "heldout.npy: array \"action\" is missing"])?;
-    fs::write(fixture.policy().join("policy.json"), "{broken")?;
+    let file = text(&fixture.policy().join("policy.json"));
+    failed(&eval(&["--policy", &file])?, 1, &["policy.json: not a folder"])?;
+    fs::write(&file, "{broken")?;
     failed(&eval(&["--policy", &policy])?, 1, &["policy.json"])?;
     failed(&eval(&["--policy", &text(&fixture.out("none"))])?, 1, &["there is no such folder"])
 }

@@ -282,6 +282,8 @@ fn sweeps_are_refused_before_any_job() -> Result<()> {
     failed(&sweep.run("sweep sweep.toml policy --store store", "")?, 1, &["sweep.toml: is a spec; sweep it alone"])?;
     failed(&sweep.run("sweep sweep.toml --quiet", "")?, 1, &["sweep.toml: is a spec; add --store DIR"])?;
     failed(&sweep.run("sweep sweep.toml --store policy --quiet", "")?, 1, &["is not empty, and has no store.json"])?;
+    // Another try does not help.
+    failed(&sweep.run("merge sweep.toml --store sweep.toml", "")?, 1, &["sweep.toml: is not a folder"])?;
     failed(&sweep.run("merge sweep.toml --store new", "")?, 1, &["jobs have no result yet"])?;
     failed(&sweep.run("job - --store store", "{}")?, 1, &["standard input: is not one job"])?;
     failed(&sweep.run("plan simulator.sh", "")?, 1, &["simulator.sh: is not a plan"])

@@ -161,6 +161,10 @@ fn a_misspelt_option_gets_a_suggestion() -> Result<()> {
         command.arg(name).arg("--jsno");
         failed(&run(command, b"")?, 2, &["'--json'"])?;
     }
+    // A conflict is not a misspelling.
+    let output = run(actq(&["inspect", "x", "--widths", "--json"]), b"")?;
+    failed(&output, 2, &["cannot be used with"])?;
+    ensure!(!String::from_utf8_lossy(&output.stderr).contains("similar"), "{output:?}");
     // An option of another command is not an option of this one.
     let output = run(actq(&["inspect", "x", "--bwp", "2"]), b"")?;
     ensure!(!String::from_utf8_lossy(&output.stderr).contains("similar"), "{output:?}");
