@@ -19,6 +19,15 @@ const MAX_REPEAT: Duration = Duration::from_secs(1);
 /// Attempts of a change, each with the current token.
 const ATTEMPTS: usize = 3;
 
+/// Fails, with the reason, if a controller that was armed is not any more.
+pub(crate) fn require_armed(status: &Status) -> Result<()> {
+    if status.state != State::Armed {
+        let why = status.fault.map_or("it was disarmed".to_owned(), |fault| fault.to_string());
+        bail!("the controller is {}: {why}", status.state);
+    }
+    Ok(())
+}
+
 /// Client of a controller.
 pub struct Client {
     connection: Connection,
@@ -69,10 +78,11 @@ impl Client {
     fn ask<T>(&mut self, message: &Message<'_>, wanted: impl Fn(&Event, &[u32]) -> Option<T>) -> Result<T> {
         let begun = Instant::now();
         let (mut numbers, mut wait) = (Vec::new(), REPEAT);
-        while begun.elapsed() < self.timeout {
+        loop {
             numbers.push(self.connection.send(message)?);
-            let sent = Instant::now();
-            while sent.elapsed() < wait {
+            let (sent, was_open) = (Instant::now(), self.connection.is_open());
+            // Each loop checks the time at its end: an answer that came while this process stood still is read.
+            loop {
                 let (mut answer, events) = (None, &mut self.events);
                 self.connection.poll(|event| match wanted(&event, &numbers) {
                     Some(found) if answer.is_none() => answer = Some(found),
@@ -81,10 +91,16 @@ impl Client {
                 if let Some(answer) = answer {
                     return Ok(answer);
                 }
+                if sent.elapsed() >= wait {
+                    break;
+                }
             }
             wait = wait.mul_f64(1.5).min(MAX_REPEAT);
+            // The connection gives up a lost port; after its return the request is sent again.
+            if was_open && begun.elapsed() >= self.timeout {
+                bail!("no answer for {:.1?}: {}", self.timeout, self.connection.silence());
+            }
         }
-        bail!("no answer for {:.1?}: {}", self.timeout, self.connection.silence())
     }
 
     /// Sends a request until it is acknowledged. Returns the accepted bytes of the update, and the outcome.

@@ -165,6 +165,11 @@ impl Connection {
         Ok(())
     }
 
+    /// Returns `true` unless the port is lost.
+    pub(crate) const fn is_open(&self) -> bool {
+        self.port.is_some()
+    }
+
     /// Number of times that the port was reopened.
     pub const fn reopened(&self) -> u32 {
         self.reopened

@@ -3,11 +3,10 @@
 use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
-use actq_link::code::State;
 use actq_link::{NO_ACTION, RESET, STEP};
 use anyhow::{Context as _, Result, bail};
 
-use crate::client::Client;
+use crate::client::{Client, require_armed};
 use crate::event::Event;
 
 /// Time without an action before an observation is sent again.
@@ -56,25 +55,43 @@ pub fn serve(client: &mut Client, arm: bool, mut input: impl Read, mut output: i
     }
 }
 
-/// Returns the action for an observation; `None` without one.
+/// Returns the action for an observation; `None` without one. An attempt counts only if the controller answers a later
+/// request, so a late controller is waited for.
 fn step(client: &mut Client, observation: &[f32], armed: bool) -> Result<Option<Vec<f32>>> {
+    let mut numbers = Vec::new();
     for _ in 0..ATTEMPTS {
-        let number = client.observe(observation)?;
-        let sent = Instant::now();
-        while sent.elapsed() < REPEAT {
-            for event in client.events()? {
-                match event {
-                    Event::Action { of, applied, values, .. } if of == number && applied == armed => {
-                        return Ok(Some(values));
-                    }
-                    Event::Status(status) if armed && status.state != State::Armed => {
-                        let why = status.fault.map_or("it was disarmed".to_owned(), |fault| fault.to_string());
-                        bail!("the controller is {}: {why}", status.state);
-                    }
-                    _ => {}
-                }
+        numbers.push(client.observe(observation)?);
+        let mut action = listen(client, REPEAT, &numbers, armed)?;
+        if action.is_none() {
+            let status = client.status()?;
+            if armed {
+                require_armed(&status)?;
             }
+            // It may have sent the action before the status.
+            action = listen(client, Duration::ZERO, &numbers, armed)?;
+        }
+        if action.is_some() {
+            return Ok(action);
         }
     }
     Ok(None)
+}
+
+/// Waits at most `wait` for the action for an observation with one of these numbers.
+fn listen(client: &mut Client, wait: Duration, numbers: &[u32], armed: bool) -> Result<Option<Vec<f32>>> {
+    let begun = Instant::now();
+    loop {
+        for event in client.events()? {
+            match event {
+                Event::Action { of, applied, values, .. } if numbers.contains(&of) && applied == armed => {
+                    return Ok(Some(values));
+                }
+                Event::Status(status) if armed => require_armed(&status)?,
+                _ => {}
+            }
+        }
+        if begun.elapsed() >= wait {
+            return Ok(None);
+        }
+    }
 }

@@ -2,11 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use actq_link::code::State;
 use actq_link::report::Status;
-use anyhow::{Result, bail};
+use anyhow::Result;
 
-use crate::client::Client;
+use crate::client::{Client, require_armed};
 use crate::event::Event;
 use crate::log::Log;
 
@@ -66,9 +65,8 @@ fn listen(
                 Event::Action { of, applied, values, .. } => log.acted(of, applied, values),
                 Event::Status(status) => {
                     seen(&status);
-                    if armed && status.state != State::Armed {
-                        let why = status.fault.map_or("it was disarmed".to_owned(), |fault| fault.to_string());
-                        bail!("the controller is {}: {why}", status.state);
+                    if armed {
+                        require_armed(&status)?;
                     }
                 }
                 _ => {}

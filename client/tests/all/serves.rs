@@ -7,7 +7,7 @@ use actq_controller::Output;
 use actq_controller::slots::Anyone;
 use actq_link::{NO_ACTION, RESET, STEP};
 
-use crate::simulated::{Control, Simulated};
+use crate::simulated::Simulated;
 
 fn step(values: [f32; 4]) -> Vec<u8> {
     [STEP].into_iter().chain(values.into_iter().flat_map(f32::to_le_bytes)).collect()
@@ -15,6 +15,20 @@ fn step(values: [f32; 4]) -> Vec<u8> {
 
 fn actions(bytes: &[u8]) -> Vec<f32> {
     bytes.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+}
+
+/// Requests; calls the function with the number of each read before it.
+struct Requests<F>(Vec<u8>, usize, F);
+
+impl<F: FnMut(usize)> std::io::Read for Requests<F> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        self.1 += 1;
+        (self.2)(self.1);
+        let count = buffer.len().min(self.0.len());
+        buffer[..count].copy_from_slice(&self.0[..count]);
+        self.0.drain(..count);
+        Ok(count)
+    }
 }
 
 #[test]
@@ -59,23 +73,28 @@ fn refused_observations_and_protocol_errors_are_reported() {
 #[test]
 fn a_stopped_controller_ends_serving_with_its_reason() {
     let controller = Simulated::start(0, || Anyone);
-    let control = controller.control.clone();
-    /// Requests that pause after some steps until the deadline has passed.
-    struct Pausing<'c>(Vec<u8>, usize, &'c Control);
-    impl std::io::Read for Pausing<'_> {
-        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-            self.1 += 1;
-            if self.1 == 40 {
-                self.2.miss_the_deadline(std::thread::yield_now);
-            }
-            let count = buffer.len().min(self.0.len());
-            buffer[..count].copy_from_slice(&self.0[..count]);
-            self.0.drain(..count);
-            Ok(count)
+    let control = &controller.control;
+    // The simulator pauses after some steps until the deadline has passed.
+    let input = Requests((0..100).flat_map(|_| step([0.5; 4])).collect(), 0, |read| {
+        if read == 40 {
+            control.miss_the_deadline(std::thread::yield_now);
         }
-    }
-    let input = Pausing((0..100).flat_map(|_| step([0.5; 4])).collect(), 0, &control);
+    });
     let error = serve(&mut controller.client(), true, input, Vec::new()).expect_err("it has latched");
     assert!(error.to_string().contains("no valid observation arrived within the deadline"), "{error:#}");
     assert_eq!(control.starts.load(Ordering::Relaxed), 1);
+}
+
+/// It is late by more than the time of all attempts at a step.
+#[test]
+fn a_late_controller_still_answers_the_step() {
+    let controller = Simulated::start(0, || Anyone);
+    let input = Requests(step([0.5, 0.25, 0.0, 0.0]), 0, |read| {
+        if read == 2 {
+            controller.control.stall(1500);
+        }
+    });
+    let mut output = Vec::new();
+    serve(&mut controller.client(), false, input, &mut output).expect("the controller answers");
+    assert_eq!(actions(&output), [0.25, 0.125]);
 }

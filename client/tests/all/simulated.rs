@@ -46,6 +46,8 @@ pub(super) struct Control {
     pub(super) reset: AtomicBool,
     /// Holds the control tick.
     pub(super) hold: AtomicBool,
+    /// Turns of a millisecond for which the loop does nothing, as on a machine that is busy.
+    stall: AtomicU32,
     /// Lets the clock run although no bytes arrive.
     pub(super) silence: AtomicBool,
     /// Ticks of all starts.
@@ -59,6 +61,14 @@ pub(super) struct Control {
 }
 
 impl Control {
+    /// Stalls the controller for this many of its turns. It does nothing after this returns until they are over.
+    pub(super) fn stall(&self, turns: u32) {
+        self.stall.store(turns, Ordering::Relaxed);
+        while self.stall.load(Ordering::Relaxed) == turns {
+            std::thread::yield_now();
+        }
+    }
+
     /// Waits until the deadline passed without an observation and the following ramp ended. Calls `meanwhile` until
     /// then.
     pub(super) fn miss_the_deadline(&self, mut meanwhile: impl FnMut()) {
@@ -168,6 +178,11 @@ fn run<A: Authority>(
     let (mut inward, mut outward) = (Line::new(1, faults), Line::new(2, faults));
     let (mut stream, mut ticks, mut quiet) = (None::<TcpStream>, 0, 0);
     while !control.stop.load(Ordering::Relaxed) && !control.reset.load(Ordering::Relaxed) {
+        if control.stall.load(Ordering::Relaxed) > 0 {
+            std::thread::sleep(Duration::from_millis(1));
+            control.stall.fetch_sub(1, Ordering::Relaxed);
+            continue;
+        }
         if control.cut.load(Ordering::Relaxed) {
             stream = None;
         } else if stream.is_none()
