@@ -26,8 +26,8 @@ pub(super) const OBSERVATION: usize = 4;
 /// Ticks of 1 ms.
 pub(super) const DEADLINE: u32 = 100;
 /// Ticks after the last byte at which its clock stops, unless a test lets it run: a delayed host must not miss a
-/// deadline.
-const QUIET: u32 = DEADLINE / 4;
+/// deadline, not even if some of its frames are lost in a row.
+const QUIET: u32 = DEADLINE / 20;
 /// Time without an answer after which a test fails; no result depends on it.
 const HANG: Duration = Duration::from_secs(600);
 const SECTOR: usize = 4096;

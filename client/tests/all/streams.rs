@@ -1,5 +1,6 @@
 //! Observations at their rate, and the log of the actions.
 
+use std::cell::Cell;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -13,6 +14,9 @@ use crate::simulated::{OBSERVATION, Simulated};
 
 const PACE: Pace = Pace { period: Duration::from_millis(10), arm: true };
 
+/// Observations of ten minutes: a late controller has stopped the stream long before.
+const MANY: usize = 60_000;
+
 fn observations(count: usize) -> impl Iterator<Item = Vec<f32>> {
     (0..count).map(|i| vec![0.5, -0.25, i as f32, 0.0])
 }
@@ -20,17 +24,19 @@ fn observations(count: usize) -> impl Iterator<Item = Vec<f32>> {
 #[test]
 fn a_streamed_recording_is_logged_with_its_actions() {
     let controller = Simulated::start(50, || Anyone);
-    let (mut client, mut log, mut armed) = (controller.client(), Log::default(), 0);
-    let mut moved = false;
+    let (mut client, mut log) = (controller.client(), Log::default());
+    // A late controller reports later that it has followed the actions.
+    let moved = Cell::new(false);
     let seen = |status: &actq_link::report::Status| {
-        armed += u32::from(status.state == State::Armed);
-        moved |= controller.outputs() == [Output::Drive(0.25), Output::Drive(-0.125)];
+        let followed = controller.outputs() == [Output::Drive(0.25), Output::Drive(-0.125)];
+        moved.set(moved.get() || followed && status.state == State::Armed);
     };
-    stream(&mut client, observations(100), &PACE, &mut log, seen).expect("losing one in twenty frames stops nothing");
-    assert!(armed > 0 && moved);
+    let sent = observations(MANY).enumerate().take_while(|(i, _)| *i < 100 || !moved.get()).map(|(_, values)| values);
+    stream(&mut client, sent, &PACE, &mut log, seen).expect("losing one in twenty frames stops nothing");
+    assert!(moved.get());
     assert_eq!(client.status().expect("the controller answers").state, State::Disarmed);
     let rows = log.rows();
-    assert_eq!(rows.len(), 100);
+    assert!(rows.len() >= 100);
     let answers: Vec<_> = rows.iter().filter_map(|row| Some((row.sent, row.answer.as_ref()?))).collect();
     assert!(answers.len() > 70, "{}", answers.len());
     assert_eq!(log.latencies().len(), answers.len());
@@ -49,7 +55,7 @@ fn a_streamed_recording_is_logged_with_its_actions() {
 fn a_stopped_controller_ends_the_stream() {
     let controller = Simulated::start(0, || Anyone);
     let (mut client, mut log) = (controller.client(), Log::default());
-    let cut = observations(400).enumerate().map(|(i, values)| {
+    let cut = observations(MANY).enumerate().map(|(i, values)| {
         if i == 30 {
             controller.control.cut.store(true, Ordering::Relaxed);
             controller.control.miss_the_deadline(std::thread::yield_now);
