@@ -18,6 +18,8 @@ pub struct Pace {
     pub arm: bool,
 }
 
+/// Longest wait for the last action, counted from the controller's answer to a later request.
+const LAST_ACTION: Duration = Duration::from_millis(100);
 /// Observations before arming.
 const BEFORE_ARMING: usize = 5;
 
@@ -45,11 +47,16 @@ pub fn stream(
         due = (due + pace.period).max(Instant::now());
         listen(client, due, armed, log, &mut seen)?;
     }
+    // The last action may be late. A controller that answers a later request has read the observation.
+    if log.rows().last().is_some_and(|row| row.answer.is_none()) {
+        client.status()?;
+        listen(client, Instant::now() + pace.period.max(LAST_ACTION), armed, log, &mut seen)?;
+    }
     if armed {
         client.disarm()?;
+        listen(client, Instant::now(), false, log, &mut seen)?;
     }
-    // The actions that are still on their way.
-    listen(client, Instant::now() + pace.period.max(Duration::from_millis(100)), false, log, &mut seen)
+    Ok(())
 }
 
 fn listen(

@@ -68,3 +68,21 @@ fn a_stopped_controller_ends_the_stream() {
     // A controller that is late loses the last answers with the connection, but not that to the observation before arming.
     assert!(log.rows().len() >= 30 && !log.latencies().is_empty());
 }
+
+/// It is late by more than the wait for the last action.
+#[test]
+fn a_late_controller_loses_no_last_action() {
+    for arm in [false, true] {
+        let controller = Simulated::start(0, || Anyone);
+        let (mut client, mut log) = (controller.client(), Log::default());
+        let late = observations(20).enumerate().map(|(i, values)| {
+            if i == 19 {
+                controller.control.stall(300);
+            }
+            values
+        });
+        stream(&mut client, late, &Pace { arm, ..PACE }, &mut log, |_| ()).expect("the controller answers");
+        let answer = log.rows()[19].answer.as_ref().expect("the last observation has its action");
+        assert_eq!((&answer.action[..], answer.applied), (&[0.25, -0.125][..], arm));
+    }
+}
