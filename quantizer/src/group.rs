@@ -5,9 +5,9 @@ use std::io;
 use std::process::{Child, Command, ExitStatus};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Time after a signal at which the group is killed.
+/// Time after a signal at which the group is killed. A robot's driver may need seconds to stop the robot.
 #[cfg(unix)]
-const END_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(2);
+const END_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(30);
 
 /// Process ids of the leaders of the running groups.
 static LEADERS: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
@@ -33,10 +33,10 @@ pub(crate) fn wait(mut child: Child) -> io::Result<ExitStatus> {
     status
 }
 
-/// Passes a signal to the running groups, if any, and kills those that run after [`END_TIMEOUT`]. No group can start
-/// after that.
+/// Passes a signal to the running groups, if any. Kills those that run after [`END_TIMEOUT`], or as soon as `kill_now`
+/// returns `true`. No group can start after that.
 #[cfg(unix)]
-pub(crate) fn stop(signal: i32) {
+pub(crate) fn stop(signal: i32, mut kill_now: impl FnMut() -> bool) {
     use rustix::process::{Pid, Signal, kill_process_group, test_kill_process_group};
     let leaders = std::mem::ManuallyDrop::new(leaders());
     let groups: Vec<Pid> = leaders.iter().filter_map(|leader| Pid::from_raw(leader.cast_signed())).collect();
@@ -46,7 +46,7 @@ pub(crate) fn stop(signal: i32) {
     let signal_all = |signal| groups.iter().for_each(|group| kill_process_group(*group, signal).unwrap_or_default());
     signal_all(signal);
     let runs = |group: &Pid| test_kill_process_group(*group).is_ok();
-    while groups.iter().any(runs) && begun.elapsed() < END_TIMEOUT {
+    while groups.iter().any(runs) && begun.elapsed() < END_TIMEOUT && !kill_now() {
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
     signal_all(Signal::KILL);

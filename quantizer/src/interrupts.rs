@@ -15,7 +15,11 @@ pub(crate) fn watch() -> Result<()> {
     let ignored = ignored();
     let caught = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
     let mut signals = Signals::new(caught).context("cannot catch signals")?;
-    thread::spawn(move || signals.forever().next().map(end));
+    thread::spawn(move || {
+        if let Some(signal) = signals.forever().next() {
+            end(signal, || signals.pending().next().is_some());
+        }
+    });
     Ok(())
 }
 
@@ -26,10 +30,11 @@ fn ignored() -> u64 {
     set.and_then(|set| u64::from_str_radix(set.trim(), 16).ok()).unwrap_or(0)
 }
 
-fn end(signal: i32) {
+/// Ends the process. A further signal, which `again` reports, kills the commands that it has started.
+fn end(signal: i32, again: impl FnMut() -> bool) {
     // From here on the main thread cannot place files or end the process.
     let discard = Discard::begin();
-    group::stop(signal);
+    group::stop(signal, again);
     let removed = if discard.remove() { ": no output was written" } else { "" };
     // A terminal has echoed ^C at the start of the line.
     let line = if !terminal::clear() && io::stderr().is_terminal() { "\n" } else { "" };

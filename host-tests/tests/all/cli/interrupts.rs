@@ -96,6 +96,18 @@ fn a_drive_may_handle_the_signal() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn a_second_signal_kills_a_drive_that_ignores_it() -> Result<()> {
+    let fixture = Fixture::with_long_recording()?;
+    let drive = "trap 'touch heard' TERM; touch started; while :; do sleep 0.01; done";
+    let mut child = start_tune(&fixture, actq(&[]), drive)?;
+    send("TERM", &child)?;
+    wait_for(&mut child, || Ok(fixture.out("tune/heard").exists()))?;
+    send("TERM", &child)?;
+    assert_eq!(child.wait_with_output()?.status.code(), Some(143));
+    Ok(())
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn an_ignored_signal_stays_ignored() -> Result<()> {
