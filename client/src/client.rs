@@ -16,7 +16,7 @@ use crate::event::Event;
 const REPEAT: Duration = Duration::from_millis(150);
 /// Longest time between two repetitions.
 const MAX_REPEAT: Duration = Duration::from_secs(1);
-/// Attempts of a change, each with the current token.
+/// Least number of attempts of a change, each with the current token.
 const ATTEMPTS: usize = 3;
 
 /// Fails, with the reason, if a controller that was armed is not any more.
@@ -188,18 +188,9 @@ impl Client {
     ///
     /// Fails if the controller refuses, or without an answer.
     pub fn arm(&mut self) -> Result<()> {
-        let mut outcome = Err(Refusal::Token);
-        for _ in 0..ATTEMPTS {
-            outcome = self.with_token(|token| Message::Arm { token })?;
-            if outcome != Err(Refusal::Token) {
-                break;
-            }
-            // The token of a repeated request whose first answer was lost, or one that has been renewed since.
-            if self.status()?.state == State::Armed {
-                outcome = Ok(());
-                break;
-            }
-        }
+        // A repetition whose first answer was lost has an old token, too.
+        let is_armed = |client: &mut Self| Ok(client.status()?.state == State::Armed);
+        let outcome = self.change_unless(|token| Message::Arm { token }, is_armed)?;
         outcome.context("not armed")?;
         // Earlier statuses describe the earlier state.
         self.events.retain(|event| !matches!(event, Event::Status(_)));
@@ -215,17 +206,32 @@ impl Client {
         self.request(&Message::Disarm)?.1.context("not disarmed")
     }
 
-    /// As [`Self::with_token`], for requests that are valid in any state. It repeats them with a new token, because a
-    /// repetition of an earlier request may have changed the token again.
+    /// Sends a request that is valid in any state with the current token.
     pub(crate) fn change<'m>(&mut self, message: impl Fn(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
-        let mut outcome = Err(Refusal::Token);
-        for _ in 0..ATTEMPTS {
-            outcome = self.with_token(&message)?;
+        self.change_unless(message, |_| Ok(false))
+    }
+
+    /// As [`Self::with_token`], until the token is accepted, `is_done` is true, or time is over: a repetition of an
+    /// earlier request, or a silent line, may have changed the token again.
+    fn change_unless<'m>(
+        &mut self,
+        message: impl Fn(u32) -> Message<'m>,
+        is_done: impl Fn(&mut Self) -> Result<bool>,
+    ) -> Result<Result<(), Refusal>> {
+        let (begun, mut attempts) = (Instant::now(), 0);
+        loop {
+            let outcome = self.with_token(&message)?;
             if outcome != Err(Refusal::Token) {
-                break;
+                return Ok(outcome);
+            }
+            if is_done(self)? {
+                return Ok(Ok(()));
+            }
+            attempts += 1;
+            if attempts >= ATTEMPTS && begun.elapsed() >= self.timeout {
+                return Ok(outcome);
             }
         }
-        Ok(outcome)
     }
 
     /// Sends a request with the current token.

@@ -73,6 +73,16 @@ fn arming_without_observations_is_refused() {
     assert!(format!("{error:#}").contains(&Refusal::Stale.to_string()), "{error:#}");
 }
 
+/// As when a busy machine silences the line again and again.
+#[test]
+fn a_renewed_token_is_read_again() {
+    let controller = Simulated::start(0, || Anyone);
+    let mut client = controller.client();
+    controller.control.renew.store(20, Ordering::Relaxed);
+    client.set(Parameter::High, 1, 0.5).expect("it has the current token at last");
+    assert_eq!(controller.control.renew.load(Ordering::Relaxed), 0);
+}
+
 #[test]
 fn a_broken_cable_is_safe_and_reconnects() {
     let controller = Simulated::start(0, || Anyone);

@@ -48,6 +48,8 @@ pub(super) struct Control {
     pub(super) hold: AtomicBool,
     /// Turns of a millisecond for which the loop does nothing, as on a machine that is busy.
     stall: AtomicU32,
+    /// Number of next readings before which the token changes.
+    pub(super) renew: AtomicU32,
     /// Lets the clock run although no bytes arrive.
     pub(super) silence: AtomicBool,
     /// Ticks of all starts.
@@ -212,6 +214,10 @@ fn run<A: Authority>(
                 0
             }
         };
+        if count > 0 && control.renew.load(Ordering::Relaxed) > 0 {
+            control.renew.fetch_sub(1, Ordering::Relaxed);
+            safety.renew();
+        }
         for byte in inward.carry(&bytes[..count]) {
             sent.extend(endpoint.receive(byte, micros, &mut safety, &mut updater, &mut out).unwrap_or_default());
             // The head: half of the first two values. It takes each observation, however many frames have arrived.
