@@ -286,6 +286,8 @@ impl Rig {
         while self.line.is_waiting() {
             self.listen()?;
         }
+        // A status may be from before the last frames, unless the answer to a later request has come before it.
+        self.client.get(Parameter::MaxAge, 0)?;
         self.client.status()?;
         self.listen()
     }
