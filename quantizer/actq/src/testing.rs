@@ -1,7 +1,7 @@
 //! Small networks and recordings of them, for the unit tests of this crate and, by path, of `actq-research`.
 
 use actq::data::Dataset;
-use actq::graph::ops::{Gru, Linear, Lstm, Pointwise};
+use actq::graph::ops::{Add, Gru, LayerNorm, Linear, Lstm, Pointwise};
 use actq::graph::{Evaluator, Graph, WeightMatrix};
 use actq::random::Random;
 use actq_kernels::math::Function;
@@ -63,6 +63,28 @@ pub(crate) fn gru(hidden: usize) -> Graph {
     let (input_bias, state_bias) = (vector(3 * hidden, &mut random), vector(3 * hidden, &mut random));
     graph.add(Gru { hidden, input: 0, state: 1, input_bias, state_bias }, &[0]).expect("it fits");
     graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[1]).expect("it fits");
+    graph
+}
+
+/// Makes a network 3 -> 4 relu, to which two blocks 4 -> 4 relu add, the second after a norm if wanted; then -> 2.
+pub(crate) fn residual(normed: bool) -> Graph {
+    let mut random = Random::new(7);
+    let mut graph = Graph::new(3);
+    for (i, (rows, cols)) in [(4, 3), (4, 4), (4, 4), (2, 4)].into_iter().enumerate() {
+        graph.matrices.push(matrix(&format!("m{i}"), rows, cols, &mut random));
+    }
+    let mut stream = 0;
+    for matrix in 0..3 {
+        let mut value = stream;
+        if normed && matrix == 2 {
+            let norm = LayerNorm { weight: vector(4, &mut random), bias: vector(4, &mut random), eps: 1e-5 };
+            value = graph.add(norm, &[value]).expect("it fits");
+        }
+        value = graph.add(Linear { matrix, bias: vector(4, &mut random) }, &[value]).expect("it fits");
+        value = graph.add(Pointwise(Function::Relu), &[value]).expect("it fits");
+        stream = if stream == 0 { value } else { graph.add(Add, &[value, stream]).expect("it fits") };
+    }
+    graph.add(Linear { matrix: 3, bias: vector(2, &mut random) }, &[stream]).expect("it fits");
     graph
 }
 

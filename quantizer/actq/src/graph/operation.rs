@@ -86,8 +86,9 @@ pub trait Operation {
         [0, 0]
     }
 
-    /// Keeps some of the hidden units, in this order, and the values of the vectors for them. The caller cuts the matrices:
-    /// their rows as [`super::ops::unit_rows`] says, and the columns of those that read the units.
+    /// Keeps some elements of the output, in this order, and the values of the vectors for them; of a recurrent cell its
+    /// hidden units. The caller cuts the matrices: their rows as [`super::ops::unit_rows`] says, and the columns of those
+    /// that read the elements.
     fn keep_units(&mut self, _units: &[usize]) {}
 
     /// Computes the output for a batch, or for a sequence of batches. A node with a state has one row of it for each

@@ -25,6 +25,7 @@ mod norm;
 mod normalize;
 mod recurrent;
 mod table;
+mod units;
 
 use std::ops::{Deref, DerefMut};
 
@@ -38,8 +39,8 @@ pub use lstm::Lstm;
 pub use mul::Mul;
 pub use norm::{LayerNorm, RmsNorm};
 pub use normalize::{Balance, Normalize};
-pub use recurrent::unit_rows;
 pub use table::Table;
+pub use units::unit_rows;
 
 use super::operation::Operation;
 use super::syntax::Keys;

@@ -8,6 +8,7 @@ pub mod balance;
 mod candidate;
 pub mod choose;
 pub mod compact;
+mod cut;
 pub mod dimension;
 pub mod feedback;
 mod latent;

@@ -3,7 +3,8 @@ use actq_kernels::math;
 use actq_kernels::ops::cells::gru_cell;
 use ndarray::Array2;
 
-use super::recurrent::{KEYS, Parts, keep};
+use super::recurrent::{KEYS, Parts};
+use super::units::keep;
 use crate::error::Result;
 use crate::graph::arrays::{contiguous, contiguous_mut, rows, rows_mut, step_rows, sum_rows};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};

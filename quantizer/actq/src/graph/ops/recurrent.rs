@@ -27,14 +27,3 @@ impl Parts {
         Ok(Self { hidden, w_ih, w_hh, b_ih: op.bias("b_ih", rows)?, b_hh: op.bias("b_hh", rows)? })
     }
 }
-
-/// Returns the rows of a cell's matrices and biases, of `rows`, that belong to some of its `hidden` units: those of the
-/// first gate, then those of the second, and so on.
-pub fn unit_rows(rows: usize, hidden: usize, units: &[usize]) -> Vec<usize> {
-    (0..rows / hidden.max(1)).flat_map(|gate| units.iter().map(move |unit| gate * hidden + unit)).collect()
-}
-
-/// Keeps the values of some units of a vector.
-pub(super) fn keep(vector: &mut Vec<f32>, hidden: usize, units: &[usize]) {
-    *vector = unit_rows(vector.len(), hidden, units).into_iter().map(|row| vector[row]).collect();
-}

@@ -1,6 +1,7 @@
 use actq_kernels::image::OpKind;
 use ndarray::Array2;
 
+use super::units::keep;
 use crate::error::{Result, ensure};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved};
@@ -28,6 +29,11 @@ impl Operation for Table {
     }
 
     learned! { rows }
+
+    fn keep_units(&mut self, units: &[usize]) {
+        keep(&mut self.rows, self.len, units);
+        self.len = units.len();
+    }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
         let row = &run.vectors[0][run.step * self.len..][..self.len];

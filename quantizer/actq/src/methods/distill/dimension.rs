@@ -89,7 +89,7 @@ pub(super) fn elementwise(graph: &Graph, node: usize) -> Option<Vec<usize>> {
 }
 
 /// Returns how many nodes use a matrix.
-fn uses(graph: &Graph, matrix: usize) -> usize {
+pub(super) fn uses(graph: &Graph, matrix: usize) -> usize {
     graph.nodes.iter().filter(|node| node.kind.products().iter().any(|p| p.matrix == matrix)).count()
 }
 

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{DAMPING_INPUT, Side, importance};
 use crate::gemm::{Panels, add_product_parallel};
-use crate::graph::Graph;
+use crate::graph::{Graph, WeightMatrix};
 use crate::simd::wide;
 
 /// Rows that a thread takes together.
@@ -57,45 +57,42 @@ impl Effect {
     /// Returns the errors of removing each element together with those that matter less, at least as much as alone.
     /// The work grows with the cube of the vector's length.
     pub fn together(&self) -> Vec<f64> {
-        let joint = ranked(&self.centred, &self.effect);
-        joint.into_iter().zip(self.alone()).map(|(joint, alone)| joint.max(alone)).collect()
+        together(std::slice::from_ref(self))
     }
 }
 
-/// Ranks the elements of a vector with the covariance `second` by their effect, a quadratic form; returns the errors of
-/// their removal.
-fn ranked(second: &DMatrix<f64>, effect: &Array2<f64>) -> Vec<f64> {
-    let n = second.nrows();
-    let damping = (DAMPING_INPUT * second.trace() / n.max(1) as f64).max(1e-30);
-    // The covariance that the elements so far do not explain.
-    let mut rest = Array2::from_shape_fn((n, n), |(i, j)| second[(i, j)] + if i == j { damping } else { 0.0 });
-    let mut explained = Array1::zeros(n);
-    let mut through = Array2::zeros((n, n));
-    add_product_parallel(rest.view(), &Panels::of(effect.view()), through.view_mut());
-    explained.iter_mut().zip(through.rows()).zip(rest.rows()).for_each(|((e, a), b)| *e = dot(&a, &b));
+/// Returns the errors of removing each element, as [`Effect::together`], where several vectors lose the same elements: the
+/// sums over the vectors. All have the same length.
+pub(super) fn together(effects: &[Effect]) -> Vec<f64> {
+    let alone: Vec<Vec<f64>> = effects.iter().map(Effect::alone).collect();
+    let at_least = |j: usize| alone.iter().map(|alone| alone[j]).sum::<f64>();
+    ranked(effects).into_iter().enumerate().map(|(j, joint)| joint.max(at_least(j))).collect()
+}
+
+/// Returns the errors of the rows of a matrix without bits, if their elements stay: each then always gives its mean, and
+/// loses the variance of its product. No other row makes up for that; sums of such elements, as residual ones, would lose
+/// what the network adds to them.
+pub(super) fn in_place(matrix: &WeightMatrix, moments: &Moments, g: &[f64]) -> Vec<f64> {
+    let centred = moments.centred();
+    let w = Array2::from_shape_fn((matrix.rows, matrix.cols), |(r, c)| f64::from(matrix.data[r * matrix.cols + c]));
+    let covariance = Array2::from_shape_fn(centred.shape(), |(i, j)| centred[(i, j)]);
+    let mut through = Array2::zeros(w.raw_dim());
+    add_product_parallel(w.view(), &Panels::of(covariance.view()), through.view_mut());
+    through.rows().into_iter().zip(w.rows()).zip(g).map(|((a, b), g)| g * dot(&a, &b).max(0.0)).collect()
+}
+
+/// Ranks the elements by their effect on the network; returns the errors of their removal.
+fn ranked(effects: &[Effect]) -> Vec<f64> {
+    let mut vectors: Vec<Unexplained<'_>> = effects.iter().map(Unexplained::of).collect();
+    let n = effects.first().map_or(0, |effect| effect.centred.nrows());
     let mut gains: Vec<(usize, f64)> = Vec::with_capacity(n);
     let mut left: Vec<usize> = (0..n).collect();
     while !left.is_empty() {
-        let gain = |j: usize| explained[j] / rest[[j, j]].max(damping * 1e-3);
+        let gain = |j: usize| vectors.iter().map(|vector| vector.gain(j)).sum::<f64>();
         let best = (0..left.len()).max_by(|&a, &b| gain(left[a]).total_cmp(&gain(left[b]))).unwrap_or(0);
         let j = left.swap_remove(best);
         gains.push((j, gain(j).max(0.0)));
-        let root = rest[[j, j]].max(damping * 1e-3).sqrt();
-        let v = rest.column(j).mapv(|value| value / root);
-        let w = times(effect, &v);
-        let u = times(&rest, &w);
-        let along = dot(&v.view(), &w.view());
-        for ((e, v), u) in explained.iter_mut().zip(&v).zip(&u) {
-            *e += v * (v * along - 2.0 * u);
-        }
-        let v = v.as_slice().unwrap_or_default();
-        let rows = rest.as_slice_mut().unwrap_or_default().par_chunks_mut(n).zip(v);
-        rows.with_min_len(ROWS).for_each(|(row, of_row)| {
-            wide(
-                #[inline(always)]
-                || row.iter_mut().zip(v).for_each(|(rest, v)| *rest -= of_row * v),
-            );
-        });
+        vectors.iter_mut().for_each(|vector| vector.explain(j));
     }
     // An element that suits those before it better than its rank says costs as much as the next ones.
     let mut removals = vec![0.0; n];
@@ -105,6 +102,59 @@ fn ranked(second: &DMatrix<f64>, effect: &Array2<f64>) -> Vec<f64> {
         removals[j] = most;
     }
     removals
+}
+
+/// What the elements of a vector that are ranked so far do not explain.
+struct Unexplained<'a> {
+    effect: &'a Array2<f64>,
+    damping: f64,
+    /// Their covariance.
+    rest: Array2<f64>,
+    /// The part of the effect that each would explain, times its variance.
+    explained: Array1<f64>,
+}
+
+impl<'a> Unexplained<'a> {
+    fn of(Effect { centred, effect }: &'a Effect) -> Self {
+        let n = centred.nrows();
+        let damping = (DAMPING_INPUT * centred.trace() / n.max(1) as f64).max(1e-30);
+        let rest = Array2::from_shape_fn((n, n), |(i, j)| centred[(i, j)] + if i == j { damping } else { 0.0 });
+        let mut explained = Array1::zeros(n);
+        let mut through = Array2::zeros((n, n));
+        add_product_parallel(rest.view(), &Panels::of(effect.view()), through.view_mut());
+        explained.iter_mut().zip(through.rows()).zip(rest.rows()).for_each(|((e, a), b)| *e = dot(&a, &b));
+        Self { effect, damping, rest, explained }
+    }
+
+    fn variance(&self, j: usize) -> f64 {
+        self.rest[[j, j]].max(self.damping * 1e-3)
+    }
+
+    /// Returns the part of the effect that element `j` explains.
+    fn gain(&self, j: usize) -> f64 {
+        self.explained[j] / self.variance(j)
+    }
+
+    /// Subtracts what element `j` explains.
+    fn explain(&mut self, j: usize) {
+        let root = self.variance(j).sqrt();
+        let v = self.rest.column(j).mapv(|value| value / root);
+        let w = times(self.effect, &v);
+        let u = times(&self.rest, &w);
+        let along = dot(&v.view(), &w.view());
+        for ((e, v), u) in self.explained.iter_mut().zip(&v).zip(&u) {
+            *e += v * (v * along - 2.0 * u);
+        }
+        let n = v.len();
+        let v = v.as_slice().unwrap_or_default();
+        let rows = self.rest.as_slice_mut().unwrap_or_default().par_chunks_mut(n).zip(v);
+        rows.with_min_len(ROWS).for_each(|(row, of_row)| {
+            wide(
+                #[inline(always)]
+                || row.iter_mut().zip(v).for_each(|(rest, v)| *rest -= of_row * v),
+            );
+        });
+    }
 }
 
 fn times(matrix: &Array2<f64>, v: &Array1<f64>) -> Array1<f64> {
@@ -143,7 +193,7 @@ mod tests {
             (1, 1) => 0.5,
             _ => 0.0,
         });
-        let mut removals = ranked(&second, &effect);
+        let mut removals = ranked(&[Effect { centred: second, effect }]);
         assert!((removals[4] - 0.5).abs() < 0.05, "{removals:?}");
         removals.truncate(4);
         removals.sort_by(f64::total_cmp);
@@ -158,9 +208,13 @@ mod tests {
         let mixing = DMatrix::from_fn(N, N, |_, _| f64::from(random.normal()));
         let second = &mixing * mixing.transpose();
         let w = DMatrix::from_fn(4, N, |_, _| f64::from(random.normal()));
-        let effect = w.tr_mul(&w);
-        let effect = Array2::from_shape_fn((N, N), |(i, j)| effect[(i, j)]);
-        let removals = ranked(&second, &effect);
+        let square = w.tr_mul(&w);
+        let effect = || Array2::from_shape_fn((N, N), |(i, j)| square[(i, j)]);
+        let of_one = Effect { centred: second.clone(), effect: effect() };
+        let removals = ranked(std::slice::from_ref(&of_one));
+        // Two vectors that lose the same elements lose twice as much.
+        let of_two = [of_one, Effect { centred: second.clone(), effect: effect() }];
+        ranked(&of_two).iter().zip(&removals).for_each(|(two, one)| assert!((two / one - 2.0).abs() < 1e-9));
         let mut order: Vec<usize> = (0..N).collect();
         order.sort_by(|&a, &b| removals[b].total_cmp(&removals[a]));
         let damping = DAMPING_INPUT * second.trace() / N as f64;
@@ -175,5 +229,15 @@ mod tests {
             let sum: f64 = gone.iter().map(|&j| removals[j]).sum();
             assert!((sum / error - 1.0).abs() < 0.25, "{sum} against {error}");
         }
+    }
+
+    #[test]
+    fn a_row_that_stays_loses_its_variance() {
+        // Columns 0 and 1 are equal: the rows add and subtract them.
+        let second = DMatrix::from_fn(3, 3, |i, j| if i == j || i + j == 1 { 2.0 } else { 0.0 });
+        let moments = Moments { second, mean: vec![1.0, 1.0, 0.0], count: 1 };
+        let data = vec![1.0, 1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, 3.0];
+        let matrix = WeightMatrix { name: "m".into(), rows: 3, cols: 3, data };
+        assert_eq!(in_place(&matrix, &moments, &[1.0, 1.0, 0.5]), [4.0, 0.0, 9.0]);
     }
 }

@@ -1,14 +1,15 @@
-//! Shape of the network to learn: the units of its recurrent cells, and the width of every row.
+//! Shape of the network to learn: its units, and the width of every row.
 
 use actq_kernels::Width;
 use rayon::prelude::*;
 
 use super::activations::{allocated, least_bytes as least, packed};
 use super::allocate::{Rows, energies, expected};
+use super::cut::Cut;
 use super::dimension::{Dimension, Widths, dimensions};
 use super::size::Size;
 use super::statistics::RowStatistics;
-use super::units::Cut;
+
 use crate::budget::Rate;
 use crate::calibrate::moments::Moments;
 use crate::error::Result;
@@ -39,11 +40,11 @@ pub(super) struct Shape {
     pub(super) cycles: Option<f64>,
 }
 
-/// Shares of the cells' units to choose from.
-const SHARES: [f64; 7] = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375, 0.25];
+/// Shares of the units to choose from.
+const SHARES: [f64; 11] = [1.0, 0.875, 0.75, 0.625, 0.5, 0.4375, 0.375, 0.3125, 0.25, 0.1875, 0.125];
 
-/// Chooses the units of recurrent cells, and the widths of all rows. Units are removed together where something is
-/// learned and no width is forced: of several shares of them, the one with the lowest expected error stays. `rounding`
+/// Chooses the units, and the widths of all rows. Units are removed together where something is learned and no width is
+/// forced: of several shares of them, the one with the lowest expected error stays. `rounding`
 /// is a factor on the error that rounding is expected to cause.
 pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64) -> Result<Shape> {
     let RowStatistics { inputs, outputs, moments, .. } = statistics;
@@ -56,7 +57,7 @@ pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64)
         let of_matrix = |(m, matrix): (usize, &WeightMatrix)| {
             let (input, output) = (pick(&inputs[m], &cut.columns[m]), pick(&outputs[m], &cut.rows[m]));
             let energy = energies(matrix, &input, &output);
-            let removal = removals[m].as_ref().map_or_else(|| energy.clone(), |of| pick(of, &cut.rows[m]));
+            let removal = pick(&removals[m], &cut.rows[m]);
             Rows { energy, removal, rounding, forced: forced[m] }
         };
         let rows: Vec<Rows> = cut.graph.matrices.iter().enumerate().map(of_matrix).collect();
@@ -67,12 +68,12 @@ pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64)
         let cycles = cycles.map(|_| Size { packings: packed(&limits, options), ..size }.cycles(&widths));
         Ok(Shape { cut, dimensions, rows, widths, limits, cycles })
     };
-    if !loses_units(options, &forced) || statistics.cells().0.is_empty() {
+    if !loses_units(options, &forced) || statistics.units().0.is_empty() {
         return of_cut(Cut::nothing(graph));
     }
-    let (cells, of_units) = statistics.cells();
+    let (units, of_units) = statistics.units();
     let shapes: Vec<Result<Shape>> =
-        SHARES.par_iter().map(|share| of_cut(Cut::to(graph, cells, of_units, *share, &of_inputs))).collect();
+        SHARES.par_iter().map(|share| of_cut(Cut::to(graph, units, of_units, *share, &of_inputs))).collect();
     // The last error names the fewest bytes: those of the fewest units.
     let most = rate.cycles();
     let best = shapes.into_iter().reduce(|best, next| match (&best, &next) {
@@ -102,7 +103,7 @@ impl Shape {
     }
 }
 
-/// Returns `true` if recurrent cells may lose units: something is learned, and no width is forced.
+/// Returns `true` if units may be removed: something is learned, and no width is forced.
 fn loses_units(options: &Options, forced: &[Option<Width>]) -> bool {
     options.learns() && forced.iter().all(Option::is_none)
 }

@@ -7,16 +7,16 @@ use nalgebra::DMatrix;
 
 use super::balance::{MixedUnits, balance, mixed_units};
 use super::dimension::{Dimension, dimensions};
-use super::removal::Effect;
+use super::removal::{Effect, in_place};
 use super::schedule::{Bounds, most_steps};
-use super::units::{Cell, cells};
+use super::units::{Units, units};
 use crate::calibrate::allowance::Allowance;
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{Side, importance, output_moments};
 use crate::calibrate::windows::Windows;
 use crate::data::Dataset;
 use crate::error::{Result, ensure};
-use crate::graph::Graph;
+use crate::graph::{Graph, WeightMatrix};
 use crate::methods::options::Options;
 
 /// Least frames to learn from.
@@ -34,12 +34,11 @@ pub struct RowStatistics {
     /// Importance of every matrix's columns; of its rows.
     pub(super) inputs: Vec<Vec<f64>>,
     pub(super) outputs: Vec<Vec<f64>>,
-    /// Errors of removing the rows of a matrix, one by one and, when needed, together; `None` if its rows cannot be
-    /// removed.
-    alone: Vec<Option<Vec<f64>>>,
-    together: OnceLock<Vec<Option<Vec<f64>>>>,
-    /// Recurrent cells, each with the errors of removing its units.
-    cells: OnceLock<(Vec<Cell>, Vec<Vec<f64>>)>,
+    /// Errors of the rows of every matrix without bits, where they are removed one by one and, when needed, together.
+    alone: Vec<Vec<f64>>,
+    together: OnceLock<Vec<Vec<f64>>>,
+    /// Units that can only be removed whole, each set with the errors of their removal.
+    units: OnceLock<(Vec<Units>, Vec<Vec<f64>>)>,
     /// Moments of every matrix's input, and `G`.
     pub(super) moments: Vec<(Moments, DMatrix<f64>)>,
     /// Held-out observations, to report the error on while something is learned.
@@ -71,8 +70,7 @@ impl RowStatistics {
         let outputs: Vec<Vec<f64>> = output_moments.iter().map(|g| importance(g, Side::Output)).collect();
         let balanced = balance(graph, &mut moments, &outputs)?;
         let of_inputs: Vec<&Moments> = moments.iter().collect();
-        let alone =
-            effects(&balanced, &of_inputs, &outputs).map(|effect| effect.map(|effect| effect.alone())).collect();
+        let alone = removals(&balanced, &of_inputs, &outputs, Effect::alone);
         Ok(Self {
             mixed: mixed_units(&balanced, &moments),
             windows: windows.with(balanced),
@@ -80,7 +78,7 @@ impl RowStatistics {
             outputs,
             alone,
             together: OnceLock::new(),
-            cells: OnceLock::new(),
+            units: OnceLock::new(),
             watched: None,
             moments: moments.into_iter().zip(output_moments).collect(),
             outputs_of,
@@ -99,22 +97,21 @@ impl RowStatistics {
         &self.windows.graph
     }
 
-    /// Returns the errors of removing each row of every matrix. Without learning those of single rows count: the gain of
+    /// Returns the error of each row of every matrix without bits. Without learning those of single rows count: the gain of
     /// the others is small then, and small networks get more uneven errors.
-    pub(super) fn removals(&self, learns: bool) -> &[Option<Vec<f64>>] {
+    pub(super) fn removals(&self, learns: bool) -> &[Vec<f64>] {
         let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
-        let together =
-            || effects(self.graph(), &of_inputs, &self.outputs).map(|effect| Some(effect?.together())).collect();
+        let together = || removals(self.graph(), &of_inputs, &self.outputs, Effect::together);
         if learns { self.together.get_or_init(together) } else { &self.alone }
     }
 
-    /// Returns the recurrent cells with the errors of removing their units.
-    pub(super) fn cells(&self) -> &(Vec<Cell>, Vec<Vec<f64>>) {
-        self.cells.get_or_init(|| {
+    /// Returns the units that can only be removed whole, with the errors of their removal.
+    pub(super) fn units(&self) -> &(Vec<Units>, Vec<Vec<f64>>) {
+        self.units.get_or_init(|| {
             let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
-            let cells = cells(self.graph());
-            let removals = cells.iter().map(|cell| cell.removals(self.graph(), &of_inputs, &self.outputs)).collect();
-            (cells, removals)
+            let units = units(self.graph());
+            let removals = units.iter().map(|units| units.removals(self.graph(), &of_inputs, &self.outputs)).collect();
+            (units, removals)
         })
     }
 
@@ -131,9 +128,12 @@ impl RowStatistics {
     }
 }
 
-/// Returns the effect of every matrix's output; `None` if its rows cannot be removed.
-fn effects(graph: &Graph, moments: &[&Moments], g: &[Vec<f64>]) -> impl Iterator<Item = Option<Effect>> {
+/// Returns the errors of the rows of every matrix without bits: by `of` if they disappear, else by what they give.
+fn removals(graph: &Graph, moments: &[&Moments], g: &[Vec<f64>], of: fn(&Effect) -> Vec<f64>) -> Vec<Vec<f64>> {
     let dimensions = dimensions(graph);
-    (0..graph.matrices.len())
-        .map(move |m| Some(Effect::of(graph, &Dimension::made_by(&dimensions, m)?.consumers, moments, g)))
+    let of_matrix = |(m, matrix): (usize, &WeightMatrix)| match Dimension::made_by(&dimensions, m) {
+        Some(dimension) => of(&Effect::of(graph, &dimension.consumers, moments, g)),
+        None => in_place(matrix, moments[m], &g[m]),
+    };
+    graph.matrices.iter().enumerate().map(of_matrix).collect()
 }

@@ -16,7 +16,7 @@ use super::objective::{Frames, Objective};
 use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
-use crate::graph::{Derivatives, Graph, Matrix, Network, STRIP, Vectors, Weights};
+use crate::graph::{Derivatives, Graph, Matrix, Network, STRIP, Vectors, WeightMatrix, Weights};
 use crate::methods::learning::Recipe;
 use crate::methods::options::Effort;
 use crate::methods::quantized::Quantized;
@@ -86,13 +86,20 @@ impl Task<'_> {
     /// Returns `true` if the network has lost more than half of the weights. Then it does not have to adapt only, but to
     /// learn anew.
     pub fn is_rest_of(&self, windows: &Windows) -> bool {
-        2 * self.graph.weights() < windows.graph.weights()
+        2 * self.weights() < windows.graph.weights()
     }
 
     /// Returns `true` if the network keeps less than a quarter of the weights: it is not the trained one any more, but a
     /// small one.
     pub fn is_small_beside(&self, windows: &Windows) -> bool {
-        4 * self.graph.weights() < windows.graph.weights()
+        4 * self.weights() < windows.graph.weights()
+    }
+
+    /// Returns the weights that have bits.
+    fn weights(&self) -> usize {
+        let of_matrix =
+            |(matrix, widths): (&WeightMatrix, &Vec<Option<Width>>)| widths.iter().flatten().count() * matrix.cols;
+        self.graph.matrices.iter().zip(self.widths).map(of_matrix).sum()
     }
 }
 
