@@ -7,7 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Time after a signal at which the group is killed. A robot's driver may need seconds to stop the robot.
 #[cfg(unix)]
-const END_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(30);
+const END_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(10);
 
 /// Process ids of the leaders of the running groups.
 static LEADERS: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
