@@ -57,7 +57,7 @@ pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64)
         let of_matrix = |(m, matrix): (usize, &WeightMatrix)| {
             let (input, output) = (pick(&inputs[m], &cut.columns[m]), pick(&outputs[m], &cut.rows[m]));
             let energy = energies(matrix, &input, &output);
-            let removal = pick(&removals[m], &cut.rows[m]);
+            let removal = removals[m].as_ref().map_or_else(|| energy.clone(), |of| pick(of, &cut.rows[m]));
             Rows { energy, removal, rounding, forced: forced[m] }
         };
         let rows: Vec<Rows> = cut.graph.matrices.iter().enumerate().map(of_matrix).collect();

@@ -1,5 +1,6 @@
 //! Statistics of a network over the recorded observations, for any number of budgets.
 
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -34,9 +35,10 @@ pub struct RowStatistics {
     /// Importance of every matrix's columns; of its rows.
     pub(super) inputs: Vec<Vec<f64>>,
     pub(super) outputs: Vec<Vec<f64>>,
-    /// Errors of the rows of every matrix without bits, where they are removed one by one and, when needed, together.
-    alone: Vec<Vec<f64>>,
-    together: OnceLock<Vec<Vec<f64>>>,
+    /// Errors of the rows of every matrix without bits, where they are removed one by one and, when needed, together; `None`
+    /// for their energies.
+    alone: Vec<Option<Vec<f64>>>,
+    together: OnceLock<Vec<Option<Vec<f64>>>>,
     /// Units that can only be removed whole, each set with the errors of their removal.
     units: OnceLock<(Vec<Units>, Vec<Vec<f64>>)>,
     /// Moments of every matrix's input, and `G`.
@@ -97,9 +99,9 @@ impl RowStatistics {
         &self.windows.graph
     }
 
-    /// Returns the error of each row of every matrix without bits. Without learning those of single rows count: the gain of
+    /// Returns the error of each row of every matrix without bits; `None` for their energies. Without learning those of single rows count: the gain of
     /// the others is small then, and small networks get more uneven errors.
-    pub(super) fn removals(&self, learns: bool) -> &[Vec<f64>] {
+    pub(super) fn removals(&self, learns: bool) -> &[Option<Vec<f64>>] {
         let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
         let together = || removals(self.graph(), &of_inputs, &self.outputs, Effect::together);
         if learns { self.together.get_or_init(together) } else { &self.alone }
@@ -128,12 +130,15 @@ impl RowStatistics {
     }
 }
 
-/// Returns the errors of the rows of every matrix without bits: by `of` if they disappear, else by what they give.
-fn removals(graph: &Graph, moments: &[&Moments], g: &[Vec<f64>], of: fn(&Effect) -> Vec<f64>) -> Vec<Vec<f64>> {
+/// Returns the errors of the rows of every matrix without bits: by `of` if they disappear, else by what they give. `None` for
+/// the gates of a cell: a gate is the sum of two products, and what one lacks, the other can learn.
+fn removals(graph: &Graph, moments: &[&Moments], g: &[Vec<f64>], of: fn(&Effect) -> Vec<f64>) -> Vec<Option<Vec<f64>>> {
     let dimensions = dimensions(graph);
+    let cells = graph.nodes.iter().map(|node| node.kind.products()).filter(|products| products.len() > 1);
+    let gates: BTreeSet<usize> = cells.flatten().map(|product| product.matrix).collect();
     let of_matrix = |(m, matrix): (usize, &WeightMatrix)| match Dimension::made_by(&dimensions, m) {
-        Some(dimension) => of(&Effect::of(graph, &dimension.consumers, moments, g)),
-        None => in_place(matrix, moments[m], &g[m]),
+        Some(dimension) => Some(of(&Effect::of(graph, &dimension.consumers, moments, g))),
+        None => (!gates.contains(&m)).then(|| in_place(matrix, moments[m], &g[m])),
     };
     graph.matrices.iter().enumerate().map(of_matrix).collect()
 }
