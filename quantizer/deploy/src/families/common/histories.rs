@@ -1,0 +1,34 @@
+//! How a family keeps histories.
+
+use actq::error::{Result, bail};
+
+use crate::description::{Fill, First, History};
+use crate::facts::Facts;
+
+/// How a family keeps histories.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Histories {
+    /// All frames of a term, then the next term; otherwise all terms of a frame.
+    pub(crate) by_term: bool,
+    pub(crate) first: First,
+    pub(crate) fill: Fill,
+    /// Ticks from a frame to the next.
+    pub(crate) stride: usize,
+}
+
+impl Histories {
+    /// Asks for the rules history.layout, history.first and history.fill.
+    pub(crate) fn of(facts: &mut Facts) -> Result<Self> {
+        let layout: Option<String> = facts.find("history.layout")?;
+        let by_term = match layout.as_deref() {
+            Some("term") => true,
+            Some("frame") | None => false,
+            Some(other) => bail!("history.layout = {other:?}: give \"term\" or \"frame\""),
+        };
+        Ok(Self { by_term, first: facts.get("history.first")?, fill: facts.get("history.fill")?, stride: 1 })
+    }
+
+    pub(crate) fn spec(&self, length: usize) -> History {
+        History { length, stride: self.stride, first: self.first, fill: self.fill, current: true }
+    }
+}

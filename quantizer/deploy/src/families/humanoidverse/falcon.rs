@@ -1,0 +1,43 @@
+//! The observation of FALCON: a list of terms, and their histories.
+
+use actq::error::{Context as _, Result, bail, ensure};
+
+use super::super::common::Histories;
+use super::lengths::count;
+use super::reader::Reader;
+
+impl Reader<'_> {
+    /// Adds the observation of FALCON; returns its length.
+    pub(super) fn falcon(&mut self) -> Result<usize> {
+        let yaml = self.yaml;
+        let listed = if yaml.look("obs_dict").is_some() { "obs_dict.actor_obs" } else { "obs_list" };
+        let mut terms = yaml.texts(listed)?;
+        let order: Option<String> = self.facts.find("terms.order")?;
+        match order.as_deref() {
+            Some("sorted") | None => terms.sort(),
+            Some("listed") => {}
+            Some(other) => bail!("terms.order = {other:?}: give \"sorted\" or \"listed\""),
+        }
+        let lengths =
+            if yaml.look("history_length_dict").is_some() { "history_length_dict.actor_obs" } else { "history_length" };
+        let length = yaml.need(lengths, "a number of frames", count)?;
+        let histories = Histories::of(self.facts)?;
+        let rules = ["terms.order", "history.layout"].map(|rule| self.facts.source(rule)).join("; ");
+        self.facts.note("observation", format!("{}; {}; {rules}", yaml.at(listed), yaml.at(lengths)));
+        if self.acts.is_none() && terms.iter().any(|term| term == "actions") {
+            self.acts_from = yaml.at("obs_dims.actions");
+            self.acts = Some(self.dim("actions")?);
+        }
+        let mut all = 0;
+        for (i, name) in terms.iter().enumerate() {
+            ensure!(!terms.iter().take(i).any(|other| other == name), "{}: {name:?} occurs twice", yaml.at(listed));
+            let term = self.term(name)?;
+            self.parts.begin(name, &term.from);
+            let value = self.parts.term(term.ops, length);
+            self.facts.note(&value, yaml.at(&format!("obs_scales.{name}")));
+            all += term.len;
+        }
+        self.parts.observe(&histories)?;
+        all.checked_mul(length).context("the observation is too long")
+    }
+}
