@@ -1,7 +1,11 @@
 //! Conversion of a file to the two files of a policy folder: chooses the action output and the observed inputs, and
 //! converts the network between them.
 
-use std::collections::{BTreeMap, HashMap};
+mod choice;
+mod files;
+mod output;
+
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use actq::error::{Context as _, Result, bail, ensure};
@@ -11,73 +15,19 @@ use actq::import::json::PolicyJson;
 use actq::policy::Policy;
 use actq::text::printable;
 use prost::bytes::Bytes;
-use safetensors::Dtype;
-use safetensors::tensor::TensorView;
 
+pub use self::choice::Choice;
+use self::files::{tensors, text};
+use self::output::{actions, choose, refuse_batch};
 use crate::action;
-use crate::file::model::{Graph, Model, Port};
-use crate::lower::{Lowered, lower};
-use crate::nodes::call::RANDOM;
+use crate::file::model::Model;
+use crate::lower::lower;
 use crate::nodes::follow::{Follower, INTEGERS};
 use crate::patterns::simplify::simplify;
-use crate::states::{Cells, Output, is_state, refuse_lost_states};
+use crate::states::{Cells, Output, refuse_lost_states};
 use crate::values::elements::value;
 use crate::values::expr::{Expr, Exprs, Id};
 use crate::values::tensor::{Element, Tensor};
-
-/// The most names in a message.
-const MOST_LISTED: usize = 20;
-
-/// Choices of the caller; none by default.
-#[derive(Clone, Debug, Default)]
-pub struct Choice {
-    /// The value that is the action: an output of the graph, or any value inside.
-    pub output: Option<String>,
-    /// Inputs that hold recurrent state, with the outputs of their next values.
-    pub states: Vec<(String, String)>,
-    /// `true` if the caller gives each input its value in each step, and takes the values of the output one after the other.
-    /// An input may then hold a state without a cell, and the output's axes mean nothing.
-    pub is_fed: bool,
-}
-
-impl Choice {
-    /// Fails for names that the file does not have.
-    fn check(&self, graph: &Graph) -> Result<()> {
-        let outputs = || format!("its outputs are {}", listed(&graph.outputs));
-        if let Some(name) = &self.output {
-            let gives =
-                graph.nodes.iter().flat_map(|node| &node.outputs).chain(graph.outputs.iter().map(|port| &port.name));
-            ensure!(
-                gives.into_iter().any(|given| given == name),
-                "--output {}: the file has no value of this name; {}",
-                printable(name),
-                outputs()
-            );
-        }
-        for (from, to) in &self.states {
-            let [state, from_name, to_name] =
-                [&format!("{from}={to}"), from, to].map(|name| printable(name).into_owned());
-            ensure!(
-                graph.inputs.iter().any(|port| port.name == *from),
-                "--state {state}: the file has no input {from_name:?}; its inputs are {}",
-                listed(&graph.inputs)
-            );
-            ensure!(
-                graph.outputs.iter().any(|port| port.name == *to),
-                "--state {state}: the file has no output {to_name:?}; {}",
-                outputs()
-            );
-        }
-        Ok(())
-    }
-}
-
-/// Lists names for a message.
-fn listed(ports: &[Port]) -> String {
-    let names: Vec<_> = ports.iter().take(MOST_LISTED).map(|port| printable(&port.name)).collect();
-    let more = ports.len() - names.len();
-    names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
-}
 
 /// The files of an imported policy, and a summary of the import.
 #[derive(Clone, Debug)]
@@ -290,151 +240,10 @@ fn keys(contract: &JsonContract) -> Vec<&'static str> {
     all.into_iter().filter(|(_, values)| values.is_some()).map(|(name, _)| name).collect()
 }
 
-/// Chooses the action output: the one of `--output`, or the only candidate, or the only one named action.
-fn choose(
-    exprs: &Exprs,
-    cells: &Cells,
-    outputs: &[Output],
-    mut errors: Vec<(String, actq::error::Error)>,
-    choice: &Choice,
-) -> Result<usize> {
-    if let Some(name) = &choice.output {
-        return outputs.iter().position(|output| output.name == *name).context("the chosen output is missing");
-    }
-    let mut can: Vec<usize> = (0..outputs.len()).filter(|&i| !outputs[i].value.is_known()).collect();
-    if can.is_empty() {
-        let (name, error) = refused(errors)
-            .context("no output depends on an input; export the policy with its observation as input")?;
-        return Err(error.context(format!("output {:?} cannot be imported", printable(&name))));
-    }
-    let is_paired = |i: &usize| is_state(cells, exprs, &outputs[*i].value);
-    let named = |i: &usize| choice.states.iter().any(|(_, to)| *to == outputs[*i].name);
-    for keep in [
-        &(|i: &usize| !is_paired(i) && !named(i)) as &dyn Fn(&usize) -> bool,
-        &|i: &usize| is_action(&outputs[*i].name),
-        &|i: &usize| outputs[*i].name.to_lowercase().contains("deterministic"),
-    ] {
-        if can.len() > 1 && can.iter().any(keep) {
-            can.retain(|i| keep(i));
-        }
-    }
-    // An action that cannot be imported must not be replaced by a critic's value or a hidden state. But exporters add
-    // the deterministic action to a random one.
-    errors.retain(|(name, error)| is_action(name) || !is_drawn(error));
-    let is_called = can.iter().any(|&i| is_action(&outputs[i].name));
-    if !is_called && let Some((lost, error)) = refused(errors) {
-        can.retain(|i| !is_paired(i) && !named(i));
-        let others = match &can[..] {
-            [] => "all other outputs are states".to_owned(),
-            _ => format!(
-                "no other output is named action; choose one by actq import --output NAME: {}",
-                sizes(outputs, &can)
-            ),
-        };
-        return Err(error.context(format!("output {:?} cannot be imported, and {others}", printable(&lost))));
-    }
-    match can[..] {
-        [one] => Ok(one),
-        _ => bail!(
-            "several outputs can be the action: {}; choose one by actq import --output NAME",
-            sizes(outputs, &can)
-        ),
-    }
-}
-
-/// Returns the refused output named action, or else the last refused one.
-fn refused(mut errors: Vec<(String, actq::error::Error)>) -> Option<(String, actq::error::Error)> {
-    match errors.iter().position(|(name, _)| is_action(name)) {
-        Some(at) => Some(errors.swap_remove(at)),
-        None => errors.pop(),
-    }
-}
-
-/// Lists outputs with their lengths, for a message.
-fn sizes(outputs: &[Output], which: &[usize]) -> String {
-    let one = |&i: &usize| format!("{} ({} values)", printable(&outputs[i].name), outputs[i].value.len());
-    which.iter().map(one).collect::<Vec<_>>().join(", ")
-}
-
-fn is_action(name: &str) -> bool {
-    name.to_lowercase().contains("action") && !name.to_lowercase().contains("shape")
-}
-
-/// Returns `true` if an output was refused because it draws random numbers.
-fn is_drawn(error: &actq::error::Error) -> bool {
-    error.cause().to_string() == RANDOM
-}
-
-/// Refuses a batch of several observations, whose actions would look like a chunk.
-fn refuse_batch(model: &Model, read: &[usize], act_shape: &[usize]) -> Result<()> {
-    let &[batch, _, ..] = act_shape else { return Ok(()) };
-    // A vector has no rows. One input with rows is enough, as other inputs may be the same for all rows.
-    let in_rows = |i: &&usize| match model.graph.inputs[**i].shape.as_deref() {
-        Some(&[first, _, ..]) => first == Some(batch),
-        _ => false,
-    };
-    if batch > 1
-        && let Some(&i) = read.iter().find(in_rows)
-    {
-        bail!(
-            "the action and the input {:?} have {batch} rows, which is a batch, and a step has one observation; export with a batch of \
-             1, and a history with a chunk of its length as [1, {batch}, n]",
-            printable(&model.graph.inputs[i].name)
-        );
-    }
-    Ok(())
-}
-
-/// Returns the number of actions in the output, and the length of each.
-fn actions(shape: &[usize], n: usize) -> Result<(usize, usize)> {
-    let ones = shape.iter().take_while(|&&n| n == 1).count();
-    match &shape[ones..] {
-        [] => Ok((1, n)),
-        [n] => Ok((1, *n)),
-        [chunk, n] => Ok((*chunk, *n)),
-        _ => bail!(
-            "the action has the shape {shape:?}; export it as [value] or [action, value], after any axes of length 1"
-        ),
-    }
-}
-
 fn at_node(model: &Model, exprs: &Exprs, id: Id, error: actq::error::Error) -> actq::error::Error {
     let at = exprs.origin(id);
     match model.graph.nodes.get(at) {
         Some(node) => error.context(format!("node {at} {:?} ({})", node.name, node.op)),
         None => error,
     }
-}
-
-/// Formats policy.json with one op per line.
-fn text(
-    json: PolicyJson,
-    lowered: &Lowered,
-    inputs: &[(String, usize)],
-    states: &[(String, String, usize)],
-    source: &str,
-) -> Result<Vec<u8>> {
-    let mut text = serde_json::to_string_pretty(&json)?;
-    let about = |key: &str, value: String| format!("  \"{key}\": {value},\n");
-    let mut extra = about("source", serde_json::to_string(source)?);
-    extra += &about("inputs", serde_json::to_string(inputs)?);
-    if !states.is_empty() {
-        extra += &about("states", serde_json::to_string(states)?);
-    }
-    let ops: Vec<String> =
-        lowered.ops.iter().map(|op| Ok(format!("    {}", serde_json::to_string(op)?))).collect::<Result<_>>()?;
-    let end = text.rfind("  \"ops\": []").context("policy.json has ops")?;
-    text.truncate(end);
-    Ok(format!("{text}{extra}  \"ops\": [\n{}\n  ]\n}}\n", ops.join(",\n")).into_bytes())
-}
-
-fn tensors(lowered: &Lowered) -> Result<Vec<u8>> {
-    let bytes: Vec<Vec<u8>> =
-        lowered.weights.iter().map(|w| w.data.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
-    let views =
-        lowered.weights.iter().zip(&bytes).map(|(weight, bytes)| {
-            Ok((weight.name.as_str(), TensorView::new(Dtype::F32, weight.shape.clone(), bytes)?))
-        });
-    let views: BTreeMap<&str, TensorView<'_>> = views.collect::<Result<_>>()?;
-    Ok(safetensors::serialize(views, None)?)
 }

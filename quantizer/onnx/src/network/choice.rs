@@ -1,0 +1,60 @@
+//! Choices of the caller.
+
+use actq::error::{Result, ensure};
+use actq::text::printable;
+
+use crate::file::model::{Graph, Port};
+
+/// The most names in a message.
+const MOST_LISTED: usize = 20;
+
+/// Choices of the caller; none by default.
+#[derive(Clone, Debug, Default)]
+pub struct Choice {
+    /// The value that is the action: an output of the graph, or any value inside.
+    pub output: Option<String>,
+    /// Inputs that hold recurrent state, with the outputs of their next values.
+    pub states: Vec<(String, String)>,
+    /// `true` if the caller gives each input its value in each step, and takes the values of the output one after the other.
+    /// An input may then hold a state without a cell, and the output's axes mean nothing.
+    pub is_fed: bool,
+}
+
+impl Choice {
+    /// Fails for names that the file does not have.
+    pub(super) fn check(&self, graph: &Graph) -> Result<()> {
+        let outputs = || format!("its outputs are {}", listed(&graph.outputs));
+        if let Some(name) = &self.output {
+            let gives =
+                graph.nodes.iter().flat_map(|node| &node.outputs).chain(graph.outputs.iter().map(|port| &port.name));
+            ensure!(
+                gives.into_iter().any(|given| given == name),
+                "--output {}: the file has no value of this name; {}",
+                printable(name),
+                outputs()
+            );
+        }
+        for (from, to) in &self.states {
+            let [state, from_name, to_name] =
+                [&format!("{from}={to}"), from, to].map(|name| printable(name).into_owned());
+            ensure!(
+                graph.inputs.iter().any(|port| port.name == *from),
+                "--state {state}: the file has no input {from_name:?}; its inputs are {}",
+                listed(&graph.inputs)
+            );
+            ensure!(
+                graph.outputs.iter().any(|port| port.name == *to),
+                "--state {state}: the file has no output {to_name:?}; {}",
+                outputs()
+            );
+        }
+        Ok(())
+    }
+}
+
+/// Lists names for a message.
+fn listed(ports: &[Port]) -> String {
+    let names: Vec<_> = ports.iter().take(MOST_LISTED).map(|port| printable(&port.name)).collect();
+    let more = ports.len() - names.len();
+    names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+}

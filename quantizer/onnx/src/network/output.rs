@@ -1,0 +1,118 @@
+//! The output that is the action.
+
+use actq::error::{Context as _, Error, Result, bail};
+use actq::text::printable;
+
+use super::choice::Choice;
+use crate::file::model::Model;
+use crate::nodes::call::RANDOM;
+use crate::states::{Cells, Output, is_state};
+use crate::values::expr::Exprs;
+
+/// Chooses the action output: the one of `--output`, or the only candidate, or the only one named action.
+pub(super) fn choose(
+    exprs: &Exprs,
+    cells: &Cells,
+    outputs: &[Output],
+    mut errors: Vec<(String, Error)>,
+    choice: &Choice,
+) -> Result<usize> {
+    if let Some(name) = &choice.output {
+        return outputs.iter().position(|output| output.name == *name).context("the chosen output is missing");
+    }
+    let mut can: Vec<usize> = (0..outputs.len()).filter(|&i| !outputs[i].value.is_known()).collect();
+    if can.is_empty() {
+        let (name, error) = refused(errors)
+            .context("no output depends on an input; export the policy with its observation as input")?;
+        return Err(error.context(format!("output {:?} cannot be imported", printable(&name))));
+    }
+    let is_paired = |i: &usize| is_state(cells, exprs, &outputs[*i].value);
+    let named = |i: &usize| choice.states.iter().any(|(_, to)| *to == outputs[*i].name);
+    for keep in [
+        &(|i: &usize| !is_paired(i) && !named(i)) as &dyn Fn(&usize) -> bool,
+        &|i: &usize| is_action(&outputs[*i].name),
+        &|i: &usize| outputs[*i].name.to_lowercase().contains("deterministic"),
+    ] {
+        if can.len() > 1 && can.iter().any(keep) {
+            can.retain(|i| keep(i));
+        }
+    }
+    // An action that cannot be imported must not be replaced by a critic's value or a hidden state. But exporters add
+    // the deterministic action to a random one.
+    errors.retain(|(name, error)| is_action(name) || !is_drawn(error));
+    let is_called = can.iter().any(|&i| is_action(&outputs[i].name));
+    if !is_called && let Some((lost, error)) = refused(errors) {
+        can.retain(|i| !is_paired(i) && !named(i));
+        let others = match &can[..] {
+            [] => "all other outputs are states".to_owned(),
+            _ => format!(
+                "no other output is named action; choose one by actq import --output NAME: {}",
+                sizes(outputs, &can)
+            ),
+        };
+        return Err(error.context(format!("output {:?} cannot be imported, and {others}", printable(&lost))));
+    }
+    match can[..] {
+        [one] => Ok(one),
+        _ => bail!(
+            "several outputs can be the action: {}; choose one by actq import --output NAME",
+            sizes(outputs, &can)
+        ),
+    }
+}
+
+/// Returns the refused output named action, or else the last refused one.
+fn refused(mut errors: Vec<(String, Error)>) -> Option<(String, Error)> {
+    match errors.iter().position(|(name, _)| is_action(name)) {
+        Some(at) => Some(errors.swap_remove(at)),
+        None => errors.pop(),
+    }
+}
+
+/// Lists outputs with their lengths, for a message.
+fn sizes(outputs: &[Output], which: &[usize]) -> String {
+    let one = |&i: &usize| format!("{} ({} values)", printable(&outputs[i].name), outputs[i].value.len());
+    which.iter().map(one).collect::<Vec<_>>().join(", ")
+}
+
+fn is_action(name: &str) -> bool {
+    name.to_lowercase().contains("action") && !name.to_lowercase().contains("shape")
+}
+
+/// Returns `true` if an output was refused because it draws random numbers.
+fn is_drawn(error: &Error) -> bool {
+    error.cause().to_string() == RANDOM
+}
+
+/// Refuses a batch of several observations, whose actions would look like a chunk.
+pub(super) fn refuse_batch(model: &Model, read: &[usize], act_shape: &[usize]) -> Result<()> {
+    let &[batch, _, ..] = act_shape else { return Ok(()) };
+    // A vector has no rows. One input with rows is enough, as other inputs may be the same for all rows.
+    let in_rows = |i: &&usize| match model.graph.inputs[**i].shape.as_deref() {
+        Some(&[first, _, ..]) => first == Some(batch),
+        _ => false,
+    };
+    if batch > 1
+        && let Some(&i) = read.iter().find(in_rows)
+    {
+        bail!(
+            "the action and the input {:?} have {batch} rows, which is a batch, and a step has one observation; export with a batch of \
+             1, and a history with a chunk of its length as [1, {batch}, n]",
+            printable(&model.graph.inputs[i].name)
+        );
+    }
+    Ok(())
+}
+
+/// Returns the number of actions in the output, and the length of each.
+pub(super) fn actions(shape: &[usize], n: usize) -> Result<(usize, usize)> {
+    let ones = shape.iter().take_while(|&&n| n == 1).count();
+    match &shape[ones..] {
+        [] => Ok((1, n)),
+        [n] => Ok((1, *n)),
+        [chunk, n] => Ok((*chunk, *n)),
+        _ => bail!(
+            "the action has the shape {shape:?}; export it as [value] or [action, value], after any axes of length 1"
+        ),
+    }
+}
