@@ -185,6 +185,37 @@ impl Facts {
         }
     }
 
+    /// Returns `true` if a rule with choices has this one; `false` while it is a question.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::get`].
+    pub(crate) fn chooses(&mut self, key: &str, choice: &str) -> Result<bool> {
+        Ok(self.find::<String>(key)?.as_deref() == Some(choice))
+    }
+
+    /// Returns a number above 0 by its rule; 1 while it is a question.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::get`], or if it is another number.
+    pub(crate) fn positive(&mut self, key: &str) -> Result<f64> {
+        let number = self.find(key)?.unwrap_or(1.0);
+        ensure!(number > 0.0, "{key} = {number}: give a number above 0");
+        Ok(number)
+    }
+
+    /// Returns one of the things that there are, by a rule that names it; the first while it is a question.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::get`], or if there is none of this name.
+    pub(crate) fn named(&mut self, key: &str, there: &[&str]) -> Result<String> {
+        let name = self.find(key)?.or_else(|| there.first().map(|&name| name.to_owned())).unwrap_or_default();
+        ensure!(there.contains(&name.as_str()), "{key} = {name:?}: there are {}", there.join(", "));
+        Ok(name)
+    }
+
     /// Asks for something that the reader finds missing, unless the user has answered it.
     ///
     /// # Errors

@@ -28,3 +28,20 @@ pub(crate) static FAMILIES: &[&dyn Family] = &[
     &mjlab::Mjlab,
     &lerobot::Lerobot,
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::facts::Profile;
+
+    #[test]
+    fn every_rule_has_one_of_its_choices() {
+        for family in FAMILIES {
+            let profile = Profile::parse(family.profile()).expect("a profile");
+            for rule in profile.rules.iter().filter(|rule| !rule.choices.is_empty()) {
+                let is_choice = |value: &toml::Value| rule.choices.iter().any(|choice| value.as_str() == Some(choice));
+                assert!(rule.value.as_ref().is_none_or(is_choice), "{}: {}", profile.family, rule.key);
+            }
+        }
+    }
+}

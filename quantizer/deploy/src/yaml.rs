@@ -107,6 +107,16 @@ impl Node {
         }
     }
 
+    /// Returns a list of numbers, or one number as a list.
+    pub(crate) fn one_or_several(&self) -> Option<Vec<f64>> {
+        self.numbers().or_else(|| Some(vec![self.number()?]))
+    }
+
+    /// Returns a list of two numbers.
+    pub(crate) fn pair(&self) -> Option<[f64; 2]> {
+        self.numbers()?.try_into().ok()
+    }
+
     /// Returns a list of texts.
     pub(crate) fn texts(&self) -> Option<Vec<String>> {
         match &self.data {

@@ -26,6 +26,14 @@ pub struct Clock {
     pub standing: Option<Standing>,
 }
 
+impl Clock {
+    /// Makes a clock of one phase that starts at 0 and has no end.
+    pub(crate) fn from_zero(name: &str, advance: f64, when: When) -> Self {
+        let (name, start) = (name.to_owned(), vec![0.0]);
+        Self { name, start, advance, when, wrap: None, restart_above: None, standing: None }
+    }
+}
+
 /// When a clock advances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -1,12 +1,14 @@
 //! What readers share.
 
+pub(super) mod action;
 mod graph;
 mod gravity;
 mod histories;
 mod lists;
 mod parts;
+pub(super) mod terms;
 
-pub(super) use graph::{Graph, metadata_document};
+pub(super) use graph::{Graph, known, listed, metadata_document};
 pub(super) use gravity::{given_gravity, gravity};
 pub(super) use histories::Histories;
 pub(super) use lists::{check_names, count, counts, names, numbers};

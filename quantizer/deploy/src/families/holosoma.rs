@@ -3,12 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
 
-use actq::error::{Context as _, Result, bail, ensure};
+use actq::error::{Context as _, Result, ensure};
 use actq_onnx::Signature;
 
+use super::common::action::{add_zero, clip, fed_back, padded};
+use super::common::terms::given;
 use super::common::{Histories, Parts, given_gravity};
 use crate::bundle::Bundle;
-use crate::description::{Clock, Description, Gains, Op, Operand, Order, Standing, TargetKind, When};
+use crate::description::{Clock, Description, Gains, Op, Operand, Standing, TargetKind, When};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
@@ -107,8 +109,7 @@ impl Family for Holosoma {
             ));
         }
 
-        let rate: f64 = facts.find("rate_hz")?.unwrap_or(1.0);
-        ensure!(rate > 0.0, "rate_hz = {rate}: give a number above 0");
+        let rate = facts.positive("rate_hz")?;
         let default: Option<Vec<f64>> = facts.find("default")?;
         let default = default.unwrap_or_else(|| vec![0.0; n]);
         ensure!(
@@ -174,10 +175,8 @@ impl Reader<'_> {
         let key = kind.rule;
         let terms: Option<Vec<String>> = self.facts.find(key)?;
         let mut terms = terms.unwrap_or_else(|| kind.terms.iter().map(|&term| term.to_owned()).collect());
-        match self.facts.find::<String>("order")?.as_deref() {
-            Some("sorted") | None => terms.sort(),
-            Some("listed") => {}
-            Some(other) => bail!("order = {other:?}: give \"sorted\" or \"listed\""),
+        if !self.facts.chooses("order", "listed")? {
+            terms.sort();
         }
         let length: usize = self.facts.find("history.length")?.unwrap_or(1);
         ensure!((1..=1000).contains(&length), "history.length = {length}: give 1 to 1000");
@@ -213,18 +212,11 @@ impl Reader<'_> {
     fn term(&mut self, name: &str) -> Result<(String, Vec<Op>, usize)> {
         let n = self.n;
         let known = match name {
-            "base_ang_vel" => Some((3, "rad/s")),
-            "base_lin_vel" => Some((3, "m/s")),
-            "command_lin_vel" => Some((2, "m/s")),
-            "command_ang_vel" => Some((1, "rad/s")),
-            "command_stand" => Some((1, "1 to walk, 0 to stand")),
-            "command_base_height" => Some((1, "m")),
-            "command_waist_dofs" => Some((3, "rad")),
             // The orientation of the reference body needs the robot's kinematics.
             "motion_command" => Some((2 * n, "rad, rad/s")),
             "motion_ref_pos_b" => Some((3, "m")),
             "motion_ref_ori_b" => Some((6, "")),
-            _ => None,
+            _ => given(name),
         };
         if let Some((len, unit)) = known {
             self.parts.raw(name, len, unit);
@@ -241,13 +233,7 @@ impl Reader<'_> {
             }
             "projected_gravity" => self.gravity()?,
             "actions" => {
-                let raw = match self.facts.find::<String>("last_action")?.as_deref() {
-                    Some("clipped") | None => false,
-                    Some("raw") => true,
-                    Some(other) => bail!("last_action = {other:?}: give \"clipped\" or \"raw\""),
-                };
-                self.parts.kept("last_action", self.acts, if raw { "policy.ACTION" } else { "clipped" });
-                self.facts.note("last_action", self.facts.source("last_action"));
+                fed_back(&mut self.parts, self.acts, self.facts)?;
                 ("last_action".to_owned(), Vec::new(), self.acts)
             }
             "sin_phase" => ("leg_phases".to_owned(), vec![Op::Sin], self.clock()?),
@@ -282,8 +268,7 @@ impl Reader<'_> {
             return Ok(legs);
         }
         self.has_clock = true;
-        let period: f64 = self.facts.find("gait_period")?.unwrap_or(1.0);
-        ensure!(period > 0.0, "gait_period = {period}: give a number above 0");
+        let period = self.facts.positive("gait_period")?;
         let below: f64 = self.facts.get("clock.standing_below")?;
         let at: Option<Vec<f64>> = self.facts.find("clock.standing_at")?;
         let of = [("command_lin_vel", 2, "m/s"), ("command_ang_vel", 1, "rad/s")];
@@ -311,10 +296,7 @@ impl Reader<'_> {
     /// Adds the target: the default and the scaled action; 0 for the first joints of an action that is shorter.
     fn act(&mut self, metadata: &Document) -> Result<()> {
         let (n, acts) = (self.n, self.acts);
-        let clip: f64 = self.facts.find("action.clip")?.unwrap_or(100.0);
-        let limits = [Operand::Number(-clip), Operand::Number(clip)];
-        self.parts.value("clipped", "policy.ACTION", vec![Op::Clip(limits)]);
-        self.facts.note("clipped", self.facts.source("action.clip"));
+        clip(&mut self.parts, self.facts)?;
         let (scale, source) = match metadata.maybe("action_scale", "a finite number, or several", numbers)? {
             Some(scale) => (scale, metadata.at("action_scale")),
             None => {
@@ -333,11 +315,9 @@ impl Reader<'_> {
         if acts < n {
             let first: bool = self.facts.find("action.last_joints")?.unwrap_or(true);
             let moved = if first { n - acts..n } else { 0..acts };
-            self.parts.unchanged("zero", vec![0.0]);
-            self.parts.values("clipped_and_zero", &["clipped", "zero"]);
+            add_zero(&mut self.parts, "clipped");
             self.facts.note("clipped_and_zero", self.facts.source("action.last_joints"));
-            let places = (0..n).map(|i| if moved.contains(&i) { i - moved.start } else { acts }).collect();
-            ops.push(Op::Select(Order::Places(places)));
+            ops.push(padded(n, moved));
             from = "clipped_and_zero";
         }
         ops.push(Op::Scale(match scale[..] {

@@ -137,11 +137,6 @@ fn network(yaml: &Document, networks: &[String], facts: &mut Facts) -> Result<St
             facts.note("network", format!("the only ONNX file{other}"));
             Ok(only.clone())
         }
-        [first, ..] => {
-            let answer: Option<String> = facts.find("network")?;
-            let file = answer.unwrap_or_else(|| first.clone());
-            ensure!(networks.contains(&file), "network = {file:?}: there are {}", networks.join(", "));
-            Ok(file)
-        }
+        _ => facts.named("network", &networks.iter().map(String::as_str).collect::<Vec<_>>()),
     }
 }

@@ -3,6 +3,7 @@
 use actq::error::{Context as _, Result, bail, ensure};
 use actq_onnx::Signature;
 
+use super::common::action::clip_to;
 use super::common::{Histories, Parts, count, given_gravity};
 use crate::bundle::Bundle;
 use crate::description::{Clock, Description, Gains, Op, Operand, Order, TargetKind, When};
@@ -140,8 +141,7 @@ impl Limx {
         facts.note("joint_pos", yaml.at("PointfootCfg.normalization.obs_scales.dof_pos"));
         parts.value("joint_vel", "dq", vec![select(), scaled(scale("dof_vel")?)]);
         facts.note("joint_vel", yaml.at("PointfootCfg.normalization.obs_scales.dof_vel"));
-        let fed_back: Option<String> = facts.find("last_action")?;
-        parts.kept("last_action", n, if fed_back.as_deref() == Some("raw") { "ordered" } else { "limited" });
+        parts.kept("last_action", n, if facts.chooses("last_action", "raw")? { "ordered" } else { "limited" });
         parts.value("fed_back", "last_action", vec![select()]);
         facts.note("fed_back", facts.source("last_action"));
 
@@ -149,13 +149,9 @@ impl Limx {
         ensure!(gait.len() == 4, "gait has {} values; give frequency, offset, duration and height", gait.len());
         let restarts: bool = facts.get("clock.restart")?;
         parts.clock(Clock {
-            name: "gait_phase".to_owned(),
-            start: vec![0.0],
-            advance: gait[0] / rate,
-            when: When::Before,
             wrap: (!restarts).then_some([0.0, 1.0]),
             restart_above: restarts.then_some(1.0),
-            standing: None,
+            ..Clock::from_zero("gait_phase", gait[0] / rate, When::Before)
         });
         facts.note("gait_phase", format!("{}; {}", facts.source("gait"), facts.source("clock.restart")));
         let turn = || scaled(std::f64::consts::TAU);
@@ -223,12 +219,7 @@ fn variant(networks: &[String], facts: &mut Facts) -> Result<String> {
             facts.note("variant", format!("the folder {only}"));
             Ok(only.to_owned())
         }
-        _ => {
-            let variant: Option<String> = facts.find("variant")?;
-            let variant = variant.unwrap_or_else(|| there[0].to_owned());
-            ensure!(there.contains(&variant.as_str()), "variant = {variant:?}: there are {}", there.join(", "));
-            Ok(variant)
-        }
+        _ => facts.named("variant", &there),
     }
 }
 
@@ -241,8 +232,4 @@ fn port(bundle: &Bundle, file: &str) -> Result<(String, String)> {
             bail!("{file}: it has {} inputs and {} outputs; one each is known", inputs.len(), outputs.len())
         }
     }
-}
-
-fn clip_to(limit: f64) -> Op {
-    Op::Clip([Operand::Number(-limit), Operand::Number(limit)])
 }

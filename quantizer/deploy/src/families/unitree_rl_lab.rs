@@ -86,7 +86,7 @@ impl Family for UnitreeRlLab {
                     ops
                 }
                 "last_action" => {
-                    let processed = facts.find::<String>("last_action")?.is_some_and(|which| which == "processed");
+                    let processed = facts.chooses("last_action", "processed")?;
                     parts.state(term, joints, if processed { "processed" } else { "policy.ACTION" })
                 }
                 other => {
@@ -107,12 +107,9 @@ impl Family for UnitreeRlLab {
                 }
             };
             let mut ops = ops;
-            let clip =
-                yaml.maybe(&format!("{path}.clip"), "two numbers", |node| <[f64; 2]>::try_from(node.numbers()?).ok())?;
+            let clip = yaml.maybe(&format!("{path}.clip"), "two numbers", Node::pair)?;
             let clip = clip.map(|[low, high]| Op::Clip([Operand::Number(low), Operand::Number(high)]));
-            let scale = yaml.maybe(&format!("{path}.scale"), "numbers", |node| {
-                node.numbers().or_else(|| Some(vec![node.number()?]))
-            })?;
+            let scale = yaml.maybe(&format!("{path}.scale"), "numbers", Node::one_or_several)?;
             let scale = scale.map(|scale| Op::Scale(Operand::List(scale)));
             let both = if clip_first { [clip, scale] } else { [scale, clip] };
             ops.extend(both.into_iter().flatten());
@@ -153,9 +150,8 @@ impl UnitreeRlLab {
         let mut ops = parts.input("velocity_commands", 3, "m/s, m/s, rad/s");
         let path = "commands.base_velocity.ranges";
         if facts.get::<bool>("clamp_commands")? {
-            let ranges = ["lin_vel_x", "lin_vel_y", "ang_vel_z"].map(|axis| {
-                yaml.need(&format!("{path}.{axis}"), "two numbers", |node| <[f64; 2]>::try_from(node.numbers()?).ok())
-            });
+            let ranges = ["lin_vel_x", "lin_vel_y", "ang_vel_z"]
+                .map(|axis| yaml.need(&format!("{path}.{axis}"), "two numbers", Node::pair));
             let ranges = ranges.into_iter().collect::<Result<Vec<_>>>()?;
             let of = |i: usize| Operand::List(ranges.iter().map(|range| range[i]).collect());
             ops.push(Op::Clip([of(0), of(1)]));
@@ -177,16 +173,14 @@ impl UnitreeRlLab {
             other => bail!("{}: action {other:?} is not known", yaml.at("actions")),
         };
         let path = |key: &str| format!("actions.{action}.{key}");
-        let numbers = |node: &Node| node.numbers().or_else(|| Some(vec![node.number()?]));
         let mut ops = Vec::new();
         for (key, op) in [("scale", Op::Scale as fn(Operand) -> Op), ("offset", Op::Add)] {
-            if let Some(list) = yaml.maybe(&path(key), "numbers", numbers)? {
+            if let Some(list) = yaml.maybe(&path(key), "numbers", Node::one_or_several)? {
                 ops.push(op(Operand::List(list)));
             }
         }
         if let Some(clip) = yaml.get(&path("clip")) {
-            let pairs: Option<Vec<[f64; 2]>> =
-                clip.items().iter().map(|pair| <[f64; 2]>::try_from(pair.numbers()?).ok()).collect();
+            let pairs: Option<Vec<[f64; 2]>> = clip.items().iter().map(Node::pair).collect();
             let pairs = pairs.filter(|pairs| !pairs.is_empty());
             let pairs = pairs.with_context(|| format!("{} must be pairs of numbers", yaml.at(&path("clip"))))?;
             let of = |i: usize| Operand::List(pairs.iter().map(|pair| pair[i]).collect());

@@ -28,14 +28,27 @@ impl Graph {
             };
             let shown = || ports.iter().map(|(name, _)| printable(name)).collect::<Vec<_>>().join(", ");
             let (name, len) = port.with_context(|| format!("{file}: none of its {kind} is {usual:?}: {}", shown()))?;
-            let len = len.filter(|len| *len > 0);
-            let len = len.with_context(|| format!("{file}: the length of {:?} is not given", printable(name)))?;
-            Ok((name.clone(), len))
+            Ok((name.clone(), known_len(file, name, *len)?))
         };
         let (input, input_len) = choose(&signature.inputs, "inputs", "obs")?;
         let (output, actions) = choose(&signature.outputs, "outputs", "actions")?;
         Ok(Self { file: file.to_owned(), input, input_len, output, actions })
     }
+}
+
+/// Returns inputs or outputs with their lengths, which the file must give.
+pub(crate) fn known(file: &str, ports: &[(String, Option<usize>)]) -> Result<Vec<(String, usize)>> {
+    ports.iter().map(|(name, len)| Ok((name.clone(), known_len(file, name, *len)?))).collect()
+}
+
+fn known_len(file: &str, name: &str, len: Option<usize>) -> Result<usize> {
+    let len = len.filter(|len| *len > 0);
+    len.with_context(|| format!("{file}: the length of {:?} is not given", printable(name)))
+}
+
+/// Lists inputs or outputs with their lengths, for a message.
+pub(crate) fn listed(ports: &[(String, usize)]) -> String {
+    ports.iter().map(|(name, len)| format!("{} [{len}]", printable(name))).collect::<Vec<_>>().join(", ")
 }
 
 /// Takes an ONNX file's metadata as a document of texts.

@@ -1,6 +1,6 @@
 //! How a family keeps histories.
 
-use actq::error::{Result, bail};
+use actq::error::Result;
 
 use crate::description::{Fill, First, History};
 use crate::facts::Facts;
@@ -19,12 +19,7 @@ pub(crate) struct Histories {
 impl Histories {
     /// Asks for the rules history.layout, history.first and history.fill.
     pub(crate) fn of(facts: &mut Facts) -> Result<Self> {
-        let layout: Option<String> = facts.find("history.layout")?;
-        let by_term = match layout.as_deref() {
-            Some("term") => true,
-            Some("frame") | None => false,
-            Some(other) => bail!("history.layout = {other:?}: give \"term\" or \"frame\""),
-        };
+        let by_term = facts.chooses("history.layout", "term")?;
         Ok(Self { by_term, first: facts.get("history.first")?, fill: facts.get("history.fill")?, stride: 1 })
     }
 

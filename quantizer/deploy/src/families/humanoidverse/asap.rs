@@ -134,11 +134,8 @@ impl Reader<'_> {
         if let [only] = skills[..] {
             return Ok(only.to_owned());
         }
-        let answer: Option<String> = self.facts.find("asap.skill")?;
-        let skill = answer.or_else(|| Some((*skills.first()?).to_owned()));
-        let skill = skill.with_context(|| format!("{} has no skills", self.yaml.at("mimic_models")))?;
-        ensure!(skills.contains(&skill.as_str()), "asap.skill = {skill:?}: there are {}", skills.join(", "));
-        Ok(skill)
+        ensure!(!skills.is_empty(), "{} has no skills", self.yaml.at("mimic_models"));
+        self.facts.named("asap.skill", &skills)
     }
 
     /// Returns the places of a mask.

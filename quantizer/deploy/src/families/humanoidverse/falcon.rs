@@ -1,6 +1,6 @@
 //! The observation of FALCON: a list of terms, and their histories.
 
-use actq::error::{Context as _, Result, bail, ensure};
+use actq::error::{Context as _, Result, ensure};
 
 use super::super::common::Histories;
 use super::lengths::count;
@@ -12,11 +12,8 @@ impl Reader<'_> {
         let yaml = self.yaml;
         let listed = if yaml.look("obs_dict").is_some() { "obs_dict.actor_obs" } else { "obs_list" };
         let mut terms = yaml.texts(listed)?;
-        let order: Option<String> = self.facts.find("terms.order")?;
-        match order.as_deref() {
-            Some("sorted") | None => terms.sort(),
-            Some("listed") => {}
-            Some(other) => bail!("terms.order = {other:?}: give \"sorted\" or \"listed\""),
+        if !self.facts.chooses("terms.order", "listed")? {
+            terms.sort();
         }
         let lengths =
             if yaml.look("history_length_dict").is_some() { "history_length_dict.actor_obs" } else { "history_length" };

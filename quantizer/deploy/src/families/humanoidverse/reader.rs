@@ -47,10 +47,4 @@ impl Reader<'_> {
         self.parts.raw(name, len, unit);
         Term { from: name.to_owned(), ops: Vec::new(), len, stated: len }
     }
-
-    /// Adds the value `NAME_and_zero`, which has one 0 after a value, for places that nothing moves.
-    pub(super) fn with_zero(&mut self, name: &str) {
-        self.parts.unchanged("zero", vec![0.0]);
-        self.parts.values(&format!("{name}_and_zero"), &[name, "zero"]);
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use actq::error::{Context as _, Result, bail, ensure};
+use actq::error::{Context as _, Result, ensure};
 
 use super::lengths::{count, whole};
 use crate::document::Document;
@@ -88,15 +88,7 @@ impl Robot {
                 (&yaml.at("dof_names_upper_body"), &format!("{} names", upper.len())),
             ));
         }
-        let by_name = if names.is_empty() {
-            false
-        } else {
-            match facts.find::<String>("joint_order")?.as_deref() {
-                Some("names") => true,
-                Some("position") | None => false,
-                Some(other) => bail!("joint_order = {other:?}: give \"position\" or \"names\""),
-            }
-        };
+        let by_name = !names.is_empty() && facts.chooses("joint_order", "names")?;
         let order = if names.is_empty() { yaml.at("DEFAULT_DOF_ANGLES") } else { facts.source("joint_order") };
         facts.note("joint order", order);
         Ok(Self { default, names, by_name, upper })

@@ -1,7 +1,8 @@
 //! The target, and the gains of its joints.
 
-use actq::error::{Result, bail, ensure};
+use actq::error::{Result, ensure};
 
+use super::super::common::action::{add_zero, clip, padded};
 use super::reader::Reader;
 use crate::description::{Gains, Op, Operand, Order, TargetKind};
 use crate::facts::Facts;
@@ -11,12 +12,9 @@ impl Reader<'_> {
     /// Adds the target: the action, scaled, with what the upper body gets, relative to the default.
     pub(super) fn act(&mut self) -> Result<()> {
         let (yaml, n) = (self.yaml, self.robot.len());
-        let clip: f64 = self.facts.find("action.clip")?.unwrap_or(100.0);
-        let number = Operand::Number;
-        self.parts.value("clipped", "policy.ACTION", vec![Op::Clip([number(-clip), number(clip)])]);
-        self.facts.note("clipped", self.facts.source("action.clip"));
+        clip(&mut self.parts, self.facts)?;
         let scale: f64 = self.facts.get("action_scale")?;
-        let scaled = || Op::Scale(number(scale));
+        let scaled = || Op::Scale(Operand::Number(scale));
         let acts = self.acts.unwrap_or(n);
         let mut source = self.facts.source("action_scale");
         let mut ops = Vec::new();
@@ -25,7 +23,7 @@ impl Reader<'_> {
                 return Err(self.wrong_action(acts, active.len(), "robot_dofs"));
             }
             let places = (0..n).map(|i| active.iter().position(|place| *place == i).unwrap_or(acts)).collect();
-            self.with_zero("clipped");
+            add_zero(&mut self.parts, "clipped");
             ops.extend([Op::Select(Order::Places(places)), scaled()]);
             "clipped_and_zero".to_owned()
         } else if acts == n {
@@ -89,7 +87,7 @@ impl Reader<'_> {
         self.parts.raw("ref_upper_dof_pos", upper.len(), "rad");
         let default = upper.iter().map(|place| self.robot.default[*place]).collect();
         self.parts.value("upper_residual", "ref_upper_dof_pos", vec![Op::Subtract(Operand::List(default))]);
-        self.with_zero("upper_residual");
+        add_zero(&mut self.parts, "upper_residual");
         let places = (0..n).map(|i| upper.iter().position(|place| *place == i).unwrap_or(upper.len())).collect();
         self.parts.value("residual", "upper_residual_and_zero", vec![Op::Select(Order::Places(places))]);
         for name in ["upper_residual", "upper_residual_and_zero", "residual"] {
@@ -103,7 +101,13 @@ impl Reader<'_> {
         let n = self.robot.len();
         self.parts.value("scaled", "clipped", vec![scaled]);
         match self.facts.find::<String>("target.short")?.as_deref() {
-            Some("reference") | None => {
+            Some(fill @ ("zeros_first" | "zeros_last")) => {
+                add_zero(&mut self.parts, "scaled");
+                let moved = if fill == "zeros_first" { n - acts..n } else { 0..acts };
+                self.parts.value("all", "scaled_and_zero", vec![padded(n, moved)]);
+                Ok("all".to_owned())
+            }
+            _ => {
                 let upper = self.robot.upper.len();
                 if acts + upper != n {
                     let key = if self.yaml.look("dof_names_upper_body").is_some() {
@@ -117,14 +121,6 @@ impl Reader<'_> {
                 self.parts.values("all", &["scaled", "ref_upper_dof_pos"]);
                 Ok("all".to_owned())
             }
-            Some(fill @ ("zeros_first" | "zeros_last")) => {
-                self.with_zero("scaled");
-                let moved = if fill == "zeros_first" { n - acts..n } else { 0..acts };
-                let places = (0..n).map(|i| if moved.contains(&i) { i - moved.start } else { acts }).collect();
-                self.parts.value("all", "scaled_and_zero", vec![Op::Select(Order::Places(places))]);
-                Ok("all".to_owned())
-            }
-            Some(other) => bail!("target.short = {other:?}: give \"reference\", \"zeros_first\" or \"zeros_last\""),
         }
     }
 

@@ -2,9 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use actq::error::{Result, bail};
+use actq::error::Result;
 
+use super::super::common::action::fed_back;
 use super::super::common::given_gravity;
+use super::super::common::terms::given;
 use super::reader::{Reader, Term};
 use crate::description::{Op, Operand, Order};
 use crate::facts::Facts;
@@ -40,16 +42,12 @@ impl Reader<'_> {
     }
 
     fn content(&mut self, name: &str, dim: usize) -> Result<Term> {
+        if let Some((len, unit)) = given(name) {
+            return Ok(self.raw(name, len, unit));
+        }
         let n = self.robot.len();
         let from = |from: &str, ops: Vec<Op>, len: usize| Term { from: from.to_owned(), ops, len, stated: len };
         Ok(match name {
-            "base_ang_vel" => self.raw(name, 3, "rad/s"),
-            "base_lin_vel" => self.raw(name, 3, "m/s"),
-            "command_lin_vel" => self.raw(name, 2, "m/s"),
-            "command_ang_vel" => self.raw(name, 1, "rad/s"),
-            "command_stand" => self.raw(name, 1, "1 to walk, 0 to stand"),
-            "command_base_height" => self.raw(name, 1, "m"),
-            "command_waist_dofs" => self.raw(name, 3, "rad"),
             "ref_upper_dof_pos" => self.raw(name, self.robot.upper.len(), "rad"),
             "projected_gravity" => self.gravity()?,
             "dof_pos" | "dof_vel" => {
@@ -72,13 +70,7 @@ impl Reader<'_> {
             }
             "actions" => {
                 let acts = self.acts.unwrap_or(dim);
-                let raw = match self.facts.find::<String>("last_action")?.as_deref() {
-                    Some("clipped") | None => false,
-                    Some("raw") => true,
-                    Some(other) => bail!("last_action = {other:?}: give \"clipped\" or \"raw\""),
-                };
-                self.parts.kept("last_action", acts, if raw { "policy.ACTION" } else { "clipped" });
-                self.facts.note("last_action", self.facts.source("last_action"));
+                fed_back(&mut self.parts, acts, self.facts)?;
                 // The file states the number of all joints for a policy that moves a selection of them.
                 let stated = if self.active.is_some() { n } else { acts };
                 Term { stated, ..from("last_action", Vec::new(), acts) }

@@ -252,9 +252,9 @@ impl Maker<'_> {
                 ops
             }
             What::LastAction(places) => {
-                let which: Option<String> = self.facts.find("last_action")?;
+                let is_processed = self.facts.chooses("last_action", "processed")?;
                 also(self.facts, "last_action");
-                let next = if which.as_deref() == Some("processed") { "processed" } else { self.action };
+                let next = if is_processed { "processed" } else { self.action };
                 let ops = parts.state(&name, total, next);
                 let select = places.iter().map(|places| Op::Select(Order::Places(places.clone())));
                 ops.into_iter().chain(select).collect()

@@ -23,8 +23,7 @@ pub(super) fn bounds(node: &Node) -> Option<[f64; 2]> {
 
 /// Reads one number or several.
 pub(super) fn numbers(node: &Node) -> Option<Vec<f64>> {
-    let numbers = node.numbers().or_else(|| Some(vec![node.number()?]))?;
-    (!numbers.is_empty()).then_some(numbers)
+    node.one_or_several().filter(|numbers| !numbers.is_empty())
 }
 
 /// Reads the number of frames that a term or a group observes.

@@ -5,6 +5,7 @@ use actq::text::printable;
 use actq_onnx::Signature;
 use serde::Deserialize;
 
+use super::super::common::{known, listed};
 use crate::document::Document;
 use crate::facts::Facts;
 
@@ -28,16 +29,8 @@ pub(super) struct Graph {
 
 impl Graph {
     pub(super) fn of(file: &str, signature: Signature) -> Result<Self> {
-        let known = |ports: Vec<(String, Option<usize>)>| {
-            let known = |(name, len): (String, Option<usize>)| {
-                let len = len.filter(|len| *len > 0);
-                let len = len.with_context(|| format!("{file}: the length of {:?} is not given", printable(&name)))?;
-                Ok((name, len))
-            };
-            ports.into_iter().map(known).collect::<Result<Vec<_>>>()
-        };
-        let graph =
-            Self { file: file.to_owned(), inputs: known(signature.inputs)?, outputs: known(signature.outputs)? };
+        let (inputs, outputs) = (known(file, &signature.inputs)?, known(file, &signature.outputs)?);
+        let graph = Self { file: file.to_owned(), inputs, outputs };
         for (i, (name, _)) in graph.inputs.iter().enumerate() {
             ensure!(
                 graph.inputs[..i].iter().all(|(other, _)| base(other) != base(name)),
@@ -74,8 +67,7 @@ impl Graph {
     }
 
     fn listed(&self) -> String {
-        let shown = |(name, len): &(String, usize)| format!("{} [{len}]", printable(name));
-        self.outputs.iter().map(shown).collect::<Vec<_>>().join(", ")
+        listed(&self.outputs)
     }
 }
 

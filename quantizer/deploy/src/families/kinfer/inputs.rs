@@ -1,6 +1,6 @@
 //! The values that the graph's inputs read.
 
-use actq::error::{Result, bail, ensure};
+use actq::error::{Result, ensure};
 
 use super::super::common::{Parts, given_gravity};
 use super::graph::{BUFFERS, Graph, Outputs, base};
@@ -41,23 +41,13 @@ pub(super) fn inputs(
             "imu_euler_xyz" => raw(parts, name, len, "rad"),
             "imu_lin_acc" => raw(parts, name, len, "m/s2"),
             "t" | "timestamp" => {
-                let clock: Option<String> = facts.find("clock")?;
+                let is_raw = facts.chooses("clock", "raw")?;
                 source = format!("{}; {}", meta.at("sim_dt"), facts.source("clock"));
-                match clock.as_deref() {
-                    Some("raw") => raw(parts, name, 1, "s"),
-                    Some("count") | None => {
-                        parts.clock(Clock {
-                            name: name.to_owned(),
-                            start: vec![0.0],
-                            advance: period,
-                            when: When::After,
-                            wrap: None,
-                            restart_above: None,
-                            standing: None,
-                        });
-                        name.to_owned()
-                    }
-                    Some(other) => bail!("clock = {other:?}: give \"count\" or \"raw\""),
+                if is_raw {
+                    raw(parts, name, 1, "s")
+                } else {
+                    parts.clock(Clock::from_zero(name, period, When::After));
+                    name.to_owned()
                 }
             }
             "dof_pos" => {

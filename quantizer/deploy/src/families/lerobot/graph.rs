@@ -7,6 +7,7 @@ use actq::graph::NodeKind;
 use actq::text::printable;
 use actq_onnx::Signature;
 
+use super::super::common::{known, listed};
 use super::feature::Feature;
 use super::normalizer::Normalizer;
 use crate::bundle::Bundle;
@@ -34,21 +35,10 @@ impl Graph {
                 facts.note("network", "the only ONNX file");
                 only.clone()
             }
-            [first, ..] => {
-                let answer: Option<String> = facts.find("network")?;
-                let file = answer.unwrap_or_else(|| first.clone());
-                ensure!(files.contains(&file), "network = {file:?}: there are {}", files.join(", "));
-                file
-            }
+            _ => facts.named("network", &files.iter().map(String::as_str).collect::<Vec<_>>())?,
         };
         let signature = Signature::read(&bundle.path(&file)?)?;
-        let known = |(name, len): (String, Option<usize>)| {
-            let len = len.filter(|len| *len > 0);
-            let len = len.with_context(|| format!("{file}: the length of {:?} is not given", printable(&name)))?;
-            Ok((name, len))
-        };
-        let inputs = signature.inputs.into_iter().map(known).collect::<Result<_>>()?;
-        let outputs: Vec<(String, usize)> = signature.outputs.into_iter().map(known).collect::<Result<_>>()?;
+        let (inputs, outputs) = (known(&file, &signature.inputs)?, known(&file, &signature.outputs)?);
         let output = match &outputs[..] {
             [only] => Some(only),
             several => several.iter().find(|(name, _)| name == "action"),
@@ -157,8 +147,4 @@ impl Graph {
         }
         Ok(())
     }
-}
-
-fn listed(ports: &[(String, usize)]) -> String {
-    ports.iter().map(|(name, len)| format!("{} [{len}]", printable(name))).collect::<Vec<_>>().join(", ")
 }

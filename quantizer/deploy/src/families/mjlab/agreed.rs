@@ -36,22 +36,44 @@ pub(super) fn order(
     let Some(i) = (0..common.len()).find(|&i| common.get(i) != listed.get(i)) else {
         return Ok((common, format!("{yaml}; {meta}")));
     };
-    let key = "joints.order";
-    match facts.missing::<String>(key, "which order of joints does the network have?")?.as_deref() {
-        Some("metadata") => Ok((common, format!("{meta} (answer {key})"))),
-        Some("file") => Ok((listed.to_vec(), format!("{yaml} (answer {key})"))),
-        Some(other) => bail!("answer {key} = {other:?}: give \"metadata\" or \"file\""),
-        None => {
-            let shown = |names: &[String]| {
-                let name = names.get(i).map(|name| printable(name));
-                format!("joint {i} (the first is 0) is {:?}: {}", name.unwrap_or_default(), names.join(", "))
-            };
-            Err(Facts::contradiction(
-                &format!("order of the joints (answer {key} = \"metadata\" or \"file\" to decide)"),
-                (meta, &shown(&common)),
-                (yaml, &shown(listed)),
-            ))
-        }
+    let shown = |names: &[String]| {
+        let name = names.get(i).map(|name| printable(name));
+        format!("joint {i} (the first is 0) is {:?}: {}", name.unwrap_or_default(), names.join(", "))
+    };
+    let dispute = Dispute {
+        key: "joints.order",
+        text: "which order of joints does the network have?",
+        what: "order of the joints",
+    };
+    dispute.decide((common.clone(), meta, &shown(&common)), (listed.to_vec(), yaml, &shown(listed)), facts)
+}
+
+/// Two statements of one thing that differ.
+struct Dispute<'a> {
+    key: &'a str,
+    text: &'a str,
+    /// What both state.
+    what: &'a str,
+}
+
+impl Dispute<'_> {
+    /// Returns what the metadata or the file says, by the answer, and where it is. A statement has its value, its place and
+    /// what a message shows of it. Without an answer both contradict each other.
+    fn decide<T>(&self, meta: (T, &str, &str), file: (T, &str, &str), facts: &mut Facts) -> Result<(T, String)> {
+        let Self { key, text, what } = self;
+        let (value, at, _) = match facts.missing::<String>(key, text)?.as_deref() {
+            Some("metadata") => meta,
+            Some("file") => file,
+            Some(other) => bail!("answer {key} = {other:?}: give \"metadata\" or \"file\""),
+            None => {
+                return Err(Facts::contradiction(
+                    &format!("{what} (answer {key} = \"metadata\" or \"file\" to decide)"),
+                    (meta.1, meta.2),
+                    (file.1, file.2),
+                ));
+            }
+        };
+        Ok((value, format!("{at} (answer {key})")))
     }
 }
 
@@ -74,26 +96,13 @@ pub(super) fn agreed(
             match joints.iter().find(differs) {
                 None => (yaml.0, format!("{}; {}", yaml.1, own.1)),
                 Some(joint) => {
-                    let which = facts.missing::<String>(key, "which numbers hold?")?;
-                    match which.as_deref() {
-                        Some("metadata") => (own.0, format!("{} (answer {key})", own.1)),
-                        Some("file") => (yaml.0, format!("{} (answer {key})", yaml.1)),
-                        Some(other) => bail!("answer {key} = {other:?}: give \"metadata\" or \"file\""),
-                        None => {
-                            let shown = |by: &ByJoint| {
-                                format!(
-                                    "{} for joint {:?}",
-                                    by.0.get(joint).copied().unwrap_or_default(),
-                                    printable(joint)
-                                )
-                            };
-                            return Err(Facts::contradiction(
-                                &format!("{key} (answer {key} = \"metadata\" or \"file\" to decide)"),
-                                (&own.1, &shown(&own)),
-                                (&yaml.1, &shown(&yaml)),
-                            ));
-                        }
-                    }
+                    let shown = |by: &ByJoint| {
+                        let number = by.0.get(joint).copied().unwrap_or_default();
+                        format!("{number} for joint {:?}", printable(joint))
+                    };
+                    let (of_own, of_yaml) = (shown(&own), shown(&yaml));
+                    let dispute = Dispute { key, text: "which numbers hold?", what: key };
+                    dispute.decide((own.0, &own.1, &of_own), (yaml.0, &yaml.1, &of_yaml), facts)?
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! The target, and the gains of its joints.
 
-use actq::error::{Result, bail};
+use actq::error::Result;
 
 use super::super::common::Parts;
 use super::robot::Robot;
@@ -13,10 +13,6 @@ pub(super) fn target(parts: &mut Parts, robot: &Robot, ros: Option<&Ros<'_>>, fa
     let mut ops = vec![Op::Scale(Operand::Name("action_scale".to_owned()))];
     let base: Option<String> = facts.find("target.base")?;
     match base.as_deref() {
-        Some("default") | None => {
-            parts.constant("target_default", robot.of_moved(&robot.default));
-            ops.push(Op::Add(Operand::Name("target_default".to_owned())));
-        }
         Some("current") => {
             let position = if ros.is_some() { "position" } else { "joint_pos" };
             let mut select = robot.select();
@@ -25,7 +21,10 @@ pub(super) fn target(parts: &mut Parts, robot: &Robot, ros: Option<&Ros<'_>>, fa
             ops.push(Op::Add(Operand::Name("current".to_owned())));
         }
         Some("nothing") => {}
-        Some(other) => bail!("target.base = {other:?}: give \"default\", \"current\" or \"nothing\""),
+        _ => {
+            parts.constant("target_default", robot.of_moved(&robot.default));
+            ops.push(Op::Add(Operand::Name("target_default".to_owned())));
+        }
     }
     parts.value("processed", "policy.ACTION", ops);
     let mut ops = Vec::new();

@@ -1,8 +1,8 @@
 //! The terms of the observation.
 
-use actq::error::{Result, bail, ensure};
+use actq::error::{Result, ensure};
 
-use super::super::common::{Graph, Histories, Parts, gravity, names};
+use super::super::common::{ACTION, Graph, Histories, Parts, gravity, names};
 use super::frames::{MOST, frames};
 use super::robot::Robot;
 use super::ros::Ros;
@@ -83,8 +83,7 @@ pub(super) fn terms(
     let plain: Option<bool> = facts.find("terms.plain")?;
     let relative: bool = facts.get("joint_pos.relative")?;
     let (position, velocity) = if ros.is_some() { ("position", "velocity") } else { ("joint_pos", "joint_vel") };
-    let base: Option<String> = facts.find("target.base")?;
-    if base.as_deref() == Some("current") || listed.iter().any(|term| matches!(of(term), Term::Position)) {
+    if facts.chooses("target.base", "current")? || listed.iter().any(|term| matches!(of(term), Term::Position)) {
         parts.raw_joints(position, "robot", "rad");
     }
     if listed.iter().any(|term| matches!(of(term), Term::Velocity)) {
@@ -112,14 +111,9 @@ pub(super) fn terms(
                 robot.select()
             }
             Term::Action => {
-                let which: Option<String> = facts.find("last_action")?;
+                let is_processed = facts.chooses("last_action", "processed")?;
                 source = format!("{source}; {}", facts.source("last_action"));
-                let next = match which.as_deref() {
-                    Some("raw") | None => "policy.ACTION",
-                    Some("processed") => "processed",
-                    Some(other) => bail!("last_action = {other:?}: give \"raw\" or \"processed\""),
-                };
-                parts.state(term, *len, next)
+                parts.state(term, *len, if is_processed { "processed" } else { ACTION })
             }
             Term::Unknown => parts.input(term, *len, ""),
         };

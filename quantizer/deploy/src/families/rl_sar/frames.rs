@@ -33,13 +33,9 @@ pub(super) fn frames(config: &Config<'_>, facts: &mut Facts) -> Result<(usize, H
     );
     let (by_term, layout) = match by_term {
         Some(by_term) => (by_term, config.at("observations_history_priority")),
-        None => {
-            let layout: Option<String> = facts.find("history.layout")?;
-            (layout.as_deref() == Some("term"), facts.source("history.layout"))
-        }
+        None => (facts.chooses("history.layout", "term")?, facts.source("history.layout")),
     };
-    let zero: Option<String> = facts.find("history.zero")?;
-    let first = if ascends == (zero.as_deref() == Some("oldest")) { First::Oldest } else { First::Newest };
+    let first = if ascends == facts.chooses("history.zero", "oldest")? { First::Oldest } else { First::Newest };
     let fill = facts.get("history.fill")?;
     let [zero, filled] = ["history.zero", "history.fill"].map(|rule| facts.source(rule));
     facts.note("observation", format!("{}; {layout}; {zero}; {filled}", config.at(key)));

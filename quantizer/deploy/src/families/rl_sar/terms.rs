@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use actq::error::{Result, ensure};
 
+use super::super::common::action::clip_to;
 use super::super::common::{Parts, count, given_gravity};
 use super::action::masked;
 use super::config::Config;
@@ -45,7 +46,7 @@ impl Terms<'_, '_> {
             ensure!(is_plain(name), "{shown}: term {i} (the first is 0) is no name: use letters, digits, _ - /");
             ensure!(!terms[..i].contains(name), "{shown}: {name:?} occurs twice");
             let mut term = self.term(name)?;
-            term.ops.push(Op::Clip([Operand::Number(-clip), Operand::Number(clip)]));
+            term.ops.push(clip_to(clip));
             let value = self.parts.term(term.ops, length);
             self.facts.note(&value, format!("{shown}; {}", term.source));
             all = all.zip(term.len).map(|(all, len)| all + len);
@@ -72,7 +73,7 @@ impl Terms<'_, '_> {
         match name {
             "lin_vel" => {
                 let mut term = scaled("lin_vel_scale", 3, Vec::new())?;
-                if self.facts.find::<String>("lin_vel")?.as_deref() == Some("input") {
+                if self.facts.chooses("lin_vel", "input")? {
                     self.parts.input(name, 3, "m/s");
                 } else {
                     self.parts.unchanged("no_lin_vel", vec![0.0; 3]);
@@ -113,7 +114,7 @@ impl Terms<'_, '_> {
             }
             "dof_vel" => scaled("dof_vel_scale", n, self.joints.input(self.parts, name, "rad/s")),
             "actions" => {
-                let is_raw = self.facts.find::<String>("last_action")?.as_deref() == Some("raw");
+                let is_raw = self.facts.chooses("last_action", "raw")?;
                 let ops = self.parts.state(name, n, if is_raw { "policy.ACTION" } else { self.action });
                 Ok(Term { len: Some(n), ops, source: self.facts.source("last_action") })
             }
@@ -161,15 +162,8 @@ impl Terms<'_, '_> {
     /// Adds a clock that advances by 1 in some seconds.
     fn clock(&mut self, name: &str, seconds: f64, wrap: Option<[f64; 2]>) -> Result<()> {
         let when: Option<When> = self.facts.find("clock.when")?;
-        self.parts.clock(Clock {
-            name: name.to_owned(),
-            start: vec![0.0],
-            advance: 1.0 / (self.rate * seconds),
-            when: when.unwrap_or(When::Before),
-            wrap,
-            restart_above: None,
-            standing: None,
-        });
+        let advance = 1.0 / (self.rate * seconds);
+        self.parts.clock(Clock { wrap, ..Clock::from_zero(name, advance, when.unwrap_or(When::Before)) });
         self.facts.note(name, self.facts.source("clock.when"));
         Ok(())
     }
