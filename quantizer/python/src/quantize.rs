@@ -93,7 +93,7 @@ impl Request {
             forced: forced.collect::<PyResult<_>>()?,
             ..Options::new(method, self.budget()?)
         };
-        options.check().or_raise()?;
+        options.check().and_then(|()| options.check_length()).or_raise()?;
         Ok(options)
     }
 }

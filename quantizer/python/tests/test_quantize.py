@@ -70,12 +70,17 @@ def test_episodes_are_those_of_a_padded_file(command, mlp, observations, tmp_pat
     assert actq.evaluate(image, (observations, starts), policy) == actq.evaluate(image, recording, policy)
 
 
-@pytest.mark.parametrize(("folder", "method"), [(UR3, "distill"), (FLOW, "rtn")])
-def test_a_policy_folder_brings_its_recordings(command, folder, method, tmp_path):
-    options = ["--bits", "3", "--steps", "2", "--method", method]
+@pytest.mark.parametrize(("folder", "method", "steps"), [(UR3, "distill", 2), (FLOW, "rtn", None)])
+def test_a_policy_folder_brings_its_recordings(command, folder, method, steps, tmp_path):
+    options = ["--bits", "3", "--method", method] + ([] if steps is None else ["--steps", steps])
     command("quantize", folder, "--out", tmp_path / "c.actq", *options)
-    image = actq.quantize(actq.import_policy(folder), bits=3, steps=2, method=method, progress=False)
+    image = actq.quantize(actq.import_policy(folder), bits=3, steps=steps, method=method, progress=False)
     assert image.bytes == (tmp_path / "c.actq").read_bytes()
+
+
+def test_steps_require_a_method_that_learns():
+    with pytest.raises(actq.Error, match="method rtn does not learn"):
+        actq.quantize(actq.import_policy(UR3), bits=3, steps=2, method="rtn", progress=False)
 
 
 def test_errors_of_an_image_are_those_of_eval(command, image, mlp, observations, tmp_path):
