@@ -110,7 +110,7 @@ fn with_values(text: String, values: &BTreeMap<String, Vec<u64>>) -> Vec<String>
     })
 }
 
-/// Returns the numbers behind each occurrence of `front`.
+/// Returns the numbers after each occurrence of `front`.
 fn numbers(text: &str, front: &str) -> Vec<u64> {
     let digits = |rest: &str| rest.chars().take_while(char::is_ascii_digit).collect::<String>().parse().ok();
     text.split(front).skip(1).filter_map(digits).collect()

@@ -104,11 +104,11 @@ fn ranked(effects: &[Effect]) -> Vec<f64> {
     removals
 }
 
-/// What the elements of a vector that are ranked so far do not explain.
+/// A vector of elements, as far as those that are ranked so far do not explain it.
 struct Unexplained<'a> {
     effect: &'a Array2<f64>,
     damping: f64,
-    /// Their covariance.
+    /// Covariance of its elements.
     rest: Array2<f64>,
     /// The part of the effect that each would explain, times its variance.
     explained: Array1<f64>,
