@@ -104,7 +104,7 @@ fn ranked(effects: &[Effect]) -> Vec<f64> {
     removals
 }
 
-/// A vector of elements, as far as those that are ranked so far do not explain it.
+/// A vector without what the elements that are ranked so far explain.
 struct Unexplained<'a> {
     effect: &'a Array2<f64>,
     damping: f64,
