@@ -17,6 +17,7 @@ pub mod operation;
 pub mod ops;
 mod run;
 pub mod syntax;
+pub(crate) mod units;
 mod values;
 mod weights;
 

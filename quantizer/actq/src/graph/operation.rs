@@ -6,6 +6,7 @@ use super::arrays::round_rows;
 use super::lowering::{BufferId, Lowering};
 use super::matrix::{Factors, Matrix};
 use super::syntax::Syntax;
+use super::units::keep;
 use super::values::{ValueId, WeightMatrix};
 use crate::error::{Result, ensure};
 use crate::gemm::Panels;
@@ -87,9 +88,11 @@ pub trait Operation {
     }
 
     /// Keeps some elements of the output, in this order, and the values of the vectors for them; of a recurrent cell its
-    /// hidden units. The caller cuts the matrices: their rows as [`super::ops::unit_rows`] says, and the columns of those
-    /// that read the elements.
-    fn keep_units(&mut self, _units: &[usize]) {}
+    /// hidden units. There are `len` of them. The caller cuts the matrices: their rows as `unit_rows` (`units.rs`) says,
+    /// and the columns of those that read the elements.
+    fn keep_units(&mut self, len: usize, units: &[usize]) {
+        self.vectors_mut().into_iter().for_each(|vector| keep(vector, len, units));
+    }
 
     /// Computes the output for a batch, or for a sequence of batches. A node with a state has one row of it for each
     /// row of a batch, and `state` advances through the sequence.

@@ -25,7 +25,6 @@ mod norm;
 mod normalize;
 mod recurrent;
 mod table;
-mod units;
 
 use std::ops::{Deref, DerefMut};
 
@@ -40,7 +39,6 @@ pub use mul::Mul;
 pub use norm::{LayerNorm, RmsNorm};
 pub use normalize::{Balance, Normalize};
 pub use table::Table;
-pub use units::unit_rows;
 
 use super::operation::Operation;
 use super::syntax::Keys;

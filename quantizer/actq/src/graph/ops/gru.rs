@@ -4,7 +4,6 @@ use actq_kernels::ops::cells::gru_cell;
 use ndarray::Array2;
 
 use super::recurrent::{KEYS, Parts};
-use super::units::keep;
 use crate::error::Result;
 use crate::graph::arrays::{contiguous, contiguous_mut, rows, rows_mut, step_rows, sum_rows};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
@@ -12,6 +11,7 @@ use crate::graph::operation::{
     Backward, Forward, NodeState, Operand, Operation, Product, Saved, expect_len, expect_shape, only,
 };
 use crate::graph::syntax::{Keys, Syntax};
+use crate::graph::units::keep;
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// torch's GRU of one layer, one step; gates `[r z n]`.
@@ -60,9 +60,9 @@ impl Operation for Gru {
 
     learned! { input_bias, state_bias }
 
-    fn keep_units(&mut self, units: &[usize]) {
-        keep(&mut self.input_bias, self.hidden, units);
-        keep(&mut self.state_bias, self.hidden, units);
+    fn keep_units(&mut self, len: usize, units: &[usize]) {
+        keep(&mut self.input_bias, len, units);
+        keep(&mut self.state_bias, len, units);
         self.hidden = units.len();
     }
 

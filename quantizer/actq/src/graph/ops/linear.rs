@@ -1,6 +1,5 @@
 use ndarray::Array2;
 
-use super::units::keep;
 use crate::error::Result;
 use crate::graph::arrays::sum_rows;
 use crate::graph::lowering::{BufferId, Lifetime, Lowering};
@@ -43,11 +42,6 @@ impl Operation for Linear {
     }
 
     learned! { bias }
-
-    fn keep_units(&mut self, units: &[usize]) {
-        let rows = self.bias.len();
-        keep(&mut self.bias, rows, units);
-    }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
         let x = run.operand(self.matrix, run.input(0).view());

@@ -4,7 +4,6 @@ use actq_kernels::ops::cells::lstm_cell;
 use ndarray::Array2;
 
 use super::recurrent::{KEYS, Parts};
-use super::units::keep;
 use crate::error::Result;
 use crate::graph::arrays::{contiguous, contiguous_mut, rows, rows_mut, step_rows, sum_rows};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
@@ -12,6 +11,7 @@ use crate::graph::operation::{
     Backward, Forward, NodeState, Operand, Operation, Product, Saved, expect_len, expect_shape, only,
 };
 use crate::graph::syntax::{Keys, Syntax};
+use crate::graph::units::keep;
 use crate::graph::values::{ValueId, WeightMatrix};
 use crate::simd::wide;
 
@@ -65,8 +65,8 @@ impl Operation for Lstm {
         2 * self.bias.len()
     }
 
-    fn keep_units(&mut self, units: &[usize]) {
-        keep(&mut self.bias, self.hidden, units);
+    fn keep_units(&mut self, len: usize, units: &[usize]) {
+        keep(&mut self.bias, len, units);
         self.hidden = units.len();
     }
 

@@ -1,7 +1,6 @@
 use actq_kernels::image::OpKind;
 use ndarray::Array2;
 
-use super::units::keep;
 use crate::error::Result;
 use crate::graph::arrays::{contiguous, contiguous_mut, sum, sum_of_products, sum_rows};
 use crate::graph::lowering::{BufferId, Lowering, StepData};
@@ -53,11 +52,6 @@ impl Operation for LayerNorm {
 
     learned! { weight, bias }
 
-    fn keep_units(&mut self, units: &[usize]) {
-        let len = self.weight.len();
-        self.vectors_mut().into_iter().for_each(|vector| keep(vector, len, units));
-    }
-
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
         normalized(run, self.eps, true)
     }
@@ -91,11 +85,6 @@ impl Operation for RmsNorm {
     }
 
     learned! { weight }
-
-    fn keep_units(&mut self, units: &[usize]) {
-        let len = self.weight.len();
-        keep(&mut self.weight, len, units);
-    }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
         normalized(run, self.eps, false)

@@ -1,10 +1,10 @@
 use actq_kernels::image::OpKind;
 use ndarray::Array2;
 
-use super::units::keep;
 use crate::error::{Result, ensure};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved};
+use crate::graph::units::keep;
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// Constants that differ between denoising steps: the network's values of the time.
@@ -30,8 +30,8 @@ impl Operation for Table {
 
     learned! { rows }
 
-    fn keep_units(&mut self, units: &[usize]) {
-        keep(&mut self.rows, self.len, units);
+    fn keep_units(&mut self, len: usize, units: &[usize]) {
+        keep(&mut self.rows, len, units);
         self.len = units.len();
     }
 

@@ -3,7 +3,7 @@
 use super::compact::{absorb, add_to_bias, columns, rows};
 use super::units::{Units, units};
 use crate::calibrate::moments::Moments;
-use crate::graph::ops::unit_rows;
+use crate::graph::units::unit_rows;
 use crate::graph::{Graph, WeightMatrix};
 
 /// Returns the number of a units in a share.
@@ -83,7 +83,7 @@ impl Cut {
             graph.matrices[m] = rows(&graph.matrices[m], &self.rows[m]);
         }
         for &node in &units.nodes {
-            graph.nodes[node].kind.keep_units(kept);
+            graph.nodes[node].kind.keep_units(units.len, kept);
             graph.nodes[node].len = kept.len();
         }
         for &m in units.readers.iter().flatten() {

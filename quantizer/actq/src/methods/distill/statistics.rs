@@ -99,8 +99,8 @@ impl RowStatistics {
         &self.windows.graph
     }
 
-    /// Returns the error of each row of every matrix without bits; `None` for their energies. Without learning those of single rows count: the gain of
-    /// the others is small then, and small networks get more uneven errors.
+    /// Returns the error of each row of every matrix without bits; `None` for their energies. Without learning those of
+    /// single rows count: the gain of the others is small then, and small networks get more uneven errors.
     pub(super) fn removals(&self, learns: bool) -> &[Option<Vec<f64>>] {
         let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
         let together = || removals(self.graph(), &of_inputs, &self.outputs, Effect::together);

@@ -2,7 +2,7 @@
 
 /// Returns the rows of a matrix or bias, of `rows`, that belong to some of an operation's `hidden` units: of a recurrent
 /// cell those of the first gate, then those of the second, and so on.
-pub fn unit_rows(rows: usize, hidden: usize, units: &[usize]) -> Vec<usize> {
+pub(crate) fn unit_rows(rows: usize, hidden: usize, units: &[usize]) -> Vec<usize> {
     (0..rows / hidden.max(1)).flat_map(|gate| units.iter().map(move |unit| gate * hidden + unit)).collect()
 }
 
