@@ -6,12 +6,12 @@
 //! over its deviation and with a random sign: the mean square is the error of removal to the first order.
 
 use actq::error::Result;
+use actq::graph::narrow::narrowed;
 use actq::graph::{Derivatives, Network, zero_state};
 use actq::random::Random;
 use ndarray::Array2;
 
 use crate::student::choice::Start;
-use crate::student::cut::cut;
 use crate::student::form::Form;
 use crate::student::rival::{Rival, Settings, Teacher};
 use crate::student::widths::format_widths;
@@ -48,7 +48,7 @@ pub fn pruned(teacher: &Teacher<'_>, settings: Settings, progress: &mut dyn FnMu
             }
         }
     }
-    let graph = cut(teacher.graph, &teacher.ties, &kept)?;
+    let graph = narrowed(teacher.graph, &teacher.ties, &kept).graph;
     let units = vec![None; graph.matrices.len()];
     let describe = |_: usize| format_widths(&teacher.ties, &kept);
     teacher.learned((&[Start { graph, units }], &RATES), (Form::Int8, settings), &describe, progress)

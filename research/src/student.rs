@@ -3,19 +3,17 @@
 
 pub mod choice;
 pub mod codes;
-pub mod cut;
 pub mod fit;
 pub mod form;
 pub mod rival;
 pub mod start;
-pub mod ties;
 pub mod widths;
 
 use actq::error::Result;
+use actq::graph::narrow::narrowed;
 use actq::random::Random;
 
 use choice::Start;
-use cut::cut;
 use form::Form;
 use rival::{Rival, Settings, Teacher};
 use start::restart;
@@ -38,13 +36,13 @@ pub fn student(
     progress: &mut dyn FnMut(&str, f64),
 ) -> Result<Rival> {
     let shapes = teacher.narrowing(form, settings.budget)?.shapes()?;
-    let start = |kept: &Vec<Vec<usize>>| -> Result<Start> {
-        let mut graph = cut(teacher.graph, &teacher.ties, kept)?;
+    let start = |kept: &Vec<Vec<usize>>| {
+        let mut graph = narrowed(teacher.graph, &teacher.ties, kept).graph;
         let units = teacher.units(&graph, settings.seed);
         restart(&mut graph, &units, &mut Random::new(settings.seed));
-        Ok(Start { graph, units })
+        Start { graph, units }
     };
-    let starts = shapes.iter().map(start).collect::<Result<Vec<Start>>>()?;
+    let starts = shapes.iter().map(start).collect::<Vec<Start>>();
     let describe = |start: usize| format_widths(&teacher.ties, &shapes[start]);
     teacher.learned((&starts, &RATES), (form, settings), &describe, progress)
 }

@@ -1,7 +1,7 @@
 //! Small networks and recordings of them, for the unit tests of this crate and, by path, of `actq-research`.
 
 use actq::data::Dataset;
-use actq::graph::ops::{Add, Gru, LayerNorm, Linear, Lstm, Pointwise};
+use actq::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Pointwise, Span};
 use actq::graph::{Evaluator, Graph, WeightMatrix};
 use actq::random::Random;
 use actq_kernels::math::Function;
@@ -86,6 +86,32 @@ pub(crate) fn residual(normed: bool) -> Graph {
     }
     graph.add(Linear { matrix: 3, bias: vector(2, &mut random) }, &[stream]).expect("it fits");
     graph
+}
+
+/// Makes a network with two branches, 3 -> 4 relu and 3 -> 3 tanh, whose outputs with two values of the observation
+/// between them are read together: 4 + 2 + 3 -> 2.
+pub(crate) fn branches() -> Graph {
+    let mut random = Random::new(9);
+    let mut graph = Graph::new(3);
+    for (i, (rows, cols)) in [(4, 3), (3, 3), (2, 9)].into_iter().enumerate() {
+        graph.matrices.push(matrix(&format!("m{i}"), rows, cols, &mut random));
+    }
+    let mut branch = |matrix: usize, len: usize, function: Function| {
+        let linear = graph.add(Linear { matrix, bias: vector(len, &mut random) }, &[0]).expect("it fits");
+        graph.add(Pointwise(function), &[linear]).expect("it fits")
+    };
+    let (a, b) = (branch(0, 4, Function::Relu), branch(1, 3, Function::Tanh));
+    let spans = [(0, 4), (1, 2), (0, 3)].map(|(from, len)| Span { from, len });
+    let joined = graph.add(Concat(spans.to_vec()), &[a, 0, b]).expect("it fits");
+    graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[joined]).expect("it fits");
+    graph
+}
+
+/// Runs a network over some observations.
+pub(crate) fn outputs(graph: &Graph) -> Vec<Vec<f32>> {
+    let mut evaluator = Evaluator::new(graph);
+    let obs = |t: usize| (0..graph.obs_len).map(|i| (0.7 * (t + 3 * i) as f32).sin()).collect::<Vec<_>>();
+    (0..20).map(|t| evaluator.step(&obs(t), &mut |_, _| {})).collect()
 }
 
 /// Makes random observations with the network's own actions.

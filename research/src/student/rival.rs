@@ -18,8 +18,8 @@ use super::choice::{Start, TRIAL, choose};
 use super::codes::{Coded, Coder, Coding, column_squares};
 use super::fit::{Fit, fit};
 use super::form::{Form, Limits, Taken, milliseconds, taken};
-use super::ties::Ties;
 use super::widths::Narrowing;
+use actq::graph::ties::Ties;
 
 /// The f32 policy that narrower networks learn from.
 #[derive(Debug)]

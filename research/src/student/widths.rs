@@ -5,9 +5,9 @@ use actq::error::{Result, bail};
 use actq::graph::Graph;
 use actq::policy::Policy;
 
-use super::cut::cut;
 use super::form::{Form, Limits, Taken, taken};
-use super::ties::Ties;
+use actq::graph::narrow::narrowed;
+use actq::graph::ties::Ties;
 
 /// Exponents of the teacher's widths in the student's: in proportion to them, to their roots, and equal.
 const EXPONENTS: [f64; 3] = [1.0, 0.5, 0.0];
@@ -36,9 +36,9 @@ impl Narrowing<'_> {
     ///
     /// # Errors
     ///
-    /// As [`cut`] and [`taken`].
+    /// As [`taken`].
     pub fn taken(&self, kept: &[Vec<usize>]) -> Result<Taken> {
-        taken(self.policy, &cut(self.graph, self.ties, kept)?, self.form)
+        taken(self.policy, &narrowed(self.graph, self.ties, kept).graph, self.form)
     }
 
     /// Returns `true` if the network of these elements keeps the limits.

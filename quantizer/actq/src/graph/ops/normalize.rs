@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, StepData};
 use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved, expect_len, only};
 use crate::graph::syntax::{Keys, Syntax, required};
+use crate::graph::units::keep;
 use crate::graph::values::{ValueId, WeightMatrix};
 use crate::numbers::limit;
 
@@ -42,6 +43,11 @@ impl Operation for Normalize {
             })
         };
         vec![Syntax { name: "normalize", keys: &["mean", "scale", "pre_clip", "clip"], read }]
+    }
+
+    fn keep_units(&mut self, len: usize, units: &[usize]) {
+        keep(&mut self.mean, len, units);
+        keep(&mut self.scale, len, units);
     }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
@@ -149,6 +155,20 @@ impl Balance {
 impl Operation for Balance {
     fn output_len(&self, matrices: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
         self.normalize.output_len(matrices, inputs)
+    }
+
+    fn keep_units(&mut self, len: usize, units: &[usize]) {
+        self.normalize.keep_units(len, units);
+        let scaled: Vec<bool> = units.iter().map(|unit| self.runs.iter().any(|run| run.contains(unit))).collect();
+        let mut start = 0;
+        self.runs.clear();
+        for of_one in scaled.chunk_by(|a, b| a == b) {
+            let end = start + of_one.len();
+            if of_one[0] {
+                self.runs.push(start..end);
+            }
+            start = end;
+        }
     }
 
     fn forward(&self, run: &Forward<'_>, state: &mut NodeState) -> (Array2<f32>, Saved) {

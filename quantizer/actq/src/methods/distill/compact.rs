@@ -2,10 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::dimension::{Dimension, Widths, elementwise};
+use super::dimension::{Dimension, Widths};
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::DAMPING_INPUT;
-use crate::graph::{Graph, NodeKind, WeightMatrix};
+use crate::graph::narrow::{Narrowed, narrowed};
+use crate::graph::ties::Ties;
+use crate::graph::{Graph, WeightMatrix};
 
 /// A graph whose hidden vectors hold only the elements with bits.
 #[derive(Clone, Debug)]
@@ -23,33 +25,24 @@ pub struct Compacted {
 /// Removes the elements without bits and sorts the others by width. The contribution of a removed element is estimated
 /// from the remaining ones by the moments of every matrix's input, and goes into their columns and the biases.
 pub fn compact(graph: &Graph, dimensions: &[Dimension], widths: &Widths, moments: &[&Moments]) -> Compacted {
+    let ties = Ties::of(graph);
     let mut graph = graph.clone();
     let mut widths = widths.clone();
-    let mut kept: Vec<Vec<usize>> = graph.matrices.iter().map(|m| (0..m.cols).collect()).collect();
-    let mut kept_rows: Vec<Vec<usize>> = graph.matrices.iter().map(|m| (0..m.rows).collect()).collect();
+    let mut kept = ties.whole();
     for dimension in dimensions {
         let order = dimension.order(&widths);
-        let gone: Vec<usize> =
-            (0..widths[dimension.maker].len()).filter(|&r| widths[dimension.maker][r].is_none()).collect();
-        kept_rows[dimension.maker].clone_from(&order);
+        let of_maker = &mut widths[dimension.maker];
+        let gone: Vec<usize> = (0..of_maker.len()).filter(|&r| of_maker[r].is_none()).collect();
+        *of_maker = order.iter().map(|&r| of_maker[r]).collect();
         for &consumer in &dimension.consumers {
-            let matrix = &mut graph.matrices[consumer];
-            let contribution = absorb(matrix, &gone, &order, moments[consumer]);
-            *matrix = columns(matrix, &order);
-            kept[consumer].clone_from(&order);
+            let contribution = absorb(&mut graph.matrices[consumer], &gone, &order, moments[consumer]);
             add_to_bias(&mut graph, consumer, &contribution);
         }
-        let maker = &mut graph.matrices[dimension.maker];
-        *maker = rows(maker, &order);
-        widths[dimension.maker] = order.iter().map(|&r| widths[dimension.maker][r]).collect();
-        if let NodeKind::Linear(linear) = &mut graph.nodes[dimension.node].kind {
-            linear.bias = order.iter().map(|&r| linear.bias[r]).collect();
-        }
-        // The functions after it take the new length.
-        let functions = elementwise(&graph, dimension.node).unwrap_or_default();
-        [dimension.node].into_iter().chain(functions).for_each(|node| graph.nodes[node].len = order.len());
+        // A dimension is a group of its own.
+        kept[ties.rows[dimension.maker].1[0]] = order;
     }
-    Compacted { graph, widths, columns: kept, rows: kept_rows }
+    let Narrowed { graph, rows, columns } = narrowed(&graph, &ties, &kept);
+    Compacted { graph, widths, columns, rows }
 }
 
 /// Distributes the least-squares estimate of the contribution of the columns `gone` to the columns `kept`. Returns its
@@ -74,16 +67,6 @@ pub(super) fn absorb(matrix: &mut WeightMatrix, gone: &[usize], kept: &[usize], 
         lost.dot(&constant) as f32
     })
     .collect()
-}
-
-pub(super) fn rows(matrix: &WeightMatrix, order: &[usize]) -> WeightMatrix {
-    let data = order.iter().flat_map(|&r| &matrix.data[r * matrix.cols..][..matrix.cols]).copied().collect();
-    WeightMatrix { name: matrix.name.clone(), rows: order.len(), cols: matrix.cols, data }
-}
-
-pub(super) fn columns(matrix: &WeightMatrix, order: &[usize]) -> WeightMatrix {
-    let data = matrix.data.chunks_exact(matrix.cols).flat_map(|row| order.iter().map(|&c| row[c])).collect();
-    WeightMatrix { name: matrix.name.clone(), rows: matrix.rows, cols: order.len(), data }
 }
 
 /// Adds values to the biases after a matrix.

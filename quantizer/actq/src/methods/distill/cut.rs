@@ -1,9 +1,10 @@
 //! Removal of units: all their rows and columns at once. The matrices that read them take over what they contributed.
 
-use super::compact::{absorb, add_to_bias, columns, rows};
+use super::compact::{absorb, add_to_bias};
 use super::units::{Units, units};
 use crate::calibrate::moments::Moments;
-use crate::graph::units::unit_rows;
+use crate::graph::narrow::{Narrowed, narrowed};
+use crate::graph::ties::Ties;
 use crate::graph::{Graph, WeightMatrix};
 
 /// Returns the number of a units in a share.
@@ -35,31 +36,42 @@ impl Cut {
 
     /// Keeps the given share of all units, whichever, and only to count bytes.
     pub(super) fn outline(graph: &Graph, share: f64) -> Self {
-        let mut cut = Self::nothing(graph);
-        for units in units(graph) {
-            let all: Vec<usize> = (0..units.len).collect();
-            let (kept, gone) = all.split_at(kept_of(&units, share));
-            cut.keep(&units, kept, gone, None);
-        }
-        cut
+        let ties = Ties::of(graph);
+        let mut kept = ties.whole();
+        units(graph, &ties).iter().for_each(|units| kept[units.group].truncate(kept_of(units, share)));
+        Self::nothing(graph).keep(&ties, &kept)
     }
 
     /// Keeps the given share of all units: those with the largest `removals`. The contribution of the others
     /// is estimated from these by the moments of every matrix's input.
     pub(super) fn to(graph: &Graph, units: &[Units], removals: &[Vec<f64>], share: f64, moments: &[&Moments]) -> Self {
+        let ties = Ties::of(graph);
+        let mut kept = ties.whole();
         let mut cut = Self::nothing(graph);
         for (units, removals) in units.iter().zip(removals) {
             let mut ranked: Vec<usize> = (0..units.len).collect();
             ranked.sort_by(|&a, &b| removals[b].total_cmp(&removals[a]));
             let gone = ranked.split_off(kept_of(units, share));
-            if gone.is_empty() {
-                continue;
-            }
             ranked.sort_unstable();
             cut.error += gone.iter().map(|&unit| removals[unit]).sum::<f64>();
-            cut.keep(units, &ranked, &gone, Some(moments));
+            kept[units.group] = ranked;
         }
-        cut
+        for (m, of) in moments.iter().enumerate() {
+            let columns = ties.places(&ties.cols[m], &kept);
+            let gone: Vec<usize> =
+                (0..cut.graph.matrices[m].cols).filter(|c| columns.binary_search(c).is_err()).collect();
+            if !gone.is_empty() {
+                let contribution = absorb(&mut cut.graph.matrices[m], &gone, &columns, of);
+                add_to_bias(&mut cut.graph, m, &contribution);
+            }
+        }
+        cut.keep(&ties, &kept)
+    }
+
+    /// Removes all elements but these of each group.
+    fn keep(self, ties: &Ties, kept: &[Vec<usize>]) -> Self {
+        let Narrowed { graph, rows, columns } = narrowed(&self.graph, ties, kept);
+        Self { graph, rows, columns, ..self }
     }
 
     /// Returns the error of each removed row.
@@ -74,49 +86,26 @@ impl Cut {
         self.rows[m].iter().zip(values).for_each(|(&row, value)| whole[row] = value);
         whole
     }
-
-    /// Removes the units `gone`; without moments their contribution is lost.
-    fn keep(&mut self, units: &Units, kept: &[usize], gone: &[usize], moments: Option<&[&Moments]>) {
-        let graph = &mut self.graph;
-        for &m in &units.makers {
-            self.rows[m] = unit_rows(graph.matrices[m].rows, units.len, kept);
-            graph.matrices[m] = rows(&graph.matrices[m], &self.rows[m]);
-        }
-        for &node in &units.nodes {
-            graph.nodes[node].kind.keep_units(units.len, kept);
-            graph.nodes[node].len = kept.len();
-        }
-        for &m in units.readers.iter().flatten() {
-            let contribution = moments.map(|moments| absorb(&mut graph.matrices[m], gone, kept, moments[m]));
-            graph.matrices[m] = columns(&graph.matrices[m], kept);
-            self.columns[m] = kept.to_vec();
-            contribution.iter().for_each(|contribution| add_to_bias(graph, m, contribution));
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::calibrate::moments::collect;
-    use crate::graph::Evaluator;
-    use crate::testing::{dataset, gru, lstm, residual};
-
-    /// Runs a graph over some observations.
-    fn outputs(graph: &Graph) -> Vec<Vec<f32>> {
-        let mut evaluator = Evaluator::new(graph);
-        let obs = |t: usize| (0..graph.obs_len).map(|i| (0.7 * (t + 3 * i) as f32).sin()).collect::<Vec<_>>();
-        (0..20).map(|t| evaluator.step(&obs(t), &mut |_, _| {})).collect()
-    }
+    use crate::testing::{branches, dataset, gru, lstm, outputs, residual};
 
     #[test]
     fn units_that_nothing_reads_go_without_a_trace() {
-        for mut graph in [lstm(), gru(4), residual(false)] {
-            let set = units(&graph).remove(0);
+        for mut graph in [lstm(), gru(4), residual(false), branches()] {
+            let ties = Ties::of(&graph);
+            let set = units(&graph, &ties).remove(0);
             let gone = [1, set.len - 1];
-            for &m in set.readers.iter().flatten() {
-                let WeightMatrix { cols, data, .. } = &mut graph.matrices[m];
-                data.chunks_mut(*cols).for_each(|row| gone.iter().for_each(|&unit| row[unit] = 0.0));
+            for reading in &set.readers {
+                for &m in &reading.matrices {
+                    let WeightMatrix { cols, data, .. } = &mut graph.matrices[m];
+                    let columns = gone.map(|unit| reading.columns.start + unit);
+                    data.chunks_mut(*cols).for_each(|row| columns.iter().for_each(|&c| row[c] = 0.0));
+                }
             }
             let moments = collect(&graph, &dataset(&graph, 2, 100), &mut |_| {});
             let moments: Vec<&Moments> = moments.iter().collect();
@@ -130,7 +119,7 @@ mod tests {
             for (a, b) in outputs(&graph).iter().flatten().zip(outputs(&cut.graph).iter().flatten()) {
                 assert!((a - b).abs() < 1e-5, "{a} and {b}");
             }
-            let m = set.makers[0];
+            let m = ties.rows.iter().position(|(_, layout)| layout.contains(&set.group)).expect("a matrix makes them");
             let rows = cut.whole(m, vec![true; cut.rows[m].len()], false);
             assert!((0..rows.len()).all(|row| rows[row] != gone.contains(&(row % set.len))));
         }

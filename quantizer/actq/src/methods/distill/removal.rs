@@ -9,6 +9,8 @@
 //! A recording has few frames for so many correlations. So an element costs at least its own effect, with compensation
 //! half as far (in logarithms) as the recording allows ([`importance`]).
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 use ndarray::{Array1, Array2, ArrayView1};
 use rayon::prelude::*;
@@ -22,6 +24,15 @@ use crate::simd::wide;
 /// Rows that a thread takes together.
 const ROWS: usize = 64;
 
+/// Matrices that read the same vector, or the same part of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reading {
+    /// The matrices.
+    pub matrices: Vec<usize>,
+    /// Their columns.
+    pub columns: Range<usize>,
+}
+
 /// A hidden vector and what the network makes of it.
 #[derive(Debug)]
 pub struct Effect {
@@ -32,16 +43,19 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// Measures the vector that the matrices `consumers` read. `moments` has the moments of every matrix's input, `g` the
-    /// importance of every matrix's rows.
-    pub fn of(graph: &Graph, consumers: &[usize], moments: &[&Moments], g: &[Vec<f64>]) -> Self {
-        let centred = consumers.first().map_or_else(|| DMatrix::zeros(0, 0), |&first| moments[first].centred());
-        let n = centred.nrows();
+    /// Measures the vector that is read. `moments` has the moments of every matrix's input, `g` the importance of every
+    /// matrix's rows.
+    pub fn of(graph: &Graph, Reading { matrices, columns }: &Reading, moments: &[&Moments], g: &[Vec<f64>]) -> Self {
+        let (from, n) = (columns.start, columns.len());
+        let of_part =
+            |all: DMatrix<f64>| if n < all.nrows() { all.view((from, from), (n, n)).into_owned() } else { all };
+        let centred = matrices.first().map_or_else(|| DMatrix::zeros(n, n), |&first| of_part(moments[first].centred()));
         let mut effect = Array2::zeros((n, n));
-        for &consumer in consumers {
-            let matrix = &graph.matrices[consumer];
-            let w = Array2::from_shape_fn((matrix.rows, n), |(r, c)| f64::from(matrix.data[r * n + c]));
-            let weighed = Array2::from_shape_fn(w.raw_dim(), |(r, c)| g[consumer][r] * w[[r, c]]);
+        for &m in matrices {
+            let matrix = &graph.matrices[m];
+            let weight = |(r, c): (usize, usize)| f64::from(matrix.data[r * matrix.cols + from + c]);
+            let w = Array2::from_shape_fn((matrix.rows, n), weight);
+            let weighed = Array2::from_shape_fn(w.raw_dim(), |(r, c)| g[m][r] * w[[r, c]]);
             add_product_parallel(weighed.t(), &Panels::of(w.view()), effect.view_mut());
         }
         Self { centred, effect }

@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 
 use super::balance::{MixedUnits, balance, mixed_units};
 use super::dimension::{Dimension, dimensions};
-use super::removal::{Effect, in_place};
+use super::removal::{Effect, Reading, in_place};
 use super::schedule::{Bounds, most_steps};
 use super::units::{Units, units};
 use crate::calibrate::allowance::Allowance;
@@ -17,6 +17,7 @@ use crate::calibrate::sensitivity::{Side, importance, output_moments};
 use crate::calibrate::windows::Windows;
 use crate::data::Dataset;
 use crate::error::{Result, ensure};
+use crate::graph::ties::Ties;
 use crate::graph::{Graph, WeightMatrix};
 use crate::methods::options::Options;
 
@@ -111,7 +112,7 @@ impl RowStatistics {
     pub(super) fn units(&self) -> &(Vec<Units>, Vec<Vec<f64>>) {
         self.units.get_or_init(|| {
             let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
-            let units = units(self.graph());
+            let units = units(self.graph(), &Ties::of(self.graph()));
             let removals = units.iter().map(|units| units.removals(self.graph(), &of_inputs, &self.outputs)).collect();
             (units, removals)
         })
@@ -137,7 +138,10 @@ fn removals(graph: &Graph, moments: &[&Moments], g: &[Vec<f64>], of: fn(&Effect)
     let cells = graph.nodes.iter().map(|node| node.kind.products()).filter(|products| products.len() > 1);
     let gates: BTreeSet<usize> = cells.flatten().map(|product| product.matrix).collect();
     let of_matrix = |(m, matrix): (usize, &WeightMatrix)| match Dimension::made_by(&dimensions, m) {
-        Some(dimension) => Some(of(&Effect::of(graph, &dimension.consumers, moments, g))),
+        Some(dimension) => {
+            let reading = Reading { matrices: dimension.consumers.clone(), columns: 0..matrix.rows };
+            Some(of(&Effect::of(graph, &reading, moments, g)))
+        }
         None => (!gates.contains(&m)).then(|| in_place(matrix, moments[m], &g[m])),
     };
     graph.matrices.iter().enumerate().map(of_matrix).collect()

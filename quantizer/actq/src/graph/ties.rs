@@ -1,8 +1,11 @@
-//! Elements of hidden vectors that can only be removed together: those of one vector, of vectors that are added or
-//! multiplied, of a cell's gates and its state, and the columns of the matrices that read them.
+//! Elements of hidden vectors that can only be removed together: those of vectors that are added or multiplied, of a
+//! cell's gates and its state, of parts of concatenations, and the columns of the matrices that read them.
 
-use actq::graph::operation::Operand;
-use actq::graph::{Graph, NodeKind};
+use std::ops::Range;
+
+use super::operation::Operand;
+use super::units::unit_rows;
+use super::{Graph, NodeKind};
 
 /// Groups of a vector's elements, in their order.
 pub type Layout = Vec<usize>;
@@ -88,13 +91,11 @@ impl Ties {
         for node in &graph.nodes {
             let inputs: Vec<Layout> = node.inputs.iter().map(|&value| values[value].clone()).collect();
             let layout = match &node.kind {
-                NodeKind::Pointwise(_) | NodeKind::LayerNorm(_) | NodeKind::RmsNorm(_) | NodeKind::Normalize(_) => {
-                    inputs[0].clone()
-                }
-                NodeKind::Balance(_) => {
-                    found.fix(&inputs[0]);
-                    inputs[0].clone()
-                }
+                NodeKind::Pointwise(_)
+                | NodeKind::LayerNorm(_)
+                | NodeKind::RmsNorm(_)
+                | NodeKind::Normalize(_)
+                | NodeKind::Balance(_) => inputs[0].clone(),
                 NodeKind::Add(_) | NodeKind::Mul(_) => {
                     found.tie(&inputs[0], &inputs[1]);
                     inputs[0].clone()
@@ -156,8 +157,21 @@ impl Ties {
     pub fn row_places(&self, matrix: usize, kept: &[Vec<usize>]) -> Vec<usize> {
         let (parts, layout) = &self.rows[matrix];
         let len: usize = layout.iter().map(|&group| self.lens[group]).sum();
-        let of_part = self.places(layout, kept);
-        (0..*parts).flat_map(|part| of_part.iter().map(move |place| part * len + place)).collect()
+        unit_rows(parts * len, len, &self.places(layout, kept))
+    }
+
+    /// Returns the places of a group's elements in a vector of this layout, once for each time that it has them.
+    pub fn ranges(&self, layout: &Layout, group: usize) -> Vec<Range<usize>> {
+        let mut start = 0;
+        let mut ranges = Vec::new();
+        for &of in layout {
+            let end = start + self.lens[of];
+            if of == group {
+                ranges.push(start..end);
+            }
+            start = end;
+        }
+        ranges
     }
 
     /// Returns all elements of every group.
@@ -198,12 +212,8 @@ fn resolved(found: &Found, values: Vec<Layout>, rows: Vec<Option<(usize, Layout)
 
 #[cfg(test)]
 mod tests {
-    use actq::graph::WeightMatrix;
-    use actq::graph::ops::{Add, LayerNorm, Linear, Pointwise};
-    use actq_kernels::math::Function;
-
     use super::*;
-    use crate::testing::{lstm, mlp};
+    use crate::testing::{branches, lstm, mlp, residual};
 
     #[test]
     fn hidden_vectors_are_free() {
@@ -217,26 +227,23 @@ mod tests {
 
     #[test]
     fn residual_vectors_are_narrowed_together() {
-        let mut graph = Graph::new(3);
-        for (rows, cols) in [(6, 3), (5, 6), (6, 5), (2, 6)] {
-            let data = vec![0.1; rows * cols];
-            graph.add_matrix(WeightMatrix { name: "m".into(), rows, cols, data }).expect("a matrix");
+        for normed in [false, true] {
+            let graph = residual(normed);
+            let ties = Ties::of(&graph);
+            assert_eq!(ties.free.len(), 1);
+            let stream = &ties.values[1];
+            assert!((1..graph.nodes.len()).all(|value| ties.values[value] == *stream));
+            assert!(ties.cols[1..].iter().all(|cols| cols == stream));
         }
-        let mut linear = |matrix: usize, rows: usize, input: usize| {
-            graph.add(Linear { matrix, bias: vec![0.0; rows] }, &[input]).expect("it fits")
-        };
-        let first = linear(0, 6, 0);
-        let inner = linear(1, 5, first);
-        let outer = linear(2, 6, inner);
-        let sum = graph.add(Add, &[outer, first]).expect("it fits");
-        let norm = LayerNorm { weight: vec![1.0; 6], bias: vec![0.0; 6], eps: 1e-5 };
-        let norm = graph.add(norm, &[sum]).expect("it fits");
-        let active = graph.add(Pointwise(Function::Relu), &[norm]).expect("it fits");
-        graph.add(Linear { matrix: 3, bias: vec![0.0; 2] }, &[active]).expect("it fits");
+    }
+
+    #[test]
+    fn parts_of_a_concatenation_are_free_alone() {
+        let graph = branches();
         let ties = Ties::of(&graph);
-        assert_eq!(ties.free.len(), 2);
-        assert_eq!(ties.values[first], ties.values[norm]);
-        assert_eq!(ties.cols[3], ties.rows[0].1);
-        assert_ne!(ties.values[inner], ties.values[first]);
+        assert_eq!(ties.free.iter().map(|&group| ties.lens[group]).collect::<Vec<_>>(), [4, 3]);
+        let last = &ties.cols[2];
+        assert_eq!((last.len(), last[0], last[2]), (3, ties.free[0], ties.free[1]));
+        assert_eq!(ties.ranges(last, ties.free[1])[0], 6..9);
     }
 }
