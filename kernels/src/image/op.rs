@@ -94,9 +94,15 @@ impl OpKind {
         FORMS.iter().find(|form| discriminant(&form.kind) == discriminant(&self))
     }
 
+    /// Returns the operation code; 0 if the build leaves the operation out.
+    #[cfg(feature = "writer")]
+    pub(crate) fn code(self) -> u8 {
+        self.form().map_or(0, |form| form.code)
+    }
+
     #[cfg(feature = "writer")]
     fn texts(self) -> [&'static str; 3] {
-        self.form().and_then(|form| TEXTS.get(usize::from(form.code) - 1)).copied().unwrap_or_default()
+        TEXTS.get(usize::from(self.code()).wrapping_sub(1)).copied().unwrap_or_default()
     }
 
     /// Returns a human-readable name; each function has its own.
@@ -288,7 +294,7 @@ impl OpRecord {
     ///
     /// [`TooLarge`] if a size does not fit its field.
     pub fn emit(&self) -> Result<[u32; OP_WORDS], TooLarge> {
-        let code = self.kind.form().map_or(0, |form| form.code);
+        let code = self.kind.code();
         let detail = match self.kind {
             OpKind::Linear { accumulate: detail } | OpKind::Normalize { added: detail } => detail.into(),
             OpKind::Function(function) => function as u8,

@@ -123,17 +123,13 @@ pub fn of_linear(
     })
 }
 
-/// Computes the cost of the values of a function.
+/// Computes the cost of the elements of an operation that has no matrix, or of the units of a cell.
 #[cfg(feature = "writer")]
-pub fn of_values(function: crate::math::Function, values: usize) -> Cost {
-    total(|add| add(Feature::function(function), values))
-}
-
-/// Computes the cost of the units of a recurrent cell: an LSTM, or a GRU.
-#[cfg(feature = "writer")]
-pub fn of_units(lstm: bool, units: usize) -> Cost {
-    let cell = if lstm { op::LSTM_CELL } else { op::GRU_CELL };
-    total(|add| add(Feature::value(cell), units))
+pub fn of_elements(kind: OpKind, len: usize) -> Cost {
+    total(|add| {
+        add(value(kind, kind.code()), len);
+        rest(kind, len % EIGHT, add);
+    })
 }
 
 /// Computes the cost of a step that evaluates the network. A step that continues a chunk costs the same without the
@@ -201,7 +197,7 @@ pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
 /// Counts the features of `len` values of an operation. (It takes all denoising steps to be like the first.)
 fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
     add(values(op).1, len);
-    rest(op, len % EIGHT, add);
+    rest(op.kind, len % EIGHT, add);
     if op.kind == OpKind::History {
         add(Feature::FRAME, op.dst().len.checked_div(op.src().len).unwrap_or(0));
     }
@@ -217,8 +213,8 @@ fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
 const EIGHT: usize = 8;
 
 /// Counts the additional features of the last `len` values, fewer than [`EIGHT`].
-fn rest(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
-    match op.kind {
+fn rest(kind: OpKind, len: usize, add: &mut dyn FnMut(Feature, usize)) {
+    match kind {
         OpKind::Denoise => add(Feature::DENOISED_REST, len),
         OpKind::Normalize { .. } => add(Feature::NORMALIZED_REST, len),
         _ => {}
@@ -238,7 +234,7 @@ pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     if op.units() != op.dst().len {
         add(values(op).0, 1);
     }
-    rest(op, EIGHT - 1, add);
+    rest(op.kind, EIGHT - 1, add);
     squared(op, add);
 }
 
@@ -258,16 +254,20 @@ pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(Feature, u
 /// Returns the feature of an operation, the feature of its values, and their number: 0 for a linear operation, whose
 /// parts are counted one by one.
 pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
-    let value = match op.kind {
-        OpKind::Function(function) => Feature::function(function),
-        _ => Feature::value(op.code()),
-    };
     let values = match op.kind {
         OpKind::Linear { .. } => 0,
         OpKind::History => op.units(),
         _ => op.dst().len,
     };
-    (Feature::operation(op.code()), value, values)
+    (Feature::operation(op.code()), value(op.kind, op.code()), values)
+}
+
+/// Returns the feature of a value of an operation of this code.
+fn value(kind: OpKind, code: u8) -> Feature {
+    match kind {
+        OpKind::Function(function) => Feature::function(function),
+        _ => Feature::value(code),
+    }
 }
 
 fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, usize)) {

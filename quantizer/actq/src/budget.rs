@@ -82,7 +82,7 @@ impl Rate {
         }
     }
 
-    /// Returns the modelled cycles that rows, functions and recurrent cells may take, if they are limited.
+    /// Returns the modelled cycles that rows may take, if they are limited.
     pub fn cycles(self) -> Option<f64> {
         match self {
             Self::Within { cycles, .. } => Some(cycles),

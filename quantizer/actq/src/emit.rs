@@ -3,5 +3,5 @@
 mod lower;
 mod writer;
 
-pub use lower::{Program, lower, operations};
+pub use lower::{Program, lower};
 pub use writer::{bytes_beside_blocks, image, image_around};

@@ -17,6 +17,7 @@ mod nodes;
 pub mod operation;
 pub mod ops;
 mod run;
+pub mod steps;
 pub mod syntax;
 pub mod ties;
 pub(crate) mod units;

@@ -66,21 +66,22 @@ pub(crate) fn gru(hidden: usize) -> Graph {
     graph
 }
 
-/// Makes a network 3 -> 4 relu, to which two blocks 4 -> 4 relu add, the second after a norm if wanted; then -> 2.
-pub(crate) fn residual(normed: bool) -> Graph {
+/// Makes a network 3 -> `len` relu, to which two blocks `len` -> `len` relu add, the second after a norm if wanted; then
+/// -> 2.
+pub(crate) fn residual(len: usize, normed: bool) -> Graph {
     let mut random = Random::new(7);
     let mut graph = Graph::new(3);
-    for (i, (rows, cols)) in [(4, 3), (4, 4), (4, 4), (2, 4)].into_iter().enumerate() {
+    for (i, (rows, cols)) in [(len, 3), (len, len), (len, len), (2, len)].into_iter().enumerate() {
         graph.matrices.push(matrix(&format!("m{i}"), rows, cols, &mut random));
     }
     let mut stream = 0;
     for matrix in 0..3 {
         let mut value = stream;
         if normed && matrix == 2 {
-            let norm = LayerNorm { weight: vector(4, &mut random), bias: vector(4, &mut random), eps: 1e-5 };
+            let norm = LayerNorm { weight: vector(len, &mut random), bias: vector(len, &mut random), eps: 1e-5 };
             value = graph.add(norm, &[value]).expect("it fits");
         }
-        value = graph.add(Linear { matrix, bias: vector(4, &mut random) }, &[value]).expect("it fits");
+        value = graph.add(Linear { matrix, bias: vector(len, &mut random) }, &[value]).expect("it fits");
         value = graph.add(Pointwise(Function::Relu), &[value]).expect("it fits");
         stream = if stream == 0 { value } else { graph.add(Add, &[value, stream]).expect("it fits") };
     }
@@ -88,21 +89,21 @@ pub(crate) fn residual(normed: bool) -> Graph {
     graph
 }
 
-/// Makes a network with two branches, 3 -> 4 relu and 3 -> 3 tanh, whose outputs with two values of the observation
-/// between them are read together: 4 + 2 + 3 -> 2.
-pub(crate) fn branches() -> Graph {
+/// Makes a network with two branches, 3 -> `a` relu and 3 -> `b` tanh, whose outputs with two values of the observation
+/// between them are read together: `a` + 2 + `b` -> 2.
+pub(crate) fn branches([a, b]: [usize; 2]) -> Graph {
     let mut random = Random::new(9);
     let mut graph = Graph::new(3);
-    for (i, (rows, cols)) in [(4, 3), (3, 3), (2, 9)].into_iter().enumerate() {
+    for (i, (rows, cols)) in [(a, 3), (b, 3), (2, a + 2 + b)].into_iter().enumerate() {
         graph.matrices.push(matrix(&format!("m{i}"), rows, cols, &mut random));
     }
     let mut branch = |matrix: usize, len: usize, function: Function| {
         let linear = graph.add(Linear { matrix, bias: vector(len, &mut random) }, &[0]).expect("it fits");
         graph.add(Pointwise(function), &[linear]).expect("it fits")
     };
-    let (a, b) = (branch(0, 4, Function::Relu), branch(1, 3, Function::Tanh));
-    let spans = [(0, 4), (1, 2), (0, 3)].map(|(from, len)| Span { from, len });
-    let joined = graph.add(Concat(spans.to_vec()), &[a, 0, b]).expect("it fits");
+    let (first, second) = (branch(0, a, Function::Relu), branch(1, b, Function::Tanh));
+    let spans = [(0, a), (1, 2), (0, b)].map(|(from, len)| Span { from, len });
+    let joined = graph.add(Concat(spans.to_vec()), &[first, 0, second]).expect("it fits");
     graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[joined]).expect("it fits");
     graph
 }

@@ -11,8 +11,9 @@ use actq_kernels::x::max_prepared_words;
 
 use crate::around::{Around, OUTPUT};
 use crate::error::{Result, ensure};
-use crate::graph::lowering::{Buffer, BufferId, Lifetime, Lowering, Slice, Step, StepData};
-use crate::graph::{Graph, Node, ValueId};
+use crate::graph::ValueId;
+use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, Step, StepData};
+use crate::graph::steps::{lower as nodes, readers};
 use crate::policy::Policy;
 
 /// The arena and the operations in it.
@@ -84,16 +85,6 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
     Arena { lowering, kept_len, work_len }.assign(OBSERVATION, once, iterate, act_len)
 }
 
-/// Returns how many nodes read each value; the network's output counts as one more.
-fn readers(graph: &Graph) -> Vec<usize> {
-    let mut readers = vec![0; graph.nodes.len() + 1];
-    readers[graph.output()] = 1;
-    for &value in graph.nodes.iter().flat_map(|node| &node.inputs) {
-        readers[value] += 1;
-    }
-    readers
-}
-
 /// Returns an operation after the network, whose output has its place now.
 fn after(step: &Step<Slice>, output: Slice) -> Step<Slice> {
     let placed = |s: Slice| match s.buffer {
@@ -101,23 +92,6 @@ fn after(step: &Step<Slice>, output: Slice) -> Step<Slice> {
         _ => s,
     };
     Step { dst: placed(step.dst), src: step.src.map(placed), third: step.third.map(placed), ..step.clone() }
-}
-
-/// Returns the operations of a network without matrices, its buffers, of which the first is the observation, and the
-/// place of its output.
-pub fn operations(graph: &Graph) -> (Vec<Step<Slice>>, Vec<Buffer>, Slice) {
-    let mut lowering = Lowering::new(graph.obs_len, readers(graph));
-    nodes(&graph.nodes, &mut lowering);
-    let output = lowering.place(graph.output());
-    (lowering.steps, lowering.buffers, output)
-}
-
-/// Lowers nodes in order.
-fn nodes(nodes: &[Node], lowering: &mut Lowering) {
-    for node in nodes {
-        let place = node.kind.lower(lowering, &node.inputs, node.len);
-        lowering.finish_node(place, &node.inputs);
-    }
 }
 
 /// Buffer of the observation.

@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn all_elements_make_the_same_network() {
-        for graph in [mlp(), lstm(), residual(true), branches()] {
+        for graph in [mlp(), lstm(), residual(4, true), branches([4, 3])] {
             let ties = Ties::of(&graph);
             assert_eq!(outputs(&graph), outputs(&narrowed(&graph, &ties, &ties.whole()).graph));
         }
@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn elements_that_nothing_reads_go_without_a_trace() {
-        for mut graph in [mlp(), lstm(), gru(4), residual(false), branches()] {
+        for mut graph in [mlp(), lstm(), gru(4), residual(4, false), branches([4, 3])] {
             let ties = Ties::of(&graph);
             let mut kept = ties.whole();
             for &group in &ties.free {

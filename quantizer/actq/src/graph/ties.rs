@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn residual_vectors_are_narrowed_together() {
         for normed in [false, true] {
-            let graph = residual(normed);
+            let graph = residual(4, normed);
             let ties = Ties::of(&graph);
             assert_eq!(ties.free.len(), 1);
             let stream = &ties.values[1];
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn parts_of_a_concatenation_are_free_alone() {
-        let graph = branches();
+        let graph = branches([4, 3]);
         let ties = Ties::of(&graph);
         assert_eq!(ties.free.iter().map(|&group| ties.lens[group]).collect::<Vec<_>>(), [4, 3]);
         let last = &ties.cols[2];

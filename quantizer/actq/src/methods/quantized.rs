@@ -123,8 +123,7 @@ pub struct QuantizedNetwork {
     pub outcomes: Vec<Outcome>,
     /// Learning, if the method learns.
     pub learning: Option<Learning>,
-    /// Modelled cycles of the rows, of the functions after them and of recurrent cells; `None` unless the rate limits
-    /// them.
+    /// Modelled cycles of the rows, without those that removed units save elsewhere; `None` unless the rate limits them.
     pub cycles: Option<f64>,
 }
 

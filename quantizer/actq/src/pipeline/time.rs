@@ -157,11 +157,11 @@ mod tests {
     use crate::budget::Budget;
     use crate::data::Recordings;
     use crate::policy::Policy;
-    use crate::testing::{dataset, gru, layers, lstm};
+    use crate::testing::{branches, dataset, gru, layers, lstm, residual};
 
     #[test]
-    fn the_rest_of_a_step_hardly_depends_on_the_rows() {
-        for graph in [layers(&[18, 96, 64, 6]), lstm(), gru(24)] {
+    fn the_rest_of_a_step_hardly_depends_on_rows_and_units() {
+        for graph in [layers(&[18, 96, 64, 6]), lstm(), gru(24), residual(48, true), branches([64, 40])] {
             let recordings = Recordings { calib: Some(dataset(&graph, 4, 60)), heldout: None };
             let policy = Policy::of("small", graph);
             let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {}).expect("statistics");

@@ -1,8 +1,8 @@
 //! Operations over buffers, one after the other.
 
-use actq::emit::operations;
 use actq::graph::Graph;
 use actq::graph::lowering::{Buffer, BufferId, Lifetime, Slice, Step, StepData};
+use actq::graph::steps::operations;
 use actq_kernels::image::OpKind;
 
 /// Operations before or after the network, and the buffers of both.

@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn units_that_nothing_reads_go_without_a_trace() {
-        for mut graph in [lstm(), gru(4), residual(false), branches()] {
+        for mut graph in [lstm(), gru(4), residual(4, false), branches([4, 3])] {
             let ties = Ties::of(&graph);
             let set = units(&graph, &ties).remove(0);
             let gone = [1, set.len - 1];

@@ -7,7 +7,7 @@ use super::activations::{allocated, least_bytes as least, packed};
 use super::allocate::{Rows, energies, expected};
 use super::cut::Cut;
 use super::dimension::{Dimension, Widths, dimensions};
-use super::size::Size;
+use super::size::{Size, cycles_of_elements};
 use super::statistics::RowStatistics;
 
 use crate::budget::Rate;
@@ -36,7 +36,7 @@ pub(super) struct Shape {
     pub(super) widths: Widths,
     /// Activation magnitude of every matrix.
     pub(super) limits: Vec<u16>,
-    /// Counted cycles, if the rate limits them.
+    /// Cycles of its rows, without those that removed units save elsewhere, if the rate limits them.
     pub(super) cycles: Option<f64>,
 }
 
@@ -52,6 +52,7 @@ pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64)
     let (forced, allowed) = (forced(graph, rate, options), rate.bytes(graph.weights()));
     let of_inputs: Vec<&Moments> = moments.iter().map(|(input, _)| input).collect();
     let removals = statistics.removals(options.learns());
+    let of_elements = cycles_of_elements(graph);
     let of_cut = |cut: Cut| {
         let pick = |values: &[f64], of: &[usize]| of.iter().map(|&i| values[i]).collect::<Vec<f64>>();
         let of_matrix = |(m, matrix): (usize, &WeightMatrix)| {
@@ -61,11 +62,13 @@ pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64)
             Rows { energy, removal, rounding, forced: forced[m] }
         };
         let rows: Vec<Rows> = cut.graph.matrices.iter().enumerate().map(of_matrix).collect();
-        let cycles = rate.cycles();
+        // Rows may take what the elements of removed units no longer take.
+        let saved = of_elements - cycles_of_elements(&cut.graph);
+        let cycles = rate.cycles().map(|most| most + saved);
         let dimensions = dimensions(&cut.graph);
         let size = Size { cycles, ..Size::new(&cut.graph, &dimensions, values(&cut.graph, rate, options)) };
         let (widths, limits) = allocated(size.clone(), &rows, options, allowed)?;
-        let cycles = cycles.map(|_| Size { packings: packed(&limits, options), ..size }.cycles(&widths));
+        let cycles = cycles.map(|_| Size { packings: packed(&limits, options), ..size }.cycles(&widths) - saved);
         Ok(Shape { cut, dimensions, rows, widths, limits, cycles })
     };
     if !loses_units(options, &forced) || statistics.units().0.is_empty() {

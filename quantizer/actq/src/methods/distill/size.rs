@@ -1,15 +1,17 @@
 //! Bytes and cycles as functions of the rows' widths, for the allocation, and the fewest bytes.
 
 use actq_kernels::Width;
-use actq_kernels::image::block_bytes;
+use actq_kernels::image::{OpKind, block_bytes};
 use actq_kernels::layout::{BlockShape, STRIP};
 use actq_kernels::math::Function;
 use actq_kernels::pace::cost;
 
 use super::balance::balance_bytes;
 use super::dimension::{Dimension, Widths};
+use crate::graph::lowering::{Lowering, Slice, Step};
 use crate::graph::operation::{Operand, Product};
-use crate::graph::{Graph, Node, NodeKind};
+use crate::graph::steps::{lower, readers};
+use crate::graph::{Graph, NodeKind};
 use crate::methods::packing::Packing;
 
 /// Properties that determine the bytes of a network beside its rows' widths.
@@ -27,7 +29,7 @@ pub struct Size<'a> {
     pub runs: Vec<usize>,
     /// `true` for every matrix that adds to the output of another: that of an LSTM's state.
     pub accumulates: Vec<bool>,
-    /// Most modelled cycles of the products and of the functions after them; `None`: time does not matter.
+    /// Most modelled cycles of the rows ([`Self::cycles`]); `None`: time does not matter.
     pub cycles: Option<f64>,
     /// What the allocation pays with.
     pub price: Price,
@@ -66,8 +68,7 @@ impl<'a> Size<'a> {
         cycles + if bit > 0.0 { bit * 8.0 * self.bytes(widths) as f64 } else { 0.0 }
     }
 
-    /// Returns the modelled cycles of the matrices' rows in a step, with those of the functions after them and of
-    /// recurrent cells.
+    /// Returns the modelled cycles of the matrices' rows in a step, with those of the functions of dimensions.
     pub fn cycles(&self, widths: &Widths) -> f64 {
         let of_matrix = |m: usize| {
             let Some(&packing) = self.packings[m].first() else { return 0.0 };
@@ -80,12 +81,7 @@ impl<'a> Size<'a> {
                 Dimension::made_by(self.dimensions, m).map_or(0.0, |d| self.of_functions(d, d.kept(widths)));
             self.runs[m] as f64 * (products.cycles as f64 + functions)
         };
-        let of_cell = |node: &Node| match &node.kind {
-            NodeKind::Lstm(cell) => cost::of_units(true, cell.hidden).cycles as f64,
-            NodeKind::Gru(cell) => cost::of_units(false, cell.hidden).cycles as f64,
-            _ => 0.0,
-        };
-        (0..self.packings.len()).map(of_matrix).sum::<f64>() + self.graph.nodes.iter().map(of_cell).sum::<f64>()
+        (0..self.packings.len()).map(of_matrix).sum()
     }
 
     /// Returns the cycles of one more row of `cols` columns in every run of a matrix.
@@ -100,7 +96,7 @@ impl<'a> Size<'a> {
 
     /// Returns the cycles of the functions of a dimension of `len` elements.
     pub fn of_functions(&self, dimension: &Dimension, len: usize) -> f64 {
-        let of = |function: &Function| cost::of_values(*function, len).cycles as f64;
+        let of = |function: &Function| cost::of_elements(OpKind::Function(*function), len).cycles as f64;
         dimension.functions(self.graph).iter().map(of).sum()
     }
 
@@ -164,6 +160,22 @@ impl<'a> Size<'a> {
         }
         widths
     }
+}
+
+/// Returns the modelled cycles of the elements of all operations without a matrix in a step, and of the units of cells.
+pub(super) fn cycles_of_elements(graph: &Graph) -> f64 {
+    let mut lowering = Lowering::new(graph.obs_len, readers(graph));
+    let first = graph.denoising.as_ref().map_or(graph.nodes.len(), |denoising| denoising.first);
+    let (once, repeated) = graph.nodes.split_at(first);
+    lower(once, &mut lowering);
+    let before = lowering.steps.len();
+    lower(repeated, &mut lowering);
+    let of_step = |(i, step): (usize, &Step<Slice>)| {
+        let runs = if i < before { 1 } else { graph.denoising_steps() as u64 };
+        runs * cost::of_elements(step.kind, step.dst.len).cycles
+    };
+    let elementwise = lowering.steps.iter().enumerate().filter(|(_, step)| !matches!(step.kind, OpKind::Linear { .. }));
+    elementwise.map(of_step).sum::<u64>() as f64
 }
 
 /// Returns `true` if blocks, narrow to wide, hold the rows in their own order, with rows without bits last.

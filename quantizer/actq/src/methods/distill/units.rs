@@ -80,9 +80,9 @@ mod tests {
         let forms = |graph: &Graph| found(graph).iter().map(form).collect::<Vec<_>>();
         assert_eq!(forms(&lstm()), [(3, vec![(vec![1, 2], 0)])]);
         for normed in [false, true] {
-            assert_eq!(forms(&residual(normed)), [(4, [1, 2, 3].map(|m| (vec![m], 0)).to_vec())]);
+            assert_eq!(forms(&residual(4, normed)), [(4, [1, 2, 3].map(|m| (vec![m], 0)).to_vec())]);
         }
-        assert_eq!(forms(&branches()), [(4, vec![(vec![2], 0)]), (3, vec![(vec![2], 6)])]);
+        assert_eq!(forms(&branches([4, 3])), [(4, vec![(vec![2], 0)]), (3, vec![(vec![2], 6)])]);
     }
 
     #[test]
@@ -93,13 +93,13 @@ mod tests {
     #[test]
     fn vectors_with_fixed_places_stay_whole() {
         // The sum is the network's output.
-        let mut graph = residual(false);
+        let mut graph = residual(4, false);
         graph.nodes.pop();
         graph.matrices.pop();
         assert!(found(&graph).is_empty());
         // The observation takes part in the sum.
         let mut graph = Graph::new(3);
-        graph.matrices.extend(residual(false).matrices.into_iter().take(1));
+        graph.matrices.extend(residual(4, false).matrices.into_iter().take(1));
         let WeightMatrix { rows, data, .. } = &mut graph.matrices[0];
         *rows = 3;
         data.truncate(9);
