@@ -31,4 +31,4 @@ pub use nodes::{Graph, Node};
 pub use ops::NodeKind;
 pub use run::{Network, Pass};
 pub use values::{ValueId, WeightMatrix};
-pub use weights::{Derivatives, State, Vectors, Weights, start_state, zero_state};
+pub use weights::{Derivatives, State, Vectors, Weights, copy_sample, start_state, zero_state};

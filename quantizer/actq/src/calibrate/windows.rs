@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::widening::{MEMORY, Widening};
 use crate::data::{Dataset, mean_and_variance};
-use crate::graph::{Graph, Network, State, Weights, start_state, zero_state};
+use crate::graph::{Graph, Network, State, Weights, copy_sample, start_state, zero_state};
 use crate::random::Random;
 
 /// Steps of a recurrent network's window.
@@ -35,11 +35,7 @@ impl Batch {
         let mut state = zero_state(graph, self.starts.len());
         for (sample, start) in self.starts.iter().enumerate() {
             let Some((episode, step)) = *start else { continue };
-            for (to, from) in state.iter_mut().flatten().zip(states[episode].iter().flatten()) {
-                if from.ncols() > 0 {
-                    to.row_mut(sample).assign(&from.row(step));
-                }
-            }
+            copy_sample(&states[episode], step, &mut state, sample);
         }
         state
     }
@@ -81,11 +77,7 @@ impl Windows {
                 let mut state = start_state(&graph, &[dataset.start(e)]);
                 let mut kept = zero_state(&graph, length);
                 for (t, obs) in episode.axis_chunks_iter(Axis(0), 1).enumerate() {
-                    for (kept, now) in kept.iter_mut().flatten().zip(state.iter().flatten()) {
-                        if now.ncols() > 0 {
-                            kept.row_mut(t).assign(&now.row(0));
-                        }
-                    }
+                    copy_sample(&state, 0, &mut kept, t);
                     outputs.push(network.forward(&weights, obs.to_owned(), &mut state).output().clone());
                 }
                 states.push(kept);
@@ -224,21 +216,13 @@ fn states_of(network: &Network<'_>, weights: &Weights, episodes: &[(&Array2<f32>
     let graph = network.graph;
     let mut state = zero_state(graph, episodes.len());
     for (i, (_, first)) in episodes.iter().enumerate() {
-        for (to, from) in state.iter_mut().flatten().zip(first.iter().flatten()) {
-            if from.ncols() == to.ncols() && from.ncols() > 0 {
-                to.row_mut(i).assign(&from.row(0));
-            }
-        }
+        copy_sample(first, 0, &mut state, i);
     }
     let mut states: Vec<State> = episodes.iter().map(|(episode, _)| zero_state(graph, episode.nrows())).collect();
     let longest = episodes.iter().map(|(episode, _)| episode.nrows()).max().unwrap_or(0);
     for t in 0..longest {
-        for (i, kept) in states.iter_mut().enumerate() {
-            for (kept, now) in kept.iter_mut().flatten().zip(state.iter().flatten()) {
-                if t < kept.nrows() && now.ncols() > 0 {
-                    kept.row_mut(t).assign(&now.row(i));
-                }
-            }
+        for (i, kept) in states.iter_mut().enumerate().filter(|(i, _)| t < episodes[*i].0.nrows()) {
+            copy_sample(&state, i, kept, t);
         }
         let row = |i: usize| episodes[i].0.row(t.min(episodes[i].0.nrows() - 1));
         let frames = Array2::from_shape_fn((episodes.len(), graph.input_len()), |(i, c)| row(i)[c]);

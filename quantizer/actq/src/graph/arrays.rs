@@ -59,7 +59,7 @@ pub fn sum_rows(dy: &Array2<f32>, sum: &mut [f32]) {
 }
 
 /// Partial sums, which stay in vector registers. Their number fixes the order of additions on every processor.
-const LANES: usize = 16;
+pub const LANES: usize = 16;
 
 /// Returns the sum of a function of each value.
 #[inline(always)]

@@ -81,6 +81,15 @@ pub fn zero_state(graph: &Graph, batch: usize) -> State {
     graph.nodes.iter().map(|n| n.kind.state_lens().map(|len| Array2::zeros((batch, len)))).collect()
 }
 
+/// Copies the values of one sample of a batch's state to a sample of another, where they are as many.
+pub fn copy_sample(from: &State, sample: usize, to: &mut State, at: usize) {
+    for (from, to) in from.iter().flatten().zip(to.iter_mut().flatten()) {
+        if from.ncols() == to.ncols() && from.ncols() > 0 {
+            to.row_mut(at).assign(&from.row(sample));
+        }
+    }
+}
+
 /// Returns a batch's state from every sample's values in the order of [`Graph::state_len`]; `None`: zero.
 pub fn start_state(graph: &Graph, starts: &[Option<Vec<f32>>]) -> State {
     let mut state = zero_state(graph, starts.len());

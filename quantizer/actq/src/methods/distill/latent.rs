@@ -6,6 +6,7 @@ use actq_kernels::round::ROUND;
 use half::bf16;
 
 use super::adam::{Adam, Moments, Stride, step};
+use crate::graph::arrays::LANES;
 use crate::graph::{Matrix, STRIP, WeightMatrix};
 use crate::methods::quantized::Quantized;
 use crate::methods::scale::Scales;
@@ -13,8 +14,6 @@ use crate::simd::wide;
 
 /// Least scale, so that learning can change it.
 const SMALLEST: f32 = 1e-12;
-/// Partial sums of a derivative by a scale.
-const LANES: usize = 16;
 
 /// A matrix during learning.
 pub(super) struct Latent {
@@ -86,7 +85,6 @@ impl Grid {
     /// scale.
     #[inline(always)]
     fn through(self, grads: &mut [f32], codes: &[f32], scale: f32) -> f32 {
-        // Several sums, which the compiler can keep in one vector.
         let mut sums = [0.0; LANES];
         for (grads, codes) in grads.chunks_mut(LANES).zip(codes.chunks(LANES)) {
             for ((g, c), sum) in grads.iter_mut().zip(codes).zip(&mut sums) {
