@@ -8,9 +8,10 @@ use actq::data::{Dataset, Recording, Recordings};
 use actq::graph::Graph;
 use actq::measure::eval;
 use actq::measure::time::{CLOCK, StepTime};
-use actq::methods::Options;
+use actq::methods::{Options, Quantized};
 use actq::pipeline::{QuantizedPolicy, Quantizer};
 use actq::policy::Policy;
+use actq_kernels::Width;
 use actq_kernels::layout::GROUPS;
 use anyhow::{Context as _, Result};
 
@@ -144,6 +145,7 @@ impl<'a> Maker<'a> {
         let made = Made {
             nmse: simulated.nmse,
             milliseconds: None,
+            cmsis_nn_milliseconds: None,
             bpw: 8.0 * simulated.bytes as f64 / weights.max(1) as f64,
             bytes,
             bytes_per_parameter: bytes as f64 / parameters.max(1) as f64,
@@ -202,6 +204,7 @@ impl<'a> Maker<'a> {
         Ok(Attempt::Undriven(Made {
             nmse: eval::network_nmse(&made.network, self.subject.heldout()?)?,
             milliseconds: Some(taken.milliseconds),
+            cmsis_nn_milliseconds: None,
             bpw: 8.0 * taken.weights as f64 / policy.weights.max(1) as f64,
             bytes: taken.image,
             bytes_per_parameter: taken.image as f64 / policy.parameters.max(1) as f64,
@@ -215,9 +218,13 @@ impl<'a> Maker<'a> {
         let buffer = quantized.buffer();
         let image = buffer.image(Path::new("image in memory"))?;
         let report = eval::evaluate(image, self.subject.heldout()?)?;
+        let step = StepTime::new(&image, CLOCK);
+        let is_int8 = |q: &Quantized| q.group == 0 && q.widths.iter().all(|width| *width == Some(Width::W8));
+        let is_int8 = quantized.outcomes.iter().all(|outcome| is_int8(&outcome.quantized) && outcome.x_max <= 127);
         Ok(Made {
             nmse: report.nmse,
-            milliseconds: Some(StepTime::new(&image, CLOCK).milliseconds),
+            milliseconds: Some(step.milliseconds),
+            cmsis_nn_milliseconds: is_int8.then(|| form::cmsis_nn_milliseconds(&step)),
             bpw: report.bpw,
             bytes: report.bytes,
             bytes_per_parameter: report.bytes as f64 / self.subject.policy.parameters.max(1) as f64,

@@ -14,6 +14,10 @@ use half::bf16;
 /// Cycles of a multiplication in f32, an estimate in the rival's favour: a word by VLDM, VMUL and VADD, without a stall,
 /// a loop or a load of the operand. (A VFMA takes 3.)
 pub const F32_CYCLES: f64 = 3.0;
+/// Cycles of a MAC by CMSIS-NN's int8 kernel for fully connected layers (`arm_nn_vec_mat_mult_t_s8` with DSP), an estimate
+/// in the rival's favour: an instruction takes at least a cycle, and before this project began, 2.07 instructions a MAC
+/// were counted for 256 x 256. A whole network took 2.45 (docs/records/2026-11-25-c.md).
+pub const CMSIS_NN_CYCLES: f64 = 2.07;
 /// A scale with which no function of an outlined network leaves f32's range.
 const OUTLINED_SCALE: f32 = 1.0 / 1024.0;
 
@@ -83,6 +87,12 @@ pub fn milliseconds(policy: &Policy, outcomes: &[Outcome]) -> Result<f64> {
     Ok(StepTime::new(&buffer.image("the rival's image".as_ref())?, CLOCK).milliseconds)
 }
 
+/// Estimates the milliseconds of a step whose products are computed by CMSIS-NN ([`CMSIS_NN_CYCLES`]), all else as here.
+pub fn cmsis_nn_milliseconds(step: &StepTime) -> f64 {
+    let products: u64 = step.ops.iter().filter(|op| op.macs > 0).map(|op| op.cycles).sum();
+    1e3 * ((step.cycles - products) as f64 + CMSIS_NN_CYCLES * step.macs as f64) / step.clock_hz
+}
+
 /// Returns codes of a matrix's shape.
 fn outlined(matrix: &WeightMatrix, width: Width) -> Result<Outcome> {
     let quantized = Quantized {
@@ -135,5 +145,35 @@ impl Limits {
         taken.weights as f64 <= self.weights
             && taken.image as f64 <= self.image
             && taken.milliseconds <= self.milliseconds
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use actq::measure::time::OpTime;
+
+    use super::*;
+
+    #[test]
+    fn cmsis_nn_replaces_the_products_alone() {
+        let op = |macs, cycles| OpTime {
+            op: "op".to_owned(),
+            output: 1,
+            runs: 1,
+            macs,
+            instructions: 0,
+            cycles,
+            microseconds: 0.0,
+        };
+        let step = StepTime {
+            clock_hz: 1e6,
+            ops: vec![op(100, 150), op(0, 50)],
+            macs: 100,
+            instructions: 0,
+            cycles: 200,
+            milliseconds: 0.2,
+            least_budget: 0,
+        };
+        assert!((cmsis_nn_milliseconds(&step) - (50.0 + 207.0) / 1e3).abs() < 1e-9);
     }
 }
