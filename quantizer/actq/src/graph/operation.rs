@@ -1,5 +1,7 @@
 //! The interface of an operation. Each operation implements it in its own file in [`super::ops`].
 
+use std::ops::Range;
+
 use ndarray::{Array2, ArrayView1, ArrayView2};
 
 use super::arrays::round_rows;
@@ -30,6 +32,20 @@ pub enum Operand {
     Input,
     /// The node's hidden state.
     State,
+}
+
+/// What the elements of an operation's output come from. It decides which elements of a network can only be removed
+/// together ([`super::ties`]).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Elements {
+    /// Each from the rows of the products' matrices; without products, from constants.
+    Own,
+    /// Each from those at its place in the inputs.
+    Inputs,
+    /// These parts of the inputs, one after the other.
+    Parts(Vec<Range<usize>>),
+    /// Together from outside the network: none can be removed.
+    Whole,
 }
 
 /// Hidden and cell state of a node, `[sample, element]`; without elements if it has none.
@@ -85,6 +101,11 @@ pub trait Operation {
     /// Returns the lengths of the hidden and of the cell state; 0 for none.
     fn state_lens(&self) -> [usize; 2] {
         [0, 0]
+    }
+
+    /// Returns what the elements of its output come from.
+    fn elements(&self) -> Elements {
+        if self.products().is_empty() { Elements::Inputs } else { Elements::Own }
     }
 
     /// Keeps some elements of the output, in this order, and the values of the vectors for them; of a recurrent cell its

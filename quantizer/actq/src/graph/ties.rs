@@ -3,9 +3,9 @@
 
 use std::ops::Range;
 
-use super::operation::Operand;
+use super::Graph;
+use super::operation::{Elements, Operand};
 use super::units::unit_rows;
-use super::{Graph, NodeKind};
 
 /// Groups of a vector's elements, in their order.
 pub type Layout = Vec<usize>;
@@ -90,32 +90,23 @@ impl Ties {
         let mut cols: Vec<Option<Layout>> = vec![None; graph.matrices.len()];
         for node in &graph.nodes {
             let inputs: Vec<Layout> = node.inputs.iter().map(|&value| values[value].clone()).collect();
-            let layout = match &node.kind {
-                NodeKind::Pointwise(_)
-                | NodeKind::LayerNorm(_)
-                | NodeKind::RmsNorm(_)
-                | NodeKind::Normalize(_)
-                | NodeKind::Balance(_) => inputs[0].clone(),
-                NodeKind::Add(_) | NodeKind::Mul(_) => {
-                    found.tie(&inputs[0], &inputs[1]);
+            let layout = match node.kind.elements() {
+                Elements::Whole => vec![found.group(node.len, true)],
+                Elements::Inputs => {
+                    inputs.iter().skip(1).for_each(|other| found.tie(&inputs[0], other));
                     inputs[0].clone()
                 }
-                NodeKind::Concat(concat) => {
+                Elements::Parts(parts) => {
                     let mut layout = Layout::new();
-                    for (span, input) in concat.0.iter().zip(&inputs) {
-                        match whole_groups(&found, input, span.from, span.len) {
-                            Some(groups) => layout.extend(groups),
-                            None => {
-                                found.fix(input);
-                                layout.push(found.group(span.len, true));
-                            }
-                        }
+                    for (part, input) in parts.into_iter().zip(&inputs) {
+                        layout.extend(whole_groups(&found, input, &part).unwrap_or_else(|| {
+                            found.fix(input);
+                            vec![found.group(part.len(), true)]
+                        }));
                     }
                     layout
                 }
-                NodeKind::Iterate(_) => vec![found.group(node.len, true)],
-                NodeKind::Table(_) => vec![found.group(node.len, false)],
-                NodeKind::Linear(_) | NodeKind::Lstm(_) | NodeKind::Gru(_) => {
+                Elements::Own => {
                     let products = node.kind.products();
                     let known = products.iter().find_map(|product| rows[product.matrix].clone());
                     let layout = known.map_or_else(|| vec![found.group(node.len, false)], |(_, layout)| layout);
@@ -181,12 +172,12 @@ impl Ties {
 }
 
 /// Returns the groups that make up a range of a vector; `None` if it begins or ends within one.
-fn whole_groups(found: &Found, layout: &Layout, from: usize, len: usize) -> Option<Layout> {
+fn whole_groups(found: &Found, layout: &Layout, part: &Range<usize>) -> Option<Layout> {
     let mut start = 0;
     let mut groups = Layout::new();
     for &group in layout {
         let end = start + found.lens[group];
-        match (start >= from && end <= from + len, end <= from || start >= from + len) {
+        match (start >= part.start && end <= part.end, end <= part.start || start >= part.end) {
             (true, _) => groups.push(group),
             (_, true) => {}
             _ => return None,

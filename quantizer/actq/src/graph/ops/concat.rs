@@ -3,7 +3,7 @@ use ndarray::{Array2, ArrayView2, Axis, concatenate, s};
 
 use crate::error::{Result, ensure};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, StepData};
-use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved};
+use crate::graph::operation::{Backward, Elements, Forward, NodeState, Operation, Saved};
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// A range of an input's elements.
@@ -28,6 +28,10 @@ impl Operation for Concat {
             ensure!(span.len > 0 && to <= *len, "{}:{to} reaches beyond the input's {len} values", span.from);
         }
         Ok(spans.iter().map(|span| span.len).sum())
+    }
+
+    fn elements(&self) -> Elements {
+        Elements::Parts(self.0.iter().map(|span| span.from..span.from + span.len).collect())
     }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {

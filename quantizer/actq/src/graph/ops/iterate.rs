@@ -2,7 +2,7 @@ use ndarray::Array2;
 
 use crate::error::{Result, ensure};
 use crate::graph::lowering::{BufferId, Lowering};
-use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved};
+use crate::graph::operation::{Backward, Elements, Forward, NodeState, Operation, Saved};
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// The value that the network reads of the iterate of a flow or a diffusion process: noise at first.
@@ -16,6 +16,10 @@ impl Operation for Iterate {
     fn output_len(&self, _: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
         ensure!(inputs.is_empty(), "takes no input, not {}", inputs.len());
         Ok(self.len)
+    }
+
+    fn elements(&self) -> Elements {
+        Elements::Whole
     }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {

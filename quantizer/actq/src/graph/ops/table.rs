@@ -3,7 +3,7 @@ use ndarray::Array2;
 
 use crate::error::{Result, ensure};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
-use crate::graph::operation::{Backward, Forward, NodeState, Operation, Saved};
+use crate::graph::operation::{Backward, Elements, Forward, NodeState, Operation, Saved};
 use crate::graph::units::keep;
 use crate::graph::values::{ValueId, WeightMatrix};
 
@@ -33,6 +33,10 @@ impl Operation for Table {
     fn keep_units(&mut self, len: usize, units: &[usize]) {
         keep(&mut self.rows, len, units);
         self.len = units.len();
+    }
+
+    fn elements(&self) -> Elements {
+        Elements::Own
     }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
