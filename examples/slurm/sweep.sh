@@ -18,6 +18,7 @@ JOBS
 fi
 spec=$1 store=$2
 shift 2
+mkdir -p "$store"
 actq plan "$spec" > "$store.jsonl"
 stage=0 after=
 while [ -n "$(actq plan "$store.jsonl" --stage $stage)" ]; do

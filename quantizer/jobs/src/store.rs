@@ -37,6 +37,33 @@ impl Store {
     ///
     /// If the folder holds other files, or a store of another version; if it cannot be made or read.
     pub fn open(folder: &Path, host: &dyn Host) -> Result<Self, JobError> {
+        let (store, has_header) = Self::at(folder)?;
+        if !has_header {
+            store.make(host)?;
+        }
+        Ok(store)
+    }
+
+    /// Opens a store to read it, and makes nothing. An empty folder is a store without results.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`], and if the folder is absent.
+    pub fn open_existing(folder: &Path) -> Result<Self, JobError> {
+        let (store, has_header) = Self::at(folder)?;
+        if !store.folder.exists() {
+            let name = folder.display();
+            let text = format!("{name}: there is no such folder; name the folder of the results, or create it");
+            return Err(JobError::never(Error::input(text)));
+        }
+        if !has_header {
+            store.refuse_other_files()?;
+        }
+        Ok(store)
+    }
+
+    /// Returns the store in a folder, which may be absent, and `true` if its header is there and of this version.
+    fn at(folder: &Path) -> Result<(Self, bool), JobError> {
         let name = folder.display();
         let folder = std::path::absolute(folder).map_err(JobError::never)?;
         let store = Self { folder };
@@ -49,12 +76,12 @@ impl Store {
         let path = store.folder.join(HEADER);
         match fs::read(&path) {
             Ok(bytes) => store.check(&bytes).map_err(|error| JobError::never(error.context(name.to_string())))?,
-            Err(error) if error.kind() == ErrorKind::NotFound => store.make(host)?,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok((store, false)),
             Err(error) => {
                 return Err(JobError::again(error).context(format!("{}: cannot read the file", path.display())));
             }
         }
-        Ok(store)
+        Ok((store, true))
     }
 
     fn check(&self, bytes: &[u8]) -> Result<()> {
@@ -75,6 +102,13 @@ impl Store {
         let name = self.folder.display();
         fs::create_dir_all(&self.folder)
             .map_err(|error| JobError::again(error).context(format!("{name}: cannot create the folder")))?;
+        self.refuse_other_files()?;
+        let header = Header { format: NAME.to_owned(), version: FORMAT };
+        self.write(HEADER, &line(&header)?, host)
+    }
+
+    fn refuse_other_files(&self) -> Result<(), JobError> {
+        let name = self.folder.display();
         let entries = fs::read_dir(&self.folder)
             .map_err(|error| JobError::again(error).context(format!("{name}: cannot read the folder")))?;
         for entry in entries.flatten() {
@@ -82,14 +116,13 @@ impl Store {
             // Another process may be making the same store: hidden files are not yet in place.
             if !file.to_string_lossy().starts_with('.') && file != HEADER {
                 let text = format!(
-                    "{name}: is not empty, and has no {HEADER}: it holds {}; choose an empty or new folder",
+                    "{name}: is not empty, and has no {HEADER}: it holds {}; choose the folder of a store, or an empty one",
                     file.display()
                 );
                 return Err(JobError::never(Error::input(text)));
             }
         }
-        let header = Header { format: NAME.to_owned(), version: FORMAT };
-        self.write(HEADER, &line(&header)?, host)
+        Ok(())
     }
 
     /// Returns its folder.

@@ -43,9 +43,12 @@ pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> 
     }
     if let Some(log) = &args.pool.log {
         files::refuse_input(log, &inputs)?;
+    }
+    // The log's lines stay: no output replaces it.
+    let outputs = reserve(args.svg.iter().chain(&args.json), inputs.iter().chain(&args.pool.log))?;
+    if let Some(log) = &args.pool.log {
         append(log, "")?;
     }
-    let outputs = reserve(args.svg.iter().chain(&args.json), inputs)?;
     let cores = if args.run.threads == 0 { allocation() } else { args.run.threads.into() };
     let jobs = match spec_jobs {
         Some(jobs) => jobs,

@@ -160,6 +160,9 @@ fn options_are_a_spec_in_memory() -> Result<()> {
     let log = format!("{line} d.json --store store --log policy/policy.json");
     failed(&sweep.run(&log, "")?, 1, &["is the same file as", "an input"])?;
     fs::write(sweep.folder()?.join("one.toml"), "policies = [\"policy\"]\nmethods = [\"rtn\"]\nbpw = [4]\n")?;
+    let same = format!("{line} new.json --store store --log new.json");
+    failed(&sweep.run(&same, "")?, 1, &["new.json: is the same file as new.json"])?;
+    ensure!(!sweep.folder()?.join("new.json").exists(), "something was written");
     let over = sweep.run("sweep one.toml --store one --quiet --json policy/policy.json", "")?;
     failed(&over, 1, &["is the same file as", "an input"])?;
     ensure!(fs::read(sweep.folder()?.join("policy/policy.json"))? == policy, "the policy has changed");
@@ -284,7 +287,14 @@ fn sweeps_are_refused_before_any_job() -> Result<()> {
     failed(&sweep.run("sweep sweep.toml --store policy --quiet", "")?, 1, &["is not empty, and has no store.json"])?;
     // Another try does not help.
     failed(&sweep.run("merge sweep.toml --store sweep.toml", "")?, 1, &["sweep.toml: is not a folder"])?;
+    fs::create_dir(sweep.folder()?.join("new"))?;
     failed(&sweep.run("merge sweep.toml --store new", "")?, 1, &["jobs have no result yet"])?;
+    ensure!(sweep.store("new")?.is_empty(), "a command that only reads made a file");
+    // A mistyped folder is not made.
+    for line in ["merge sweep.toml --store nwe", "plan sweep.toml --missing nwe"] {
+        failed(&sweep.run(line, "")?, 1, &["nwe: there is no such folder; name the folder of the results"])?;
+    }
+    ensure!(!sweep.folder()?.join("nwe").exists(), "a folder was made");
     failed(&sweep.run("job - --store store", "{}")?, 1, &["standard input: is not one job"])?;
     failed(&sweep.run("plan simulator.sh", "")?, 1, &["simulator.sh: is not a plan"])
 }

@@ -1,6 +1,7 @@
 //! Specs, plans and stores that are refused.
 
 use std::fs;
+use std::path::Path;
 
 use crate::common::{Fake, SPEC, files, folder, jobs};
 use actq_jobs::job::Job;
@@ -99,6 +100,22 @@ fn other_folders_are_no_stores() {
     refused("is a store of version 2, and this is actq with stores of version 1");
     fs::write(dir.path().join("store.json"), "{}").expect("written");
     refused("is not that of a store");
+}
+
+#[test]
+fn reading_makes_no_store() {
+    let dir = folder(SPEC);
+    let (typo, empty) = (dir.path().join("typo"), dir.path().join("empty"));
+    fs::create_dir(&empty).expect("a folder");
+    let refused = |path: &Path, expected: &str| {
+        let error = Store::open_existing(path).expect_err(expected);
+        assert!(!error.again && format!("{:#}", error.error).contains(expected), "{:#}", error.error);
+    };
+    refused(&typo, "typo: there is no such folder; name the folder of the results");
+    refused(dir.path(), "is not empty, and has no store.json");
+    assert!(!typo.exists());
+    let store = Store::open_existing(&empty).expect("an empty store");
+    assert!(!store.has(&"0".repeat(64)) && files(&empty).is_empty());
 }
 
 #[test]

@@ -21,7 +21,7 @@ use crate::terminal::{print, reserve};
 /// Prints the results of a sweep.
 pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     let jobs = plan::read(&args.spec, &Command)?;
-    let store = Store::open(&args.store, &Command)?;
+    let store = Store::open_existing(&args.store)?;
     refuse_inside(&args.store, args.svg.iter().chain(&args.json))?;
     let outputs = reserve(args.svg.iter().chain(&args.json), plan::inputs(&args.spec, &jobs))?;
     let left = jobs.iter().filter(|job| job.work.kind() != "merge" && !store.has(&job.address)).count();

@@ -19,7 +19,7 @@ use crate::terminal::print;
 pub(crate) fn run(args: &PlanArgs) -> Result<()> {
     let mut jobs = read(&args.spec, &Command)?;
     if let Some(folder) = &args.missing {
-        let store = Store::open(folder, &Command)?;
+        let store = Store::open_existing(folder)?;
         jobs.retain(|job| !store.has(&job.address));
     }
     jobs.retain(|job| args.stage.is_none_or(|stage| job.stage == stage));
