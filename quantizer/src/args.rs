@@ -14,7 +14,9 @@ use clap::{Parser, Subcommand, ValueEnum, value_parser};
 
 use jobs::{JobArgs, MergeArgs, PlanArgs, PoolArgs};
 use link::{KeygenArgs, LinkArgs, SignArgs};
-use values::{clock, effort, forced, group, minutes, npz, pair, positive, rounds, size, two_files, width};
+use values::{
+    clock, command, effort, forced, group, minutes, npz, pair, positive, rounds, size, steps, two_files, width,
+};
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
 ///
@@ -430,7 +432,7 @@ pub(crate) struct ExportCArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) golden: Option<PathBuf>,
     /// Observations of the golden run, at most
-    #[arg(long, default_value = "100", value_name = "N", requires = "golden")]
+    #[arg(long, default_value = "100", value_name = "N", requires = "golden", value_parser = steps)]
     pub(crate) steps: NonZeroUsize,
 }
 
@@ -454,7 +456,7 @@ pub(crate) struct TuneArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
     /// The command that rolls out an image
-    #[arg(long, value_name = "COMMAND")]
+    #[arg(long, value_name = "COMMAND", value_parser = command)]
     pub(crate) drive: String,
     /// On-policy rounds, 1 to 100
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = rounds)]

@@ -24,15 +24,17 @@ use actq::text::printable_lines;
 use actq_jobs::error::{AGAIN, JobError};
 use anyhow::Result;
 
-use args::{Command, MethodArg};
+use args::{Cli, Command, MethodArg};
 use commands::jobs::host::Command as Host;
 use commands::{bundle, eval, import, inspect, jobs, link, quantize, sign, sweep, tune};
 use outputs::unfinished;
 
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {
-    let command = suggestions::parse().command;
-    run_work(|| run_command(&command))
+    match suggestions::parse() {
+        Ok(Cli { command }) => run_work(|| run_command(&command)),
+        Err(status) => status,
+    }
 }
 
 /// Runs the work of a command and prints its error. A signal ends the process without partial outputs.

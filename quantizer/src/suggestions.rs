@@ -1,6 +1,8 @@
 //! Parsing of the command line, with a suggestion for a misspelt option.
 
 use std::env;
+use std::io::{self, Write as _};
+use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, Error, Parser as _};
@@ -10,11 +12,19 @@ use crate::args::Cli;
 /// The most letters of an option that may be missing, wrong, extra, or swapped with their neighbour.
 const MOST_TYPOS: usize = 1;
 
-/// Parses the command line. On an error, prints it and ends the process.
-pub(crate) fn parse() -> Cli {
-    Cli::try_parse().unwrap_or_else(|mut error| {
+/// Parses the command line. Prints an error, or the help or version that is asked for, and returns the exit status.
+pub(crate) fn parse() -> Result<Cli, ExitCode> {
+    Cli::try_parse().map_err(|mut error| {
         suggest(&mut error);
-        error.exit()
+        let is_asked_for = !error.use_stderr();
+        match error.print().and_then(|()| io::stdout().flush()) {
+            // A reader that has closed its end is not an error.
+            Err(failure) if is_asked_for && failure.kind() != io::ErrorKind::BrokenPipe => {
+                eprintln!("actq: cannot write to standard output: {failure}");
+                ExitCode::FAILURE
+            }
+            _ => u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from),
+        }
     })
 }
 

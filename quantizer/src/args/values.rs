@@ -1,5 +1,6 @@
 //! Parsers of option values. An error names the values that the option accepts.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use actq::methods::Effort;
@@ -22,6 +23,16 @@ pub(super) fn two_files(text: &str) -> Result<(PathBuf, PathBuf), String> {
     let both = text.rsplit_once(':').filter(|(first, second)| !first.is_empty() && !second.is_empty());
     let (first, second) = both.ok_or_else(|| "use the form RAW.npz:EXPECT.npz".to_owned())?;
     Ok((first.into(), second.into()))
+}
+
+/// Parses a command line for a shell.
+pub(super) fn command(text: &str) -> Result<String, String> {
+    let is_empty = text.trim().is_empty();
+    (!is_empty).then(|| text.to_owned()).ok_or_else(|| "name the command to run".to_owned())
+}
+
+pub(super) fn steps(text: &str) -> Result<NonZeroUsize, String> {
+    text.parse().map_err(|_| "use 1 step or more".to_owned())
 }
 
 pub(super) fn rounds(text: &str) -> Result<usize, String> {

@@ -52,8 +52,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         files.into_iter().map(|(name, content)| (args.out.join(name), content)).unzip();
     let names: Vec<&Path> = names.iter().map(PathBuf::as_path).collect();
     refuse_existing(args, &names)?;
-    let _folder =
-        OutputFolder::new(&args.out).with_context(|| format!("{}: cannot create the folder", args.out.display()))?;
+    let _folder = OutputFolder::new(&args.out)?;
     reserve(&names, &inputs)?.write(&contents)?;
     print(&deployment::summary(&reading))?;
     if let Some(checked) = checked {

@@ -1,14 +1,14 @@
 //! `actq export-c`
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use actq::data::{Dataset, Sizes};
 use actq::runtime::{ImageBuffer, with_head};
 use actq_kernels::Image;
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Result, ensure};
 
 use crate::args::ExportCArgs;
+use crate::outputs::unfinished::OutputFolder;
 use crate::report::export::{Golden, files};
 use crate::terminal::{print, reserve};
 
@@ -38,7 +38,7 @@ pub fn export(
     let run = golden.map(|(recording, steps)| replay(image, recording, steps)).transpose()?;
     let files = files(&image, bytes, name, run.as_ref());
 
-    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let _folder = OutputFolder::new(folder)?;
     let paths: Vec<PathBuf> = files.iter().map(|(name, _)| folder.join(name)).collect();
     let outputs = reserve(&paths, file.into_iter().chain(golden.map(|(recording, _)| recording)))?;
     outputs.write(&files.iter().map(|(_, text)| text).collect::<Vec<_>>())?;

@@ -6,7 +6,7 @@ use actq::data::{Dataset, Recording, Sizes};
 use actq::import::FILES;
 use actq::policy::Policy;
 use actq_onnx::{Choice, import};
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Result, ensure};
 
 use crate::args::ImportArgs;
 use crate::check::check;
@@ -33,8 +33,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         "{}: exists, and a policy folder takes one calibration recording; remove it or omit --calib",
         other.map_or("".into(), |p| p.display().to_string())
     );
-    let _folder =
-        OutputFolder::new(&args.out).with_context(|| format!("{}: cannot create the folder", args.out.display()))?;
+    let _folder = OutputFolder::new(&args.out)?;
     let outputs = reserve(&names, [&args.model].into_iter().chain(&args.calib))?;
     let checked = match args.check {
         true => Some(check(&args.model, &imported, &policy, calib.as_ref())?),
@@ -55,13 +54,8 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     ))
 }
 
-/// Refuses to replace files without --force, and an output folder that is something else.
+/// Refuses to replace files without --force.
 pub(super) fn refuse_existing(args: &ImportArgs, files: &[&Path]) -> Result<()> {
-    ensure!(
-        args.out.is_dir() || !args.out.exists(),
-        "{}: exists and is not a folder; pass the name of a folder to --out",
-        args.out.display()
-    );
     for path in files {
         ensure!(args.force || !path.exists(), "{}: exists; pass --force to replace it", path.display());
     }

@@ -49,6 +49,7 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     let sizes = Sizes::of(&policy);
     if calib.is_empty() {
         calib.extend(Recording::Calib.find(&args.policy_dir)?);
+        ensure!(!calib.is_empty(), "{}", Recording::Calib.missing("actq tune"));
     }
     let load = |file: &PathBuf| Dataset::load(file, sizes);
     let calib = calib.iter().map(load).collect::<Result<Vec<_>, _>>()?;
@@ -102,7 +103,7 @@ impl Folder {
             return Ok(Self::Temporary(Scratch::new().context("cannot create a temporary folder for recordings")?));
         };
         let name = dir.display();
-        let _made = OutputFolder::new(dir).with_context(|| format!("{name}: cannot create the folder"))?;
+        let _made = OutputFolder::new(dir)?;
         let mut entries = fs::read_dir(dir).with_context(|| format!("{name}: cannot read the folder"))?;
         ensure!(entries.next().is_none(), "{name}: is not empty; pass a new or empty folder to --keep");
         Ok(Self::Kept { path: dir.to_owned(), _made })

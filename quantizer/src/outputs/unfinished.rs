@@ -9,6 +9,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
+use anyhow::{Context as _, Result, ensure};
 use tempfile::{Builder, NamedTempFile, PersistError, TempDir};
 
 /// Characters of an output's name in the name of its temporary file, which must not become too long for the file
@@ -140,14 +141,16 @@ impl Scratch {
 pub struct OutputFolder(Vec<(PathBuf, Listed)>);
 
 impl OutputFolder {
-    /// Creates the folder and its missing parents.
-    pub fn new(path: &Path) -> io::Result<Self> {
+    /// Creates the folder and its missing parents. Refuses a path that exists and is not a folder.
+    pub fn new(path: &Path) -> Result<Self> {
+        let name = path.display();
+        ensure!(path.is_dir() || !path.exists(), "{name}: exists and is not a folder; pass the name of a folder");
         let missing = path.ancestors().take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
         let _held = hold();
         let mut made = Self(Vec::new());
         for folder in missing.into_iter().rev() {
-            fs::create_dir(&folder)?;
+            fs::create_dir(&folder).with_context(|| format!("{name}: cannot create the folder"))?;
             let listed = Listed::new(&folder, |path| fs::remove_dir(path));
             made.0.push((folder, listed));
         }

@@ -93,9 +93,10 @@ fn names_that_are_no_identifiers_and_files_that_are_no_images_are_refused() -> R
     {
         failed(&run(actq(&["export-c", image, "--out", &out, "--name", name]), b"")?, 1, &[message])?;
     }
+    failed(&run(actq(&["export-c", &image, "--out", &none]), b"")?, 1, &["text.actq: exists and is not a folder"])?;
     let steps = ["export-c", &image, "--out", &out, "--steps"];
     failed(&run(actq(&[&steps[..], &["5"]].concat()), b"")?, 2, &["--golden"])?;
-    failed(&run(actq(&[&steps[..], &["0", "--golden", &none]].concat()), b"")?, 2, &["--steps"])?;
+    failed(&run(actq(&[&steps[..], &["0", "--golden", &none]].concat()), b"")?, 2, &["--steps", "use 1 step or more"])?;
     ensure!(!dir.path().join("out").exists(), "nothing is written");
     Ok(())
 }

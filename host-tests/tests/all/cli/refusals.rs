@@ -37,7 +37,8 @@ fn a_wrong_command_line_has_status_2() -> Result<()> {
         ("--flash M", "MiB"),
     ];
     let policy = text(&fixture.policy());
-    let lines: [&[&str]; 4] = [&[], &["paint"], &["quantize", &policy], &["eval", "x.actq"]];
+    let no_command = ["tune", &policy, "--out", "x.actq", "--drive", " "];
+    let lines: [&[&str]; 5] = [&[], &["paint"], &["quantize", &policy], &["eval", "x.actq"], &no_command];
     let out = fixture.out("image");
     let quantized = options.map(|(options, word)| {
         (options.to_owned(), fixture.quantize(&out, options).and_then(|output| failed(&output, 2, &[word])))
@@ -68,6 +69,19 @@ fn lengths_of_learning_require_learning() -> Result<()> {
         let words = line.split_whitespace().chain([&*policy, "--out", &out]).collect::<Vec<_>>();
         (line.to_owned(), run(actq(&words), b"").and_then(|output| failed(&output, 1, &[message])))
     }))?;
+    ensure!(fixture.snapshot()? == before, "files changed");
+    Ok(())
+}
+
+/// The message does not suggest --keep: there is no round to keep.
+#[test]
+fn tune_requires_a_recording_before_its_rounds() -> Result<()> {
+    let fixture = Fixture::new()?;
+    fs::remove_file(fixture.policy().join("calib.npz"))?;
+    let before = fixture.snapshot()?;
+    let (policy, out) = (text(&fixture.policy()), text(&fixture.out("image.actq")));
+    let output = run(actq(&["tune", &policy, "--drive", "true", "--out", &out, "--quiet"]), b"")?;
+    failed(&output, 1, &["actq: actq tune needs recorded observations: put calib.npz", "--calib"])?;
     ensure!(fixture.snapshot()? == before, "files changed");
     Ok(())
 }
@@ -240,21 +254,43 @@ fn damaged_images_are_refused_by_every_command() -> Result<()> {
     }))
 }
 
+/// The disk is full. clap prints the first three by itself.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_is_an_error() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let image = text(&fixture.image("")?);
+    let commands: [&[&str]; 5] =
+        [&["--version"], &["--help"], &["help", "inspect"], &["inspect", &image], &["inspect", &image, "--json"]];
+    all(commands.map(|command| {
+        let run = || {
+            let full = fs::OpenOptions::new().write(true).open("/dev/full")?;
+            let output = actq(command).stdout(full).stderr(Stdio::piped()).spawn()?.wait_with_output()?;
+            failed(&output, 1, &["actq: cannot write to standard output: "])
+        };
+        (command.join(" "), run())
+    }))
+}
+
 /// Users type `actq inspect image | head -1`.
 #[test]
 fn a_closed_output_causes_no_panic() -> Result<()> {
     let fixture = Fixture::new()?;
     let image = text(&fixture.image("")?);
     let (policy, out) = (text(&fixture.policy()), text(&fixture.out("other.actq")));
-    let commands: [&[&str]; 3] =
-        [&["inspect", &image], &["eval", &image, "--policy", &policy], &["quantize", &policy, "--out", &out]];
+    let commands: [&[&str]; 4] = [
+        &["inspect", &image],
+        &["eval", &image, "--policy", &policy],
+        &["quantize", &policy, "--out", &out],
+        &["--help"],
+    ];
     all(commands.map(|command| {
         let run = || {
             let (reader, writer) = std::io::pipe()?;
             drop(reader);
             let output = actq(command).stdout(writer).stderr(Stdio::piped()).spawn()?.wait_with_output()?;
             let message = String::from_utf8_lossy(&output.stderr);
-            ensure!(!message.contains("panicked"), "{message}");
+            ensure!(!message.contains("panicked") && !message.contains("cannot write"), "{message}");
             Ok(())
         };
         (command[0].to_owned(), run())
