@@ -9,6 +9,7 @@ use actq::data::Dataset;
 use actq::measure::actions::actions;
 use actq::policy::Policy;
 use actq::random::Random;
+use actq::text::count;
 use actq_onnx::Imported;
 use anyhow::{Context as _, Result, bail, ensure};
 
@@ -49,7 +50,7 @@ pub(crate) fn check(model: &Path, imported: &Imported, policy: &Policy, calib: O
         Ok(InFloat64 { policy: error(&exact, &ours), onnxruntime: error(&exact, &expected) })
     };
     let summary = verdict(error(&expected, &ours), in_float64).with_context(|| model.display().to_string())?;
-    Ok(format!("{} observations {summary}", observations.len()))
+    Ok(format!("{} {summary}", count(observations.len(), "observation")))
 }
 
 /// Draws observations for all inputs, rounded if the file takes integers.

@@ -19,6 +19,11 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     text.chars().map(escaped).collect::<String>().into()
 }
 
+/// Formats a number of things, as "1 frame" or "2 frames". The noun's plural must end in -s.
+pub fn count(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
 /// Quotes a word for a POSIX shell and Python's `shlex.split`.
 pub fn quoted(word: &OsStr) -> Result<String> {
     let text = word.to_str().with_context(|| format!("{}: the path is not UTF-8", word.to_string_lossy()))?;
@@ -38,6 +43,11 @@ pub fn printable_lines(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_thing_is_singular() {
+        assert_eq!([0, 1, 2].map(|number| count(number, "frame")), ["0 frames", "1 frame", "2 frames"]);
+    }
 
     #[test]
     fn only_control_characters_are_escaped() {

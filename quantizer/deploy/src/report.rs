@@ -1,5 +1,7 @@
 //! A description in words, for tables.
 
+use actq::text::count;
+
 use crate::description::{Description, End, Fill, First, From, History, Op, Operand, Order, Orientation, When};
 
 /// A part of a description.
@@ -26,10 +28,10 @@ impl Description {
             let unit = input.unit.as_ref().map_or(String::new(), |unit| format!(", {unit}"));
             let joints =
                 input.joints.as_ref().map_or(String::new(), |order| format!(" in the order of joints.{order}"));
-            add("input", &input.name, format!("{len} values{joints}{unit}"));
+            add("input", &input.name, format!("{}{joints}{unit}", count(len, "value")));
         }
         for state in &self.states {
-            add("state", &state.name, format!("{} values; next tick: {}", state.len, state.next));
+            add("state", &state.name, format!("{}; next tick: {}", count(state.len, "value"), state.next));
         }
         for clock in &self.clocks {
             let when = if clock.when == When::Before { "before" } else { "after" };
@@ -38,7 +40,11 @@ impl Description {
         }
         for motion in &self.motions {
             let end = if motion.end == End::Repeat { "repeats" } else { "holds its last row" };
-            add("motion", &motion.name, format!("{}: {}, {} ticks late, {end}", motion.file, motion.array, motion.lag));
+            add(
+                "motion",
+                &motion.name,
+                format!("{}: {}, {} late, {end}", motion.file, motion.array, count(motion.lag, "tick")),
+            );
         }
         for value in &self.values {
             let from = match &value.from {
@@ -93,7 +99,7 @@ fn history_text(history: &History) -> String {
     let fill = if history.fill == Fill::First { "the first frame" } else { "zeros" };
     let stride = if history.stride > 1 { format!(" every {} ticks", history.stride) } else { String::new() };
     let current = if history.current { "" } else { " before this tick" };
-    format!("{} frames{stride}{current}, {first} first, filled with {fill}", history.length)
+    format!("{}{stride}{current}, {first} first, filled with {fill}", count(history.length, "frame"))
 }
 
 fn order_text(order: &Order) -> String {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use actq::text::printable;
+use actq::text::{count, printable};
 use actq_deploy::{Array, Comparison, Question, Reading};
 
 use super::table::table;
@@ -103,5 +103,6 @@ pub(crate) fn targets(targets: &[Target], ticks: usize) -> String {
         let cells = [printable(name).to_string(), format!("{nmse:.3e}"), format!("{largest:.4}")];
         rows.add_row(cells.into_iter().chain([tick.to_string(), value.to_string()]));
     }
-    format!("{rows}\n\n{ticks} ticks; nmse: squared error / variance of the expected target, mean over values\n")
+    let ticks = count(ticks, "tick");
+    format!("{rows}\n\n{ticks}; nmse: squared error / variance of the expected target, mean over values\n")
 }

@@ -1,12 +1,13 @@
 //! The summary of an imported ONNX file.
 
 use actq::policy::Policy;
+use actq::text::count;
 use actq_onnx::Imported;
 
 /// Formats the summary: inputs in order, states, the output, the action contract, ops, and cut inputs and outputs.
 pub fn summary(imported: &Imported, policy: &Policy) -> String {
     let list = |names: &[String]| names.join(", ");
-    let mut text = format!("file      {} nodes, by {}\n", imported.nodes, imported.producer);
+    let mut text = format!("file      {}, by {}\n", count(imported.nodes, "node"), imported.producer);
     let mut at = 0;
     for (i, (name, len)) in imported.inputs.iter().enumerate() {
         let head = if i == 0 { "input" } else { "" };
@@ -15,22 +16,23 @@ pub fn summary(imported: &Imported, policy: &Policy) -> String {
         at += len;
     }
     for (from, to, len) in &imported.states {
-        text += &format!("state     {from} -> {to}, {len} values; kept by the policy, zero at reset\n");
+        text += &format!("state     {from} -> {to}, {}; kept by the policy, zero at reset\n", count(*len, "value"));
     }
     let chunk = if policy.chunk > 1 { format!(": a chunk of {} actions", policy.chunk) } else { String::new() };
-    text += &format!("output    {}, {} values{chunk}\n", imported.output.0, imported.output.1);
+    text += &format!("output    {}, {}{chunk}\n", imported.output.0, count(imported.output.1, "value"));
     if !imported.contract.is_empty() {
         text += &format!("action    contract with {}, from the last nodes\n", imported.contract.join(", "));
     }
     if imported.bounded > 0 {
-        let of = format!("{} of {} actions", imported.bounded, policy.act_len);
+        let of = format!("{} of {}", imported.bounded, count(policy.act_len, "action"));
         text +=
             &format!("limits    low and high of {of} are the bounds of their last operation (tanh, sigmoid, clip)\n");
     }
     text += &format!("ops       {}\n", list(&counted(&imported.ops)));
     text += &format!(
-        "network   {} weights, {} parameters; all other nodes are folded into them or only move values\n",
-        policy.weights, policy.parameters
+        "network   {}, {}; all other nodes are folded into them or only move values\n",
+        count(policy.weights, "weight"),
+        count(policy.parameters, "parameter")
     );
     for (what, names) in [("inputs", &imported.cut_inputs), ("outputs", &imported.cut_outputs)] {
         if !names.is_empty() {

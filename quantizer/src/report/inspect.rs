@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use actq::graph::ops::Balance;
 use actq::measure::size::{bits_per_weight, hex};
-use actq::text::printable;
+use actq::text::{count, printable};
 use actq_kernels::image::Matrix;
 use actq_kernels::image::{Kind, Op, OpKind, Region};
 use actq_kernels::{Image, PortKind};
@@ -32,16 +32,16 @@ pub fn report(image: &Image<'_>) -> String {
         Kind::Flow | Kind::Diffusion => {
             let kind = if image.kind() == Kind::Flow { "flow" } else { "diffusion" };
             let (steps, chunk, execute) = (image.denoising_steps(), image.chunk(), image.execute());
-            format!("{kind} in {steps} steps, chunk of {chunk}, {execute} executed")
+            format!("{kind} in {}, chunk of {chunk}, {execute} executed", count(steps, "step"))
         }
         kind => format!("{kind:?}"),
     };
-    let (obs, act) = (image.obs_len(), image.act_len());
+    let (obs, act) = (count(image.obs_len(), "observation"), count(image.act_len(), "action"));
     let rate = image.rate_hz();
     let _ = writeln!(text, "policy        {}", printable(image.name()));
     let _ = writeln!(text, "source        sha256 {digest}");
     let _ = writeln!(text, "image         {} bytes, crc32 {:08x}", image.bytes(), image.crc());
-    let _ = writeln!(text, "kind          {kind}, {obs} observations -> {act} actions at {rate} Hz");
+    let _ = writeln!(text, "kind          {kind}, {obs} -> {act} at {rate} Hz");
     for port in image.ports() {
         let what = match port.kind {
             PortKind::Input => "input",
@@ -53,7 +53,7 @@ pub fn report(image: &Image<'_>) -> String {
         let [low, high] = port.range;
         let range = if low.is_finite() || high.is_finite() { format!(", {low} to {high}") } else { String::new() };
         let names = if port.names.is_empty() { String::new() } else { format!(": {}", port.names.replace('\n', ", ")) };
-        let _ = writeln!(text, "{what:13} {} ({} values{range}){names}", printable(port.name), port.len);
+        let _ = writeln!(text, "{what:13} {} ({}{range}){names}", printable(port.name), count(port.len, "value"));
     }
     let playback = playback(image);
     if !playback.is_empty() {
@@ -65,7 +65,7 @@ pub fn report(image: &Image<'_>) -> String {
     let Peak { op, words, placed } = peak(image);
     let name = image.ops().nth(op).map_or("", |op| op.kind.name());
     let _ = writeln!(text, "values        {} bytes, {} of them in use at op {op} ({name})", 4 * placed, 4 * words);
-    let _ = writeln!(text, "self-test     {} steps", image.self_test_steps());
+    let _ = writeln!(text, "self-test     {}", count(image.self_test_steps(), "step"));
     let features: Vec<_> = image.features().collect();
     let _ = writeln!(text, "features      {}, of the kernels on the target\n", features.join(" "));
     let mut ops = table(&["op", "output", "input", "detail", "bits", "group", "x max", "bytes"]);
@@ -98,7 +98,7 @@ pub fn report(image: &Image<'_>) -> String {
 fn playback(image: &Image<'_>) -> Vec<String> {
     let mut settings = Vec::new();
     if image.horizon() > 0 {
-        settings.push(format!("average of {} chunks", image.horizon()));
+        settings.push(format!("average of {}", count(image.horizon(), "chunk")));
     }
     if image.overlap() > 0 {
         settings.push(format!("{} actions blend into a new chunk", image.overlap()));
@@ -117,7 +117,7 @@ fn row(op: &Op<'_>) -> Vec<String> {
             format!("{}x{}{}", matrix.rows, matrix.cols, if accumulate { " added" } else { "" })
         }
         (OpKind::RmsNorm, _) if op.constant(0) == Balance::FREE_EPS => "factors, by the quantizer".into(),
-        (OpKind::History, _) => format!("{} frames", op.dst().len / op.src().len.max(1)),
+        (OpKind::History, _) => count(op.dst().len / op.src().len.max(1), "frame"),
         (kind, _) if kind.label().is_empty() => String::new(),
         (kind, _) => {
             let constants: String = op.constants().map(|constant| format!(" {constant}")).collect();

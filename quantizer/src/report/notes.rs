@@ -9,6 +9,7 @@ use actq::methods::Options;
 use actq::methods::distill::balance::MixedUnits;
 use actq::pipeline::{QuantizedPolicy, Reason, Unused};
 use actq::policy::Policy;
+use actq::text::count;
 
 /// Ratio of held-out to calibration error above which there is a warning, if [`OVERFIT_DIFFERENCE`] is exceeded, too.
 const OVERFIT_RATIO: f64 = 3.0;
@@ -81,8 +82,8 @@ pub fn own_path(report: &ErrorReport) -> String {
 }
 
 fn line(name: &str, report: &ErrorReport, recorded: usize) -> String {
-    let of = if recorded > report.steps { format!(" of {recorded}") } else { String::new() };
-    format!("{name:<17} {:.3e}   ({}{of} observations)\n", report.nmse, report.steps)
+    let of = if recorded > report.steps { format!("{} of ", report.steps) } else { String::new() };
+    format!("{name:<17} {:.3e}   ({of}{})\n", report.nmse, count(recorded, "observation"))
 }
 
 /// Returns a warning if the held-out error is far above the calibration error.

@@ -4,6 +4,7 @@ use actq::measure::eval::ErrorReport;
 use actq::methods::distill::balance::balance_bytes;
 use actq::methods::{Choice, Learning, Sampled, Tried};
 use actq::pipeline::{QuantizedPolicy, Search, Try};
+use actq::text::count;
 use comfy_table::Table;
 
 use super::table::{group_name, table};
@@ -39,14 +40,14 @@ pub fn matrices(quantized: &QuantizedPolicy) -> String {
 /// Formats the sample sizes of the statistics of a flow or diffusion policy.
 pub fn sampled(Sampled { frames, inputs, outputs }: Sampled) -> String {
     let derived = if outputs > 0 { format!(", derivatives at {outputs} random ones") } else { String::new() };
-    format!("statistics of {inputs} of {frames} frames{derived}, in every denoising step\n")
+    format!("statistics of {inputs} of {}{derived}, in every denoising step\n", count(frames, "frame"))
 }
 
 /// Formats the choice of learning, and the settings that were tried.
 pub fn learning(learning: &Learning) -> String {
     let Learning { steps, choice, tried } = learning;
     let mut text = match choice {
-        Choice::Learning(recipe) => format!("learned {steps} steps with {recipe}\n"),
+        Choice::Learning(recipe) => format!("learned {} with {recipe}\n", count(*steps, "step")),
         Choice::Feedback { .. } => format!("not learned: {choice}\n"),
     };
     if !tried.is_empty() {

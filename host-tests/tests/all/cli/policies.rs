@@ -179,7 +179,7 @@ const FAULTS: &[Fault] = &[
         &["heldout.npz and heldout.safetensors are present"],
     ),
     ("truncated held-out recording", |p| cut(&p.join("heldout.npz"), 100), &["heldout.npz", "truncated"]),
-    ("too few frames", |p| calib(p, OBS, 0.0, 13), &["calib.npz", "15 frames are recorded, but 16 are needed"]),
+    ("too few frames", |p| calib(p, OBS, 0.0, 13), &["calib.npz", "it has 15 frames, but 16 are needed"]),
     ("truncated recording", |p| cut(&p.join("calib.npz"), 100), &["calib.npz"]),
     ("recording empty", |p| cut(&p.join("calib.npz"), 0), &["calib.npz"]),
     ("wider recording", |p| calib(p, OBS + 1, 0.0, 1), &["calib.npz", "obs", "41", "40"]),
@@ -265,7 +265,7 @@ fn faulty_policies_are_named_and_leave_no_file() -> Result<()> {
         }
         Ok(())
     };
-    let few = "47 frames are recorded, but 200 are needed: learning from fewer overfits";
+    let few = "it has 47 frames, but 200 are needed: learning from fewer overfits";
     let learning = is_refused(|_| Ok(()), "--method distill", &["calib.npz", few]);
     let faults = FAULTS.iter().map(|(what, change, words)| ((*what).to_owned(), is_refused(*change, "", words)));
     all(faults.chain([("too few frames to learn from".to_owned(), learning)]))

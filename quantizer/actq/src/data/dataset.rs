@@ -14,6 +14,7 @@ use crate::error::{Context, Result, bail, ensure};
 use crate::graph::{Evaluator, Graph};
 use crate::import::values::{Tensor, Values};
 use crate::policy::Policy;
+use crate::text::count;
 
 /// Sizes that a recording's arrays must fit.
 #[derive(Clone, Copy, Debug)]
@@ -87,7 +88,12 @@ impl Dataset {
             ),
         };
         ensure!(episodes > 0 && steps > 0, "array \"obs\" is empty: {:?}", obs.shape);
-        ensure!(width == sizes.obs, "array \"obs\" has {width} values per step, but the policy takes {}", sizes.obs);
+        ensure!(
+            width == sizes.obs,
+            "array \"obs\" has {} per step, but the policy takes {}",
+            count(width, "value"),
+            sizes.obs
+        );
         let noise = arrays.take("noise").filter(|_| sizes.noise > 0);
         let beside_obs = |array: &Option<Tensor>, name: &str, width: usize, what: &str| -> Result<()> {
             let Some(array) = array else { return Ok(()) };
@@ -172,8 +178,9 @@ impl Dataset {
         let frames = self.frames();
         ensure!(
             frames >= least,
-            "{}: {frames} frames are recorded, but {least} are needed: {why}",
-            self.path.display()
+            "{}: it has {}, but {least} are needed: {why}",
+            self.path.display(),
+            count(frames, "frame")
         );
         Ok(())
     }
@@ -268,7 +275,7 @@ fn lengths(array: &Tensor, episodes: usize, steps: usize) -> Result<Vec<usize>> 
     );
     let one = |(episode, n): (usize, i64)| {
         let n = usize::try_from(n).ok().with_context(|| format!("array \"length\" holds {n} for episode {episode}"))?;
-        ensure!(n <= steps, "episode {episode} has length {n}, but the array \"obs\" holds {steps} steps");
+        ensure!(n <= steps, "episode {episode} has length {n}, but the array \"obs\" holds {}", count(steps, "step"));
         Ok(n)
     };
     numbers.into_iter().enumerate().map(one).collect()

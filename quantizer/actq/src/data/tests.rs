@@ -326,10 +326,7 @@ fn too_few_frames_are_named() {
     let dataset = Dataset::load(&write(&dir, "calib.npz", &[("obs", obs())]), SIZES).expect("ten frames");
     assert!(dataset.require_frames(10, "this").is_ok());
     let error = dataset.require_frames(11, "fewer repeat themselves").expect_err("ten").to_string();
-    assert!(
-        error.ends_with("calib.npz: 10 frames are recorded, but 11 are needed: fewer repeat themselves"),
-        "{error}"
-    );
+    assert!(error.ends_with("calib.npz: it has 10 frames, but 11 are needed: fewer repeat themselves"), "{error}");
 }
 
 /// Cuts the same steps into windows, with the state at the start of each.

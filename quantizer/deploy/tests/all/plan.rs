@@ -149,6 +149,16 @@ fn a_description_survives_its_text() -> Result<()> {
 }
 
 #[test]
+fn the_table_counts_one_in_the_singular() -> Result<()> {
+    let rows = Description::parse(&WHOLE.replace("len = 2", "len = 1"))?.rows();
+    let content = |name: &str| rows.iter().find(|row| row.name == name).map(|row| row.content.as_str());
+    assert_eq!(content("q"), Some("2 values in the order of joints.robot"));
+    assert_eq!(content("last"), Some("1 value; next tick: net.out"));
+    assert_eq!(content("motion"), Some("motion.npz: rows, 1 tick late, repeats"));
+    Ok(())
+}
+
+#[test]
 fn mistakes_are_refused_by_their_keys() {
     let cases = [
         ("schema = 1", "schema = 2", "schema = 2: this version reads schema 1"),

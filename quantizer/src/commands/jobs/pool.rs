@@ -9,6 +9,7 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread;
 use std::time::Instant;
 
+use actq::text::count;
 use actq_jobs::error::AGAIN;
 use actq_jobs::job::Job;
 use actq_jobs::schedule::{Counts, Ended, Schedule};
@@ -57,7 +58,7 @@ pub fn complete(jobs: &[Job], store: &Store, pool: &Pool<'_>) -> Result<()> {
         ),
         false => String::new(),
     };
-    ensure!(failed == 0, "{failed} jobs failed, and {skipped} that need them did not run{kept}");
+    ensure!(failed == 0, "{} failed, and {skipped} that need them did not run{kept}", count(failed, "job"));
     Ok(())
 }
 
@@ -102,12 +103,12 @@ impl Working<'_> {
                 return Ok(());
             }
             let (left, all) = self.left();
-            let Counts { done, running, all: count, .. } = self.schedule.counts();
+            let Counts { done, running, all: jobs, .. } = self.schedule.counts();
             // Before the first progress, nothing is known but the estimates of the plan.
             let made = left_at_begin - left;
             let seconds =
                 if made > 0.0 { begun.elapsed().as_secs_f64() * left / made } else { left / self.pool.cores as f64 };
-            let work = format!("{done} of {count} jobs, {running} running, {} left", duration(seconds));
+            let work = format!("{done} of {}, {running} running, {} left", count(jobs, "job"), duration(seconds));
             progress.set(&work, if all > 0.0 { 1.0 - left / all } else { 0.0 });
             match receiver.recv().context("the workers' threads have ended")? {
                 Message::Share(job, share) => drop(self.shares.insert(job, share)),
