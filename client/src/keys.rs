@@ -65,7 +65,9 @@ pub fn write(path: &Path, key: &SigningKey) -> Result<()> {
 pub fn read(path: &Path) -> Result<SigningKey> {
     let name = path.display();
     let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot read the file"))?;
-    SigningKey::from_pkcs8_pem(&text).with_context(|| format!("{name}: not an Ed25519 private key in PKCS #8 as PEM"))
+    SigningKey::from_pkcs8_pem(&text).with_context(|| {
+        format!("{name}: is not an Ed25519 private key in PKCS #8 as PEM; make one with `actq keygen`")
+    })
 }
 
 /// Returns the public key in hexadecimal, as a build takes it.
@@ -91,9 +93,12 @@ impl Signed {
     ///
     /// Fails if it is not.
     pub fn check(&self, image: &[u8]) -> Result<[u8; 64]> {
-        let key: [u8; 32] = bytes(&self.public_key).context("the public key is not 32 bytes in hexadecimal")?;
-        let signature: [u8; 64] = bytes(&self.signature).context("the signature is not 64 bytes in hexadecimal")?;
-        let key = VerifyingKey::from_bytes(&key).context("the public key is not an Ed25519 key")?;
+        let damaged = |what: &str| format!("{what}; sign the image again (actq sign)");
+        let key: [u8; 32] =
+            bytes(&self.public_key).with_context(|| damaged("the public key is not 32 bytes in hexadecimal"))?;
+        let signature: [u8; 64] =
+            bytes(&self.signature).with_context(|| damaged("the signature is not 64 bytes in hexadecimal"))?;
+        let key = VerifyingKey::from_bytes(&key).with_context(|| damaged("the public key is not an Ed25519 key"))?;
         let digest = Sha512::new().chain_update(image);
         let verified =
             key.verify_prehashed_strict(digest, Some(&context(self.version)), &Signature::from_bytes(&signature));

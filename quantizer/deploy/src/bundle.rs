@@ -35,7 +35,7 @@ impl Bundle {
     /// If it is missing, cannot be read, or has more than 10,000 entries.
     pub fn open(path: &Path) -> Result<Self> {
         let shown = || path.display().to_string();
-        let is_file = fs::metadata(path).with_context(shown)?.is_file();
+        let is_file = fs::metadata(path).with_context(|| format!("{}: cannot read the bundle", shown()))?.is_file();
         if is_file {
             let name = path.file_name().and_then(|name| name.to_str());
             let name = name.with_context(|| format!("{}: the name is not UTF-8", shown()))?.to_owned();

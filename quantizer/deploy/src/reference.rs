@@ -7,6 +7,7 @@ use std::path::Path;
 
 use actq::data::arrays;
 use actq::error::{Context as _, Error, Result, bail, ensure};
+use actq::text::count;
 
 use crate::conventions::{Variant, variants};
 use crate::description::Description;
@@ -20,6 +21,8 @@ pub const TOLERANCE: f64 = 1e-5;
 /// Raw inputs `[tick, value]` by name.
 #[derive(Clone, Debug)]
 pub struct Raw {
+    /// Name of the file, for messages.
+    name: String,
     ticks: usize,
     arrays: BTreeMap<String, Array>,
 }
@@ -31,9 +34,9 @@ impl Raw {
     ///
     /// If it cannot be read, or its arrays have no ticks or different numbers of them.
     pub fn read(path: &Path) -> Result<Self> {
-        let arrays = numbers(path)?;
-        let ticks = ticks(&arrays, None).with_context(|| path.display().to_string())?;
-        Ok(Self { ticks, arrays })
+        let (name, arrays) = (path.display().to_string(), numbers(path)?);
+        let ticks = ticks(&arrays, None).with_context(|| name.clone())?;
+        Ok(Self { name, ticks, arrays })
     }
 
     /// Returns the raw arrays that no input has the name of.
@@ -52,10 +55,15 @@ impl Raw {
         for (name, len) in inputs {
             let array = self.arrays.get(name).with_context(|| {
                 let all = self.arrays.keys().cloned().collect::<Vec<_>>().join(", ");
-                format!("there is no raw array {name:?}; there are {all}")
+                format!("{}: there is no raw array {name:?}; there are {all}", self.name)
             })?;
             let (_, row) = array.rows()?;
-            ensure!(row == *len, "raw array {name:?} has {row} values a tick, and the input {len}");
+            ensure!(
+                row == *len,
+                "{}: raw array {name:?} has {} a tick, and the input {len}",
+                self.name,
+                count(row, "value")
+            );
             for (frame, values) in frames.iter_mut().zip(array.values.chunks(row)) {
                 frame.push(values.to_vec());
             }
@@ -105,7 +113,7 @@ fn ticks<'a>(
         let name = name.as_ref();
         let (rows, row) = array.rows().with_context(|| format!("array {name:?}"))?;
         let first = *ticks.get_or_insert(rows);
-        ensure!(rows == first, "array {name:?} has {rows} ticks, and others {first}");
+        ensure!(rows == first, "array {name:?} has {}, and others {first}", count(rows, "tick"));
         ensure!(row > 0, "array {name:?} has no values");
     }
     ticks.filter(|ticks| *ticks > 0).context("it has no ticks")

@@ -47,7 +47,7 @@ def test_open_questions_are_listed(tmp_path):
     with pytest.raises(actq.Error) as raised:
         actq.import_policy(tmp_path)
     text = str(raised.value)
-    assert "says profile lerobot" in text and "\nthe bundle (family lerobot) leaves 1 questions open; " in text
+    assert "says profile lerobot" in text and "\nthe bundle (family lerobot) leaves 1 question open; " in text
 
 
 def test_engines_of_the_speed_comparison_agree():

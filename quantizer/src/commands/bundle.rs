@@ -7,6 +7,7 @@ use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
 use actq::data::NpzWriter;
+use actq::text::count;
 use actq_deploy::description::Description;
 use actq_deploy::{Answers, Bundle, DESCRIPTION, Deployment, Plan, Raw, Reading, Reference, explain, read};
 use anyhow::{Context as _, Result, bail, ensure};
@@ -79,8 +80,10 @@ pub(crate) fn check_kept(bundle: &Path, policy: &Path, args: &ReadingArgs) -> Re
 fn read_answers(args: &ReadingArgs) -> Result<Answers> {
     match &args.answers {
         Some(path) => {
-            let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
-            Ok(Answers::parse(&text).with_context(|| path.display().to_string())?)
+            let name = path.display();
+            let form = "pass a TOML file of lines KEY = VALUE to --answers";
+            let text = fs::read_to_string(path).with_context(|| format!("{name}: cannot read the answers; {form}"))?;
+            Ok(Answers::parse(&text).with_context(|| format!("{name}: is not TOML; {form}"))?)
         }
         None => Ok(Answers::default()),
     }
@@ -115,10 +118,10 @@ pub fn refuse_open_questions(reading: &Reading) -> Result<()> {
         n => format!("pass --accept-profile to accept what the deploy code says to {n} of them; "),
     };
     bail!(
-        "the bundle (family {}) leaves {} questions open; {accept}write answers to a file as KEY = VALUE, and pass it to --answers, or \
+        "the bundle (family {}) leaves {} open; {accept}write answers to a file as KEY = VALUE, and pass it to --answers, or \
          pass --ask. Nothing was written",
         reading.family,
-        questions.len()
+        count(questions.len(), "question")
     )
 }
 
@@ -156,7 +159,8 @@ impl Gathered {
         let inputs: Vec<PathBuf> = copies.keys().map(|file| bundle.path(file)).collect::<actq::error::Result<_>>()?;
         let mut files = vec![(DESCRIPTION.to_owned(), description.to_toml(&reading.sources)?.into_bytes())];
         for (name, path) in copies.into_values().zip(&inputs) {
-            files.push((name, fs::read(path).with_context(|| path.display().to_string())?));
+            let content = fs::read(path).with_context(|| format!("{}: cannot read the file", path.display()))?;
+            files.push((name, content));
         }
         Ok(Self { files, inputs })
     }

@@ -2,6 +2,7 @@
 
 use actq::error::Error;
 use actq::runtime::{ImageBuffer, with_head};
+use actq::text::count;
 use actq_deploy::Reference;
 use actq_kernels::{Port, PortKind};
 use anyhow::{Context as _, Result, ensure};
@@ -31,8 +32,10 @@ pub(crate) fn run(args: &CheckArgs) -> Result<()> {
     let (rows, len) = expected.rows()?;
     ensure!(
         rows == frames.len() && len == image.act_len(),
-        "{}: \"target\" has {rows} ticks of {len} values; the image gives {} of {}",
+        "{}: \"target\" has {} of {}; the image gives {} of {}",
         expect.display(),
+        count(rows, "tick"),
+        count(len, "value"),
         frames.len(),
         image.act_len()
     );

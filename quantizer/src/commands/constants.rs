@@ -36,12 +36,13 @@ pub(crate) fn run(args: &ConstantsArgs) -> Result<()> {
 
 /// Reads a description that has gains.
 fn described(path: &Path) -> Result<Description> {
-    let read = || -> Result<Description> {
-        let description = Description::parse(&fs::read_to_string(path)?)?;
-        let gains = description.gains.as_ref().context("it has no [gains]")?;
-        let all = gains.stiffness.iter().chain(&gains.damping);
-        ensure!(all.clone().all(|gain| (*gain as f32).is_finite()), "[gains]: a gain is outside f32");
-        Ok(description)
-    };
-    read().with_context(|| path.display().to_string())
+    let name = path.display();
+    let form = "pass the deploy.toml of the policy to --gains";
+    let text = fs::read_to_string(path).with_context(|| format!("{name}: cannot read the gains; {form}"))?;
+    let description = Description::parse(&text).with_context(|| format!("{name}: is not a description; {form}"))?;
+    let gains = description.gains.as_ref();
+    let gains = gains.with_context(|| format!("{name}: it has no table [gains]; add it, or remove --gains"))?;
+    let mut all = gains.stiffness.iter().chain(&gains.damping);
+    ensure!(all.all(|gain| (*gain as f32).is_finite()), "{name}: [gains]: a gain is outside f32; correct it");
+    Ok(description)
 }

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use actq::data::{Dataset, Sizes};
 use actq::runtime::ImageBuffer;
+use actq::text::count;
 use actq_client::client::Client;
 use actq_client::connection::Connection;
 use actq_client::keys::Signed;
@@ -119,9 +120,9 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     latencies.sort_by(f64::total_cmp);
     let at = |share: f64| latencies.get((share * latencies.len() as f64) as usize).map_or(f64::NAN, |s| s * 1e3);
     print(&format!(
-        "{} observations, {} actions; from observation to action {:.1} ms in the median, {:.1} ms at the 99th percentile\n",
-        log.rows().len(),
-        latencies.len(),
+        "{}, {}; from observation to action {:.1} ms in the median, {:.1} ms at the 99th percentile\n",
+        count(log.rows().len(), "observation"),
+        count(latencies.len(), "action"),
         at(0.5),
         at(0.99)
     ))?;
@@ -151,9 +152,9 @@ fn run_push(args: &PushArgs) -> Result<()> {
 
 /// Reads and checks an image's version and signature from a signature file.
 fn read_signature(path: &Path, image: &[u8]) -> Result<(u32, [u8; 64])> {
-    let name = || path.display().to_string();
-    let text = std::fs::read_to_string(path).with_context(name)?;
-    let signed: Signed =
-        serde_json::from_str(&text).context("not a signature file; create one by actq sign").with_context(name)?;
-    Ok((signed.version, signed.check(image).with_context(name)?))
+    let name = path.display();
+    let form = "pass a file that `actq sign` wrote to --signature";
+    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot read the signature; {form}"))?;
+    let signed: Signed = serde_json::from_str(&text).with_context(|| format!("{name}: is not a signature; {form}"))?;
+    Ok((signed.version, signed.check(image).with_context(|| name.to_string())?))
 }

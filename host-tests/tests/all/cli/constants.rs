@@ -97,9 +97,10 @@ fn constants_are_refused_for_other_languages_and_without_gains() -> Result<()> {
     let path = |name: &str| text(&dir.path().join(name));
     fs::write(dir.path().join("made.actq"), four_bits(&Made::deployment()?.1.policy)?)?;
     fs::write(dir.path().join("deploy.toml"), GAINS.replace("gains = {", "constants = {} # {"))?;
-    for (out, gains, message) in
-        [("made.py", None, "ends in .rs for Rust, or in .h"), ("made.h", Some("deploy.toml"), "it has no [gains]")]
-    {
+    for (out, gains, message) in [
+        ("made.py", None, "ends in .rs for Rust, or in .h"),
+        ("made.h", Some("deploy.toml"), "it has no table [gains]; add it"),
+    ] {
         let (image, out) = (path("made.actq"), path(out));
         let gains = gains.map(path);
         let gains: Vec<&str> = gains.iter().flat_map(|gains| ["--gains", gains]).collect();
