@@ -21,6 +21,7 @@ pub(crate) use dataset::mean_and_variance;
 pub use dataset::{Dataset, Sizes};
 pub use joined::{Learned, MOST_FRAMES, Share, joined, longest_piece};
 pub use npy::npy_header;
+pub(crate) use origin::is_link_log;
 pub use origin::{CRC32, driven_by};
 pub use range::{Outside, Range, runs};
 pub use recording::{Recording, Recordings, files_of};

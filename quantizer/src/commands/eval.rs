@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use actq::data::{Range, Recording, Sizes, files_of};
+use actq::data::{Range, Recording, Sizes, driven_by, files_of};
 use actq::measure::{eval, own};
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
+use actq::text::count;
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, ensure};
 
@@ -30,6 +31,14 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
     let dataset = eval::heldout_from(policy, args.heldout.as_deref(), source.as_ref(), &image)?;
     let report = eval::evaluate(image, &dataset)?;
     let own = (!driven.is_empty()).then(|| own::own_path(image, &driven, source.as_ref())).transpose()?;
+    for file in &driven {
+        if driven_by(file)?.is_none() {
+            note([format!(
+                "{}: the file names no image, so it may be the rollout of another policy; actq serve --record names the image",
+                file.display()
+            )]);
+        }
+    }
     match Recording::Calib.load(policy, None, Sizes::of_image(&image)) {
         Ok(calib) => note(calib.and_then(|calib| Range::of(&calib).warning(&dataset))),
         Err(error) => note([format!("cannot check the range of the observations: {error:#}")]),
@@ -44,7 +53,8 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
         return print(&format!("{json}\n"));
     }
     let own = own.map_or(String::new(), |own| {
-        format!("own path       {:.3e}   ({} observations from the image's own rollouts)\n", own.nmse, own.steps)
+        let steps = count(own.steps, "observation");
+        format!("own path       {:.3e}   ({steps} from the image's own rollouts)\n", own.nmse)
     });
     print(&format!(
         "observations   {}\n\

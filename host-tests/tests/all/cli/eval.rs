@@ -1,14 +1,16 @@
 //! `actq eval`: its figures, and the recordings that it accepts.
 
-use std::fs;
+use std::fs::{self, File};
+use std::path::Path;
 
+use actq::data::NpzWriter;
 use actq_bench::command::{actq, failed, run, succeeded};
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
 use serde_json::{Value, json};
 
 use super::fixture::{
-    ACT, CHUNK, EPISODES, Fixture, OBS, STEPS, draw_observations, edit, text, write_npy, write_recording,
+    ACT, CHUNK, EPISODES, Fixture, OBS, STEPS, draw_observations, edit, notes, text, write_npy, write_recording,
 };
 
 #[test]
@@ -87,4 +89,27 @@ fn eval_labels_a_named_recording_by_its_policy() -> Result<()> {
     fs::write(&file, "{broken")?;
     failed(&eval(&["--policy", &policy])?, 1, &["policy.json"])?;
     failed(&eval(&["--policy", &text(&fixture.out("none"))])?, 1, &["there is no such folder"])
+}
+
+/// A recording shows by the image's checksum which image it is a rollout of, if it shows it at all.
+#[test]
+fn recordings_of_no_rollout_are_refused_or_noted() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let (image, policy) = (text(&fixture.image("--bits 4")?), text(&fixture.policy()));
+    let eval = |driven: &Path| run(actq(&["eval", &image, "--policy", &policy, "--driven", &text(driven)]), b"");
+    for (name, array, shape, message) in [
+        ("two.npz", "crc32", &[2][..], "two.npz: array \"crc32\" is not one int64, the CRC-32 of an image"),
+        ("log.npz", "applied", &[EPISODES * STEPS], "log.npz: is a log of actq link stream"),
+    ] {
+        let path = fixture.out(name);
+        let mut npz = NpzWriter::new(File::create(&path)?);
+        let obs = draw_observations(6, OBS);
+        npz.array("obs", &[EPISODES * STEPS, OBS], obs.iter().copied())?;
+        npz.array(array, shape, (0..shape[0]).map(|_| 1i64))?;
+        npz.finish()?;
+        failed(&eval(&path)?, 1, &[message])?;
+    }
+    let notes = notes(&eval(&fixture.policy().join("calib.npz"))?)?;
+    ensure!(notes.iter().any(|note| note.contains("calib.npz: the file names no image")), "{notes:?}");
+    Ok(())
 }

@@ -9,12 +9,32 @@ use crate::import::values::Values;
 /// Name of the array that holds the image's CRC-32: one integer.
 pub const CRC32: &str = "crc32";
 
+/// Name of an array that only the log of `actq link stream` has.
+const APPLIED: &str = "applied";
+
 /// Reads the CRC-32 of the image whose rollout a recording is; `None` if it names none.
+///
+/// # Errors
+///
+/// If the file cannot be read, or its array is not one CRC-32.
 pub fn driven_by(path: &Path) -> Result<Option<u32>> {
-    let array = one(path, CRC32).with_context(|| path.display().to_string())?;
-    let number = array.and_then(|array| match array.values {
-        Values::I64(values) if values.len() == 1 => Some(values[0]),
-        _ => None,
-    });
-    Ok(number.and_then(|number| u32::try_from(number).ok()))
+    let read = || -> Result<Option<u32>> {
+        let Some(array) = one(path, CRC32)? else { return Ok(None) };
+        let number = match &array.values {
+            Values::I64(values) if values.len() == 1 => u32::try_from(values[0]).ok(),
+            _ => None,
+        };
+        let number = number.with_context(|| {
+            format!(
+                "array {CRC32:?} is not one int64, the CRC-32 of an image; record the image with actq serve --record"
+            )
+        })?;
+        Ok(Some(number))
+    };
+    read().with_context(|| path.display().to_string())
+}
+
+/// Returns `true` for a log of `actq link stream`: its observations are those of a recording, not the image's own path.
+pub(crate) fn is_link_log(path: &Path) -> Result<bool> {
+    Ok(one(path, APPLIED).with_context(|| path.display().to_string())?.is_some())
 }

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use actq_kernels::Image;
 
 use super::eval::{ErrorReport, evaluate, fill_actions};
-use crate::data::{Dataset, Sizes, driven_by, joined};
+use crate::data::{Dataset, Sizes, driven_by, is_link_log, joined};
 use crate::error::{Result, ensure};
 use crate::policy::Policy;
 
 /// Returns the error of `image` on recordings of its own rollouts, in `files` (`actq serve --record`). Recordings of
-/// another image are refused; those that name no image are accepted. If actions are missing, `source` gives them: the
-/// policy that the image was made from.
+/// another image and logs of `actq link stream` are refused; other recordings that name no image are accepted. If
+/// actions are missing, `source` gives them: the policy that the image was made from.
 pub fn own_path(image: Image<'_>, files: &[PathBuf], source: Option<&Policy>) -> Result<ErrorReport> {
     let load = |file: &PathBuf| -> Result<Dataset> {
         let name = file.display();
@@ -23,6 +23,10 @@ pub fn own_path(image: Image<'_>, files: &[PathBuf], source: Option<&Policy>) ->
                  actq serve --record"
             );
         }
+        ensure!(
+            !is_link_log(file)?,
+            "{name}: is a log of actq link stream, whose observations this image did not lead to; record it with actq serve --record"
+        );
         let mut dataset = Dataset::load(file, Sizes::of_image(&image))?;
         fill_actions(&mut dataset, source)?;
         Ok(dataset)
