@@ -5,6 +5,7 @@ mod constants;
 mod eval;
 mod export_c;
 mod fixture;
+mod inputs;
 mod inspect;
 mod interrupts;
 mod jobs;

@@ -3,7 +3,7 @@
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use actq::methods::{Effort, Method};
 use actq::runtime::ImageBuffer;
@@ -32,6 +32,10 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
         "give --recordings: what the policy observes on its task. `actq import` and `actq quantize --method rtn` make a first image; \
          run it on the robot or in simulation by `actq serve IMAGE --record FILE`, and pass FILE"
     );
+    if let Some(board) = &args.board {
+        check_board(board)?;
+    }
+    let made_with = made_with(args)?;
     let policy = args.out.join(POLICY);
     let raw = args.reading.reference.as_ref().map(|(raw, _)| raw.clone());
     step(1, "import")?;
@@ -60,7 +64,6 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
 
     step(2, "quantize")?;
     let image = args.out.join(IMAGE);
-    let made_with = made_with(args)?;
     if is_made(&image, &policy, &args.out.join(MADE_WITH), &made_with) {
         print(&format!("{}: made before with the same options\n", image.display()))?;
     } else {
@@ -85,7 +88,9 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
 }
 
 fn has_gains(description: &Path) -> Result<bool> {
-    Ok(Description::parse(&fs::read_to_string(description)?)?.gains.is_some())
+    let read = || -> Result<Description> { Ok(Description::parse(&fs::read_to_string(description)?)?) };
+    let description = read().with_context(|| format!("{}: cannot read the description", description.display()))?;
+    Ok(description.gains.is_some())
 }
 
 fn step(number: usize, what: &str) -> Result<()> {
@@ -121,7 +126,7 @@ fn made_with(args: &DeployArgs) -> Result<String> {
         args.recordings.iter().collect::<Vec<_>>()
     };
     for file in actq::data::files_of(&files.into_iter().cloned().collect::<Vec<PathBuf>>())? {
-        let bytes = fs::read(&file).with_context(|| file.display().to_string())?;
+        let bytes = fs::read(&file).with_context(|| format!("{}: cannot read the file", file.display()))?;
         text += &format!("{} {:08x}\n", file.display(), actq_kernels::image::checksum(&bytes));
     }
     Ok(text)
@@ -137,11 +142,36 @@ fn is_made(image: &Path, policy: &Path, record: &Path, made_with: &str) -> bool 
     same && matches!((digest(), load(policy)), (Ok(digest), Ok(policy)) if policy.digest == digest)
 }
 
+/// Returns the checkout of actq that the present folder is in, whose own command builds firmware.
+fn checkout() -> Result<Option<PathBuf>> {
+    let here = env::current_dir().context("cannot find the current folder")?;
+    let root = here.ancestors().find(|folder| folder.join("tools/xtask/Cargo.toml").is_file());
+    Ok(root.map(Path::to_owned))
+}
+
+/// Refuses a board that the checkout has no firmware for. Outside a checkout no firmware is built.
+fn check_board(board: &str) -> Result<()> {
+    let Some(root) = checkout()? else { return Ok(()) };
+    let list = Command::new("cargo")
+        .current_dir(root)
+        .args(["xtask", "firmware", "--list"])
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cannot start cargo, which builds the firmware")?;
+    ensure!(
+        list.status.success(),
+        "cannot list the boards by `cargo xtask firmware --list`; remove --board, or repair it"
+    );
+    let list = String::from_utf8_lossy(&list.stdout);
+    let boards: Vec<&str> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    ensure!(boards.contains(&board), "--board {board}: there is no such board; use one of {}", boards.join(", "));
+    Ok(())
+}
+
 /// Builds the firmware by the workspace's own command, which only a checkout has.
 fn firmware(board: &str, image: &Path, elf: &Path) -> Result<()> {
-    let here = env::current_dir().context("cannot find the current folder")?;
     let image = fs::canonicalize(image).with_context(|| image.display().to_string())?;
-    let Some(root) = here.ancestors().find(|folder| folder.join("tools/xtask/Cargo.toml").is_file()) else {
+    let Some(root) = checkout()? else {
         note([format!(
             "firmware is built in a checkout of actq: cargo xtask firmware --board {board} --image {} --out {board}.elf",
             image.display()

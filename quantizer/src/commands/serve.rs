@@ -18,13 +18,18 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let (input, output) = (io::stdin().lock(), io::stdout().lock());
+    // The variable is set for every command of a rollout.
+    let is_option =
+        args.policy.as_ref().is_some_and(|policy| env::var_os("ACTQ_POLICY").is_none_or(|of| of != **policy));
     let Some(path) = &args.record else {
-        // The variable is set for every command of a rollout.
-        let is_option =
-            args.policy.as_ref().is_some_and(|policy| env::var_os("ACTQ_POLICY").is_none_or(|of| of != **policy));
         ensure!(!is_option, "--policy labels the recording of --record FILE.npz; add that, or remove --policy");
         return serve(image, input, output, |_| {});
     };
+    ensure!(
+        !is_option || !image.has_around(),
+        "--policy labels recordings, but {} takes raw inputs, whose recordings have no labels; remove --policy",
+        args.image.display()
+    );
     // An action of raw values has no label: `actq quantize` makes the networks' observations of them. Neither has one from
     // noise: whoever reads the recording draws noise, and labels the observations with it.
     let is_labelled = !image.has_around() && image.noise_len() == 0;

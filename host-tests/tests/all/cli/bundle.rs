@@ -16,7 +16,7 @@ use super::fixture::text;
 mod onnx;
 
 /// A robot of two joints whose motors are in the other order, and a history of two frames.
-const YAML: &str = "
+pub(super) const YAML: &str = "
 joint_ids_map: [1, 0]
 step_dt: 0.01
 stiffness: [10.0, 20.0]
@@ -30,12 +30,12 @@ observations:
 ";
 const TICKS: usize = 12;
 
-struct Robot {
+pub(super) struct Robot {
     dir: TempDir,
 }
 
 impl Robot {
-    fn new(yaml: &str) -> Result<Self> {
+    pub(super) fn new(yaml: &str) -> Result<Self> {
         let robot = Self { dir: TempDir::new()? };
         fs::create_dir(robot.path("bundle"))?;
         fs::write(robot.path("bundle/deploy.yaml"), yaml)?;
@@ -47,12 +47,12 @@ impl Robot {
         Ok(robot)
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub(super) fn path(&self, name: &str) -> PathBuf {
         self.dir.path().join(name)
     }
 
     /// Returns the command with the bundle, a folder to write and more arguments.
-    fn import(&self, out: &str, more: &[&str]) -> Command {
+    pub(super) fn import(&self, out: &str, more: &[&str]) -> Command {
         let (bundle, out) = (text(&self.path("bundle")), text(&self.path(out)));
         actq(&[&["import", &bundle, "--out", &out], more].concat())
     }
@@ -181,7 +181,7 @@ fn a_bundle_becomes_a_description_and_an_image() -> Result<()> {
 }
 
 /// Writes a recording of raw values; returns its path.
-fn recording(robot: &Robot) -> Result<String> {
+pub(super) fn recording(robot: &Robot) -> Result<String> {
     let path = text(&robot.path("recording.npz"));
     let mut npz = NpzWriter::new(File::create(&path)?);
     npz.array("obs", &[2, 120, 2], (0..480).map(|i| (0.3 * i as f32).sin()))?;
