@@ -42,6 +42,11 @@ impl Arrays {
         Self { names, known: NAMES.into_iter().filter_map(|name| Some((name, arrays.remove(name)?))).collect() }
     }
 
+    /// Returns `true` if the file has an array of this name.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.names.iter().any(|of| of == name)
+    }
+
     pub(super) fn take(&mut self, name: &str) -> Option<Tensor> {
         self.known.remove(name)
     }

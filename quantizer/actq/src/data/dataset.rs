@@ -10,6 +10,7 @@ use actq_kernels::ops::noise::normal;
 use ndarray::{Array2, Array3, ArrayView1, Axis, concatenate, s};
 
 use super::arrays::{Arrays, floats};
+use super::origin::APPLIED;
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::{Evaluator, Graph};
 use crate::import::values::{Tensor, Values};
@@ -107,8 +108,9 @@ impl Dataset {
             Ok(())
         };
         beside_obs(&noise, "noise", sizes.noise, "the policy's initial noise")?;
-        // Actions from unknown noise cannot be compared.
-        let action = arrays.take("action").filter(|_| sizes.noise == 0 || noise.is_some());
+        // Actions from unknown noise cannot be compared, nor those of a controller, which are not the policy's.
+        let comparable = !arrays.has(APPLIED) && (sizes.noise == 0 || noise.is_some());
+        let action = arrays.take("action").filter(|_| comparable);
         beside_obs(&action, "action", sizes.out, "the network's raw output")?;
         let state = arrays.take("state");
         if let Some(state) = &state {

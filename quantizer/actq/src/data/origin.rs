@@ -10,7 +10,7 @@ use crate::import::values::Values;
 pub const CRC32: &str = "crc32";
 
 /// Name of an array that only the log of `actq link stream` has.
-const APPLIED: &str = "applied";
+pub(super) const APPLIED: &str = "applied";
 
 /// Reads the CRC-32 of the image whose rollout a recording is; `None` if it names none.
 ///

@@ -485,3 +485,16 @@ fn arrays_in_memory_are_checked_as_those_of_files() {
         assert!(error.starts_with(expected), "{error}");
     }
 }
+
+#[test]
+fn actions_of_a_controller_are_not_those_of_the_policy() {
+    let array = |width: usize| Tensor { shape: vec![4, width], values: Values::F32(vec![0.5; 4 * width]) };
+    let recording = [("obs", array(SIZES.obs)), ("action", array(SIZES.out))];
+    let log = recording.iter().cloned().chain([("applied", array(1))]);
+    let has_actions = |arrays: &[(&str, Tensor)]| {
+        let named = arrays.iter().map(|(name, array)| ((*name).to_owned(), array.clone())).collect();
+        Dataset::of_arrays(Path::new("given"), named, SIZES).expect("a recording").action.is_some()
+    };
+    assert!(has_actions(&recording));
+    assert!(!has_actions(&log.collect::<Vec<_>>()));
+}
