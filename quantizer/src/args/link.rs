@@ -37,7 +37,7 @@ pub(crate) enum LinkCommand {
         #[command(flatten)]
         of: GetArgs,
         /// The value
-        #[arg(allow_negative_numbers = true)]
+        #[arg(allow_negative_numbers = true, value_parser = super::values::finite)]
         value: f32,
     },
     /// Send a recording's observations at their rate

@@ -65,6 +65,11 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "use a number above 0".to_owned())
 }
 
+pub(super) fn finite(text: &str) -> Result<f32, String> {
+    let number = text.parse().ok().filter(|x: &f32| x.is_finite());
+    number.ok_or_else(|| "use a finite number".to_owned())
+}
+
 /// Reads an effort by its name.
 pub(super) fn effort(text: &str) -> Result<Effort, String> {
     let found = Effort::ALL.into_iter().find(|(name, _)| *name == text);

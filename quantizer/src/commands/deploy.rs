@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use actq::data::files_of;
 use actq::methods::{Effort, Method};
 use actq::runtime::ImageBuffer;
 use actq_deploy::DESCRIPTION;
@@ -120,12 +121,11 @@ fn quantization(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs 
 /// Returns what an image depends on beside the policy, as text.
 fn made_with(args: &DeployArgs) -> Result<String> {
     let mut text = format!("{:?}, {:?}, seed {}\n", args.budget, args.learn, args.run.seed);
-    let files = if args.recordings.is_empty() {
-        args.reading.reference.iter().map(|(raw, _)| raw).collect()
-    } else {
-        args.recordings.iter().collect::<Vec<_>>()
+    let files = match args.recordings.is_empty() {
+        true => args.reading.reference.iter().map(|(raw, _)| raw.clone()).collect(),
+        false => files_of(&args.recordings)?,
     };
-    for file in actq::data::files_of(&files.into_iter().cloned().collect::<Vec<PathBuf>>())? {
+    for file in files {
         let bytes = fs::read(&file).with_context(|| format!("{}: cannot read the file", file.display()))?;
         text += &format!("{} {:08x}\n", file.display(), actq_kernels::image::checksum(&bytes));
     }

@@ -155,6 +155,14 @@ fn long_work_can_be_quiet() -> Result<()> {
 }
 
 #[test]
+fn a_parameter_is_set_to_a_finite_number() -> Result<()> {
+    all(["nan", "inf", "1e40"].map(|value| {
+        let output = run(actq(&["link", "set", "nowhere", "deadline", value]), b"");
+        (value.to_owned(), output.and_then(|output| failed(&output, 2, &["use a finite number"])))
+    }))
+}
+
+#[test]
 fn a_misspelt_option_gets_a_suggestion() -> Result<()> {
     let lines: [(&[&str], &str); 5] = [
         (&["quantize", "x", "--bwp", "2"], "--bpw"),

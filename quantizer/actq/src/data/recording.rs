@@ -1,5 +1,6 @@
 //! The recordings of a policy.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -73,7 +74,8 @@ impl Recording {
     }
 }
 
-/// Returns the recordings that are `named`: files, and every .npz, .npy and .safetensors in named folders, by name.
+/// Returns the recordings that are `named`: files, and every .npz, .npy and .safetensors in named folders, by name. A file
+/// that is named twice is refused.
 pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in named {
@@ -88,6 +90,11 @@ pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
         ensure!(!found.is_empty(), "{}: the folder holds no recording (.npz, .npy or .safetensors)", path.display());
         found.sort();
         files.append(&mut found);
+    }
+    let mut known = BTreeSet::new();
+    for file in &files {
+        let is_new = known.insert(fs::canonicalize(file).unwrap_or_else(|_| file.clone()));
+        ensure!(is_new, "{}: the recording is named twice and would count twice; name it once", file.display());
     }
     Ok(files)
 }

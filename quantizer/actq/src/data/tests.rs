@@ -316,8 +316,11 @@ fn folders_expand_to_their_recordings() {
         .into();
     fs::write(drives.join("notes.txt"), "").expect("a file");
     fs::create_dir(drives.join("old.npz")).expect("a folder");
-    let found = files_of(&[other.clone(), drives]).expect("four");
+    let found = files_of(&[other.clone(), drives.clone()]).expect("four");
     assert_eq!(found, [vec![other], expected].concat());
+    let twice = drives.join("../drives/2.npz");
+    let error = files_of(&[drives, twice.clone()]).expect_err("one is named twice").to_string();
+    assert_eq!(error, format!("{}: the recording is named twice and would count twice; name it once", twice.display()));
 }
 
 #[test]
