@@ -8,6 +8,8 @@ use actq_link::code::Parameter;
 use anyhow::{Result, ensure};
 use clap::{Subcommand, ValueEnum};
 
+use super::values::finite;
+
 #[derive(clap::Args)]
 pub(crate) struct LinkArgs {
     #[command(subcommand)]
@@ -37,7 +39,7 @@ pub(crate) enum LinkCommand {
         #[command(flatten)]
         of: GetArgs,
         /// The value
-        #[arg(allow_negative_numbers = true, value_parser = super::values::finite)]
+        #[arg(allow_negative_numbers = true, value_parser = finite)]
         value: f32,
     },
     /// Send a recording's observations at their rate

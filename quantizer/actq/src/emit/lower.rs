@@ -13,7 +13,7 @@ use crate::around::{Around, OUTPUT};
 use crate::error::{Result, ensure};
 use crate::graph::ValueId;
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, Step, StepData};
-use crate::graph::steps::{lower as nodes, readers};
+use crate::graph::steps::{lower_nodes, readers};
 use crate::policy::Policy;
 
 /// The arena and the operations in it.
@@ -57,7 +57,7 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
     let kept = kept_words([act_len, policy.chunk, policy.execute], horizon, contract.playback.overlap);
     let kept_len = kept + if contract.binarise.is_some() { act_len } else { 0 };
     let Some(denoising) = &graph.denoising else {
-        nodes(&graph.nodes, &mut lowering);
+        lower_nodes(&graph.nodes, &mut lowering);
         if let Some(around) = around {
             let output = lowering.place(graph.output());
             lowering.steps.extend(around.after.iter().map(|step| after(step, output)));
@@ -71,11 +71,11 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
     };
     let iterate = lowering.noise(graph.noise_len(), denoising.len);
     let (before, of_step) = graph.nodes.split_at(denoising.first);
-    nodes(before, &mut lowering);
+    lower_nodes(before, &mut lowering);
     let read: Vec<ValueId> =
         of_step.iter().flat_map(|node| node.inputs.iter().copied()).filter(|value| *value <= denoising.first).collect();
     let once = lowering.begin_steps(iterate, &read);
-    nodes(of_step, &mut lowering);
+    lower_nodes(of_step, &mut lowering);
     let mut constants = vec![denoising.limit, f32::from_bits(0)];
     constants.extend(denoising.steps.iter().flat_map(|step| step.to_array()));
     let (velocity, read_next) = (lowering.place(graph.output()), lowering.whole(lowering.iterate()));

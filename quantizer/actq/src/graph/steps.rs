@@ -14,7 +14,7 @@ pub fn readers(graph: &Graph) -> Vec<usize> {
 }
 
 /// Lowers nodes in order.
-pub fn lower(nodes: &[Node], lowering: &mut Lowering) {
+pub fn lower_nodes(nodes: &[Node], lowering: &mut Lowering) {
     for node in nodes {
         let place = node.kind.lower(lowering, &node.inputs, node.len);
         lowering.finish_node(place, &node.inputs);
@@ -25,7 +25,7 @@ pub fn lower(nodes: &[Node], lowering: &mut Lowering) {
 /// place of its output.
 pub fn operations(graph: &Graph) -> (Vec<Step<Slice>>, Vec<Buffer>, Slice) {
     let mut lowering = Lowering::new(graph.obs_len, readers(graph));
-    lower(&graph.nodes, &mut lowering);
+    lower_nodes(&graph.nodes, &mut lowering);
     let output = lowering.place(graph.output());
     (lowering.steps, lowering.buffers, output)
 }

@@ -135,13 +135,8 @@ impl Ties {
 
     /// Returns the places of the kept elements in a vector of this layout; `kept` has those of each group, ascending.
     pub fn places(&self, layout: &Layout, kept: &[Vec<usize>]) -> Vec<usize> {
-        let mut start = 0;
-        let mut places = Vec::new();
-        for &group in layout {
-            places.extend(kept[group].iter().map(|element| start + element));
-            start += self.lens[group];
-        }
-        places
+        let of_group = |(group, at): (usize, Range<usize>)| kept[group].iter().map(move |element| at.start + element);
+        spans(&self.lens, layout).flat_map(of_group).collect()
     }
 
     /// Returns the kept rows of a matrix, as [`Self::places`].
@@ -153,16 +148,7 @@ impl Ties {
 
     /// Returns the places of a group's elements in a vector of this layout, once for each time that it has them.
     pub fn ranges(&self, layout: &Layout, group: usize) -> Vec<Range<usize>> {
-        let mut start = 0;
-        let mut ranges = Vec::new();
-        for &of in layout {
-            let end = start + self.lens[of];
-            if of == group {
-                ranges.push(start..end);
-            }
-            start = end;
-        }
-        ranges
+        spans(&self.lens, layout).filter(|(of, _)| *of == group).map(|(_, at)| at).collect()
     }
 
     /// Returns all elements of every group.
@@ -171,20 +157,19 @@ impl Ties {
     }
 }
 
+/// Returns the groups of a layout with the places of their elements; `lens` has the elements of each group.
+fn spans<'a>(lens: &'a [usize], layout: &'a Layout) -> impl Iterator<Item = (usize, Range<usize>)> + use<'a> {
+    layout.iter().scan(0, |end, &group| {
+        let start = *end;
+        *end += lens[group];
+        Some((group, start..*end))
+    })
+}
+
 /// Returns the groups that make up a range of a vector; `None` if it begins or ends within one.
 fn whole_groups(found: &Found, layout: &Layout, part: &Range<usize>) -> Option<Layout> {
-    let mut start = 0;
-    let mut groups = Layout::new();
-    for &group in layout {
-        let end = start + found.lens[group];
-        match (start >= part.start && end <= part.end, end <= part.start || start >= part.end) {
-            (true, _) => groups.push(group),
-            (_, true) => {}
-            _ => return None,
-        }
-        start = end;
-    }
-    Some(groups)
+    let touched = spans(&found.lens, layout).filter(|(_, at)| at.end > part.start && at.start < part.end);
+    touched.map(|(group, at)| (at.start >= part.start && at.end <= part.end).then_some(group)).collect()
 }
 
 /// Numbers the groups that are left from 0 on.
@@ -203,7 +188,11 @@ fn resolved(found: &Found, values: Vec<Layout>, rows: Vec<Option<(usize, Layout)
 
 #[cfg(test)]
 mod tests {
+    use actq_kernels::math::Function;
+
     use super::*;
+    use crate::graph::WeightMatrix;
+    use crate::graph::ops::{Add, LayerNorm, Linear, Pointwise};
     use crate::testing::{branches, lstm, mlp, residual};
 
     #[test]
@@ -213,7 +202,9 @@ mod tests {
             let free: Vec<usize> = ties.free.iter().map(|&group| ties.lens[group]).collect();
             assert_eq!(free, [hidden]);
         }
-        assert_eq!(Ties::of(&lstm()).rows[0].0, 4, "an LSTM has four gates");
+        let ties = Ties::of(&lstm());
+        assert_eq!(ties.rows[0].0, 4, "an LSTM has four gates");
+        assert_eq!(ties.rows[1], ties.rows[0], "both matrices of a cell make its units");
     }
 
     #[test]
@@ -225,7 +216,33 @@ mod tests {
             let stream = &ties.values[1];
             assert!((1..graph.nodes.len()).all(|value| ties.values[value] == *stream));
             assert!(ties.cols[1..].iter().all(|cols| cols == stream));
+            assert!(ties.rows[..3].iter().all(|(parts, rows)| (*parts, rows) == (1, stream)));
         }
+    }
+
+    #[test]
+    fn vectors_inside_a_block_are_free_of_the_stream() {
+        let mut graph = Graph::new(3);
+        for (rows, cols) in [(6, 3), (5, 6), (6, 5), (2, 6)] {
+            let data = vec![0.1; rows * cols];
+            graph.add_matrix(WeightMatrix { name: "m".into(), rows, cols, data }).expect("a matrix");
+        }
+        let mut linear = |matrix: usize, rows: usize, input: usize| {
+            graph.add(Linear { matrix, bias: vec![0.0; rows] }, &[input]).expect("it fits")
+        };
+        let first = linear(0, 6, 0);
+        let inner = linear(1, 5, first);
+        let outer = linear(2, 6, inner);
+        let sum = graph.add(Add, &[outer, first]).expect("it fits");
+        let norm = LayerNorm { weight: vec![1.0; 6], bias: vec![0.0; 6], eps: 1e-5 };
+        let norm = graph.add(norm, &[sum]).expect("it fits");
+        let active = graph.add(Pointwise(Function::Relu), &[norm]).expect("it fits");
+        graph.add(Linear { matrix: 3, bias: vec![0.0; 2] }, &[active]).expect("it fits");
+        let ties = Ties::of(&graph);
+        assert_eq!(ties.free.len(), 2);
+        assert_eq!(ties.values[first], ties.values[norm]);
+        assert_eq!(ties.cols[3], ties.rows[0].1);
+        assert_ne!(ties.values[inner], ties.values[first]);
     }
 
     #[test]

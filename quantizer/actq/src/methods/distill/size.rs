@@ -10,7 +10,7 @@ use super::balance::balance_bytes;
 use super::dimension::{Dimension, Widths};
 use crate::graph::lowering::{Lowering, Slice, Step};
 use crate::graph::operation::{Operand, Product};
-use crate::graph::steps::{lower, readers};
+use crate::graph::steps::{lower_nodes, readers};
 use crate::graph::{Graph, NodeKind};
 use crate::methods::packing::Packing;
 
@@ -167,9 +167,9 @@ pub(super) fn cycles_of_elements(graph: &Graph) -> f64 {
     let mut lowering = Lowering::new(graph.obs_len, readers(graph));
     let first = graph.denoising.as_ref().map_or(graph.nodes.len(), |denoising| denoising.first);
     let (once, repeated) = graph.nodes.split_at(first);
-    lower(once, &mut lowering);
+    lower_nodes(once, &mut lowering);
     let before = lowering.steps.len();
-    lower(repeated, &mut lowering);
+    lower_nodes(repeated, &mut lowering);
     let of_step = |(i, step): (usize, &Step<Slice>)| {
         let runs = if i < before { 1 } else { graph.denoising_steps() as u64 };
         runs * cost::of_elements(step.kind, step.dst.len).cycles
