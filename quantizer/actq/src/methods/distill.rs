@@ -70,7 +70,7 @@ pub fn quantize(
     let goal = Goal { statistics, rate, options };
     let recipe = Recipe::new(Widening::of(windows.recurrent()));
     let mut choosing = |share, error| progress(Progress::Choosing { share, error });
-    let first = Candidate::new(goal, recipe.rounding)?;
+    let first = Candidate::new(goal, recipe)?;
     let (candidate, chosen) = if options.learns() && first.task(goal, recipe).is_rest_of(windows) {
         choose_recipe(goal, first, recipe, &mut choosing)
     } else {

@@ -13,23 +13,28 @@ pub struct Recipe {
     pub rate: f32,
     /// Factor on the expected error of rounding when widths are allocated. The higher, the fewer rows with more bits.
     pub rounding: f64,
+    /// Whether every hidden vector counts as much as any other when elements are removed.
+    pub even: bool,
 }
 
 impl Recipe {
     /// Returns the settings with this noise and no factors.
     pub fn new(widening: Widening) -> Self {
-        Self { widening, rate: 1.0, rounding: 1.0 }
+        Self { widening, rate: 1.0, rounding: 1.0, even: false }
     }
 }
 
 impl fmt::Display for Recipe {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { widening, rate, rounding } = self;
+        let Self { widening, rate, rounding, even } = self;
         write!(f, "{widening}")?;
         if *rate != 1.0 {
             write!(f, ", rate x{rate}")?;
         }
-        if *rounding != 1.0 { write!(f, ", rounding x{rounding}") } else { Ok(()) }
+        if *rounding != 1.0 {
+            write!(f, ", rounding x{rounding}")?;
+        }
+        if *even { f.write_str(", even layers") } else { Ok(()) }
     }
 }
 

@@ -20,13 +20,13 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Chooses the shape and removes what it lacks; `rounding` is that of [`shape`].
+    /// Chooses the shape and removes what it lacks.
     ///
     /// # Errors
     ///
     /// As [`shape`].
-    pub(super) fn new(goal: Goal<'_>, rounding: f64) -> Result<Self> {
-        let shape = shape(goal, rounding)?;
+    pub(super) fn new(goal: Goal<'_>, recipe: Recipe) -> Result<Self> {
+        let shape = shape(goal, recipe)?;
         let (cut, moments) = (&shape.cut, &goal.statistics.moments);
         let inputs =
             moments.iter().zip(&cut.columns).map(|((input, _), columns)| match columns.len() == input.mean.len() {

@@ -14,6 +14,7 @@ use crate::budget::Rate;
 use crate::calibrate::moments::Moments;
 use crate::error::Result;
 use crate::graph::{Graph, WeightMatrix};
+use crate::methods::learning::Recipe;
 use crate::methods::options::Options;
 
 /// A network to quantize, by its statistics, and its budget.
@@ -44,14 +45,15 @@ pub(super) struct Shape {
 const SHARES: [f64; 11] = [1.0, 0.875, 0.75, 0.625, 0.5, 0.4375, 0.375, 0.3125, 0.25, 0.1875, 0.125];
 
 /// Chooses the units, and the widths of all rows. Units are removed together where something is learned and no width is
-/// forced: of several shares of them, the one with the lowest expected error stays. `rounding`
-/// is a factor on the error that rounding is expected to cause.
-pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64) -> Result<Shape> {
+/// forced: of several shares of them, the one with the lowest expected error stays. The
+/// recipe says how errors are expected.
+pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, recipe: Recipe) -> Result<Shape> {
+    let Recipe { rounding, even, .. } = recipe;
     let RowStatistics { inputs, outputs, moments, .. } = statistics;
     let graph = statistics.graph();
     let (forced, allowed) = (forced(graph, rate, options), rate.bytes(graph.weights()));
     let of_inputs: Vec<&Moments> = moments.iter().map(|(input, _)| input).collect();
-    let removals = statistics.removals(options.learns());
+    let removals = statistics.removals(options.learns(), even);
     let of_elements = rate.cycles().map(|_| cycles_of_elements(graph));
     let of_cut = |cut: Cut| {
         let pick = |values: &[f64], of: &[usize]| of.iter().map(|&i| values[i]).collect::<Vec<f64>>();
@@ -71,12 +73,15 @@ pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, rounding: f64)
         let cycles = cycles.map(|_| Size { packings: packed(&limits, options), ..size }.cycles(&widths) - saved);
         Ok(Shape { cut, dimensions, rows, widths, limits, cycles })
     };
-    if !loses_units(options, &forced) || statistics.units().0.is_empty() {
+    if !loses_units(options, &forced) {
         return of_cut(Cut::nothing(graph));
     }
-    let (units, of_units) = statistics.units();
+    let (units, of_units) = statistics.units(even);
+    if units.is_empty() {
+        return of_cut(Cut::nothing(graph));
+    }
     let shapes: Vec<Result<Shape>> =
-        SHARES.par_iter().map(|share| of_cut(Cut::to(graph, units, of_units, *share, &of_inputs))).collect();
+        SHARES.par_iter().map(|share| of_cut(Cut::to(graph, units, &of_units, *share, &of_inputs))).collect();
     // The last error names the fewest bytes: those of the fewest units.
     let most = rate.cycles();
     let best = shapes.into_iter().reduce(|best, next| match (&best, &next) {

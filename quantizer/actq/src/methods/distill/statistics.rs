@@ -1,5 +1,6 @@
 //! Statistics of a network over the recorded observations, for any number of budgets.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -8,7 +9,7 @@ use nalgebra::DMatrix;
 
 use super::balance::{MixedUnits, balance, mixed_units};
 use super::dimension::{Dimension, dimensions};
-use super::removal::{Effect, Reading, in_place};
+use super::removal::{Effect, Reading, evened, in_place};
 use super::schedule::{Bounds, most_steps};
 use super::units::{Units, units};
 use crate::calibrate::allowance::Allowance;
@@ -101,21 +102,37 @@ impl RowStatistics {
     }
 
     /// Returns the error of each row of every matrix without bits; `None` for their energies. Without learning those of
-    /// single rows count: the gain of the others is small then, and small networks get more uneven errors.
-    pub(super) fn removals(&self, learns: bool) -> &[Option<Vec<f64>>] {
+    /// single rows count: the gain of the others is small then, and small networks get more uneven errors. If `even`, those
+    /// of rows that disappear are [`evened`].
+    pub(super) fn removals(&self, learns: bool, even: bool) -> Cow<'_, [Option<Vec<f64>>]> {
         let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
         let together = || removals(self.graph(), &of_inputs, &self.outputs, Effect::together);
-        if learns { self.together.get_or_init(together) } else { &self.alone }
+        let measured = if learns { self.together.get_or_init(together) } else { &self.alone };
+        if !even {
+            return measured.into();
+        }
+        let mut removals = measured.to_vec();
+        for Dimension { maker, .. } in dimensions(self.graph()) {
+            removals[maker] = measured[maker].as_ref().map(|of| evened(of, self.whole()));
+        }
+        removals.into()
     }
 
-    /// Returns the units that can only be removed whole, with the errors of their removal.
-    pub(super) fn units(&self) -> &(Vec<Units>, Vec<Vec<f64>>) {
-        self.units.get_or_init(|| {
+    /// Returns the units that can only be removed whole, with the errors of their removal, [`evened`] if asked for.
+    pub(super) fn units(&self, even: bool) -> (&[Units], Cow<'_, [Vec<f64>]>) {
+        let (units, removals) = self.units.get_or_init(|| {
             let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
             let units = units(self.graph(), &Ties::of(self.graph()));
             let removals = units.iter().map(|units| units.removals(self.graph(), &of_inputs, &self.outputs)).collect();
             (units, removals)
-        })
+        });
+        let evened = || removals.iter().map(|of| evened(of, self.whole())).collect();
+        (units, if even { Cow::Owned(evened()) } else { removals.into() })
+    }
+
+    /// Returns the error of a network that always gives the mean action.
+    fn whole(&self) -> f64 {
+        self.windows.output_variance.iter().filter(|variance| **variance > 0.0).count() as f64
     }
 
     /// Returns the most steps of distillation with these options.

@@ -1,9 +1,11 @@
 //! Chooses how to learn a network that has lost most of its weights, by short learning trials.
 //!
-//! Two things cannot be predicted. One is the learning rate, which may be several times as high for a small network as
-//! for a large one. The other is how much of the error of rounding such a network can learn to make up for. It decides
+//! Three things cannot be predicted. One is the learning rate, which may be several times as high for a small network as
+//! for a large one. Another is how much of the error of rounding such a network can learn to make up for. It decides
 //! between many rows of few bits and few rows of many: a factor on that error gives several shapes for one budget.
-//! First come the rates, then the shapes at the best rate. After a tenth of the steps their order is nearly that of the
+//! The third is which vectors lose most: measured errors of removal say little where nearly all elements go ([`evened`]).
+//! First come the rates, then the shapes at the best rate: by measured errors, and by evened ones with the best factor
+//! and its neighbours. After a tenth of the steps their order is nearly that of the
 //! end. All trials learn from all episodes, and their errors are those at the recorded observations: shapes of one
 //! budget overfit alike, and the differences on a quarter of the episodes are mostly chance. Higher rates are
 //! tried where less than a quarter of the weights is left: larger networks overfit more at them, which trials do not
@@ -11,6 +13,8 @@
 
 use super::candidate::Candidate;
 use super::choose::{Chosen, LEAST_STEPS, best, errors};
+#[cfg(doc)]
+use super::removal::evened;
 use super::schedule::Bounds;
 use super::shape::Goal;
 use super::train::{Present, Task, distill};
@@ -18,8 +22,11 @@ use crate::methods::learning::{Choice, Recipe, Tried};
 
 /// Factors on the learning rates. Of recurrent networks, the first: their rates hardly depend on the size.
 const RATES: [f32; 3] = [1.0, 4.0, 8.0];
-/// Factors on the error of rounding.
-const ROUNDINGS: [f64; 4] = [1.0, 4.0, 16.0, 64.0];
+/// Factors on the error of rounding, each times [`NEXT`].
+const ROUNDINGS: [f64; 4] = [1.0, NEXT, NEXT * NEXT, NEXT * NEXT * NEXT];
+const NEXT: f64 = 4.0;
+/// Most of these factors with evened errors.
+const EVEN: usize = 3;
 /// Divisor of the steps, and of the time, for a trial.
 const STEPS: usize = 10;
 const TIME: u32 = 20;
@@ -39,7 +46,7 @@ pub(super) fn choose_recipe(
     }
     let small = first.task(goal, recipe).is_small_beside(windows);
     let rates = if small && !windows.recurrent() { &RATES[..] } else { &RATES[..1] };
-    let most = (STEPS + rates.len() + ROUNDINGS.len() - 1) as f64;
+    let most = (STEPS + rates.len() + ROUNDINGS.len() - 1 + EVEN) as f64;
     let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
     let mut attempt = |candidate: &Candidate, recipe: Recipe, before: usize| {
         let task = Task { bounds, watched: None, ..candidate.task(goal, recipe) };
@@ -59,19 +66,25 @@ pub(super) fn choose_recipe(
     let recipe = chosen(&tried);
     let mut of_shapes: Vec<Tried> =
         tried.iter().filter(|tried| tried.choice == Choice::Learning(recipe)).copied().collect();
-    let mut candidates = vec![(ROUNDINGS[0], first)];
-    for &rounding in &ROUNDINGS[1..] {
-        // A shape that does not fit is none.
-        let Ok(candidate) = Candidate::new(goal, rounding) else { continue };
-        if candidates.iter().all(|(_, other)| !other.shape.is(&candidate.shape)) {
-            let of_shape = attempt(&candidate, Recipe { rounding, ..recipe }, tried.len());
-            tried.push(of_shape);
-            of_shapes.push(of_shape);
-            candidates.push((rounding, candidate));
+    let mut candidates = vec![(recipe, first)];
+    for even in [false, true] {
+        let Recipe { rounding: best, .. } = chosen(&of_shapes);
+        let near = [best / NEXT, best, NEXT * best];
+        let roundings = if even { &near[..] } else { &ROUNDINGS[1..] };
+        for &rounding in roundings.iter().filter(|rounding| **rounding >= ROUNDINGS[0]) {
+            let recipe = Recipe { rounding, even, ..recipe };
+            // A shape that does not fit is none.
+            let Ok(candidate) = Candidate::new(goal, recipe) else { continue };
+            if candidates.iter().all(|(_, other)| !other.shape.is(&candidate.shape)) {
+                let of_shape = attempt(&candidate, recipe, tried.len());
+                tried.push(of_shape);
+                of_shapes.push(of_shape);
+                candidates.push((recipe, candidate));
+            }
         }
     }
     let recipe = chosen(&of_shapes);
-    let index = candidates.iter().position(|(rounding, _)| *rounding == recipe.rounding).unwrap_or_default();
+    let index = candidates.iter().position(|(of, _)| *of == recipe).unwrap_or_default();
     let (_, candidate) = candidates.swap_remove(index);
     let share = tried.len() as f64 / (STEPS + tried.len()) as f64;
     let left = time.map(|time| time - time / TIME * tried.len() as u32);
@@ -90,7 +103,7 @@ mod tests {
 
     /// Learns the network within few bytes.
     fn learning(steps: usize) -> Learning {
-        let graph = layers(&[6, 48, 4]);
+        let graph = layers(&[6, 48, 32, 4]);
         let recording = dataset(&graph, 4, 60);
         let method = PreparedMethod::new(&graph, Method::Distill, Some(&recording), |_| {}).expect("statistics");
         let options = Options { steps: Some(steps), ..Options::new(Method::Distill, Budget::Width(Width::W2)) };
@@ -120,6 +133,10 @@ mod tests {
         );
         let Recipe { rate, .. } = recipe(best(&tried[..RATES.len()], false).expect("a best").choice);
         assert!(!of_shapes.is_empty() && of_shapes.iter().all(|recipe| recipe.rate == rate), "{of_shapes:?}");
+        let even = of_shapes.iter().position(|recipe| recipe.even).expect("evened errors are tried");
+        let (measured, evened) = of_shapes.split_at(even);
+        assert!(measured.iter().all(|of| ROUNDINGS[1..].contains(&of.rounding)), "{measured:?}");
+        assert!(evened.len() <= EVEN && evened.iter().all(|of| of.even), "{evened:?}");
         let at_rate: Vec<Tried> = tried.iter().filter(|tried| recipe(tried.choice).rate == rate).copied().collect();
         assert_eq!(best(&at_rate, false).map(|tried| tried.choice), Some(choice));
     }
@@ -127,7 +144,7 @@ mod tests {
     #[test]
     fn few_steps_skip_the_trials() {
         let Learning { choice, tried, .. } = learning(20);
-        let Recipe { rate, rounding, .. } = recipe(choice);
-        assert_eq!((rate, rounding, tried.len()), (1.0, 1.0, 0));
+        let Recipe { rate, rounding, even, .. } = recipe(choice);
+        assert_eq!((rate, rounding, even, tried.len()), (1.0, 1.0, false, 0));
     }
 }
