@@ -17,6 +17,8 @@ const CUT_MS: u64 = 800;
 /// Durations of a stall of the host's driver, ms. One is shorter than the deadline, but some held observations then
 /// exceed the allowed age; the other is longer than the deadline.
 const STALLS_MS: [u64; 2] = [280, 1200];
+/// Most control steps in which a reset board reports again.
+const RESET_STEPS: usize = 500;
 /// Bytes of an image to send while the arm moves, and bytes in a frame: QEMU's serial port is slow. The bytes before
 /// them are sent before the arm moves.
 const BYTES_IN_FLIGHT: usize = 8 << 10;
@@ -207,8 +209,11 @@ impl Rig {
             }
             Disturbance::Reset => {
                 self.controller.reset()?;
-                while self.resets == resets {
-                    meanwhile(self, 0)?;
+                // A board that does not come back fails the check of resets.
+                for _ in 0..RESET_STEPS {
+                    if self.resets == resets {
+                        meanwhile(self, 0)?;
+                    }
                 }
             }
             Disturbance::Update(image) => {
