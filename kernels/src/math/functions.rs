@@ -85,6 +85,33 @@ impl Function {
             Self::Mish => each(x, mish),
         }
     }
+
+    /// Applies the function to every element, as [`Function::apply`] does, in a loop of its own that is inlined: a caller that
+    /// is compiled for vectors gets a loop of vectors.
+    #[cfg(feature = "writer")]
+    #[inline(always)]
+    pub fn apply_inlined(self, x: &mut [f32]) {
+        match self {
+            Self::Relu => each_inlined(x, relu),
+            Self::Elu => each_inlined(x, elu),
+            Self::Silu => each_inlined(x, silu),
+            Self::Gelu => each_inlined(x, gelu),
+            Self::GeluTanh => each_inlined(x, gelu_tanh),
+            Self::Tanh => each_inlined(x, tanh),
+            Self::Sigmoid => each_inlined(x, sigmoid),
+            Self::Exp => each_inlined(x, exp),
+            Self::Sin => each_inlined(x, sin),
+            Self::Cos => each_inlined(x, cos),
+            Self::Softplus => each_inlined(x, softplus),
+            Self::Mish => each_inlined(x, mish),
+        }
+    }
+}
+
+#[cfg(feature = "writer")]
+#[inline(always)]
+fn each_inlined(x: &mut [f32], function: impl Fn(f32) -> f32) {
+    x.iter_mut().for_each(|x| *x = function(*x));
 }
 
 /// Applies a function in a loop of its own, which is not inlined: the functions take most of the executor's code.

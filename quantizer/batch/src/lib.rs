@@ -22,7 +22,6 @@
 
 mod batch;
 mod error;
-mod functions;
 mod linear;
 mod product;
 mod program;

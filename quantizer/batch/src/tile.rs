@@ -3,7 +3,6 @@
 use actq_kernels::{Head, StepError};
 use fearless_simd::{Level, Simd, dispatch};
 
-use crate::functions;
 use crate::linear::{Linear, Operands};
 use crate::product;
 use crate::program::Operation;
@@ -57,7 +56,7 @@ impl Tile<'_, '_> {
                     *error = head
                         .replace_op(|arena| {
                             let x = bytemuck::must_cast_slice_mut(&mut arena[region.range()]);
-                            dispatch!(level, simd => functions::apply(simd, *function, x));
+                            dispatch!(level, _simd => function.apply_inlined(x));
                             Ok(())
                         })
                         .err();

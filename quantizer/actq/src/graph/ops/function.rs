@@ -38,7 +38,7 @@ impl Operation for Pointwise {
             let row = contiguous_mut(&mut row);
             wide(
                 #[inline(always)]
-                || apply(self.0, row),
+                || self.0.apply_inlined(row),
             );
         }
         (y, Saved::default())
@@ -58,31 +58,6 @@ impl Operation for Pointwise {
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], _: usize) -> BufferId {
         to.in_place(inputs[0], OpKind::Function(self.0), StepData::None)
     }
-}
-
-/// Applies a function to every element, as [`Function::apply`] does, with a loop of its own for each, which the compiler
-/// can compile for wide vectors.
-#[inline(always)]
-fn apply(function: Function, x: &mut [f32]) {
-    match function {
-        Function::Relu => each(x, math::relu),
-        Function::Elu => each(x, math::elu),
-        Function::Silu => each(x, math::silu),
-        Function::Gelu => each(x, math::gelu),
-        Function::GeluTanh => each(x, math::gelu_tanh),
-        Function::Tanh => each(x, math::tanh),
-        Function::Sigmoid => each(x, math::sigmoid),
-        Function::Exp => each(x, math::exp),
-        Function::Sin => each(x, math::sin),
-        Function::Cos => each(x, math::cos),
-        Function::Softplus => each(x, math::softplus),
-        Function::Mish => each(x, math::mish),
-    }
-}
-
-#[inline(always)]
-fn each(x: &mut [f32], function: impl Fn(f32) -> f32) {
-    x.iter_mut().for_each(|x| *x = function(*x));
 }
 
 /// Multiplies `d` by the derivative of a function at `x` with the values `y`.
