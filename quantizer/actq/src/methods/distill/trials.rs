@@ -20,7 +20,8 @@ use super::shape::Goal;
 use super::train::{Present, Task, distill};
 use crate::methods::learning::{Choice, Recipe, Tried};
 
-/// Factors on the learning rates. Of recurrent networks, the first: their rates hardly depend on the size.
+/// Factors on the learning rates. Of recurrent networks, the first: their rates hardly depend on the size. Evened errors
+/// gave them the same shapes, or no better ones, and their trials take longest.
 const RATES: [f32; 3] = [1.0, 4.0, 8.0];
 /// Factors on the error of rounding, each times [`NEXT`].
 const ROUNDINGS: [f64; 4] = [1.0, NEXT, NEXT * NEXT, NEXT * NEXT * NEXT];
@@ -46,7 +47,8 @@ pub(super) fn choose_recipe(
     }
     let small = first.task(goal, recipe).is_small_beside(windows);
     let rates = if small && !windows.recurrent() { &RATES[..] } else { &RATES[..1] };
-    let most = (STEPS + rates.len() + ROUNDINGS.len() - 1 + EVEN) as f64;
+    let laws = if windows.recurrent() { &[false][..] } else { &[false, true] };
+    let most = (STEPS + rates.len() + ROUNDINGS.len() - 1 + (laws.len() - 1) * EVEN) as f64;
     let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
     let mut attempt = |candidate: &Candidate, recipe: Recipe, before: usize| {
         let task = Task { bounds, watched: None, ..candidate.task(goal, recipe) };
@@ -67,7 +69,7 @@ pub(super) fn choose_recipe(
     let mut of_shapes: Vec<Tried> =
         tried.iter().filter(|tried| tried.choice == Choice::Learning(recipe)).copied().collect();
     let mut candidates = vec![(recipe, first)];
-    for even in [false, true] {
+    for &even in laws {
         let Recipe { rounding: best, .. } = chosen(&of_shapes);
         let near = [best / NEXT, best, NEXT * best];
         let roundings = if even { &near[..] } else { &ROUNDINGS[1..] };
