@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::{Cursor, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use actq_boards::{Target, root, target_dir, version};
 use actq_cli::outputs;
@@ -76,12 +76,12 @@ impl Core {
         all
     }
 
-    /// Builds the library for this core with these features, and returns its path.
+    /// Builds the library for this core with these features, and reads it.
     ///
     /// # Errors
     ///
-    /// If cargo cannot build it.
-    fn library(self, features: &str) -> Result<PathBuf> {
+    /// If cargo cannot build it, or the file cannot be read.
+    fn library(self, features: &str) -> Result<Vec<u8>> {
         let profile = if self.target.is_some_and(Target::has_assembler) { "capi" } else { "capi-portable" };
         let mut arguments = vec!["rustc", "--quiet", "--package", "actq-capi", "--lib", "--crate-type", "staticlib"];
         let features = format!("panic-handler {features}");
@@ -91,8 +91,13 @@ impl Core {
             arguments.extend(["--target", target.triple()]);
             folder.push(target.triple());
         }
+        // The libraries of all features have one name: no other is built until this one has been read.
+        fs::create_dir_all(target_dir())?;
+        let lock = fs::File::create(target_dir().join("actq-capi.lock"))?;
+        lock.lock()?;
         cargo("the C interface", &arguments, &[])?;
-        Ok(folder.join(profile).join("libactq_c.a"))
+        let file = folder.join(profile).join("libactq_c.a");
+        fs::read(&file).with_context(|| file.display().to_string())
     }
 
     /// Writes the package to `out`: an archive if its name ends in `.zip`, otherwise a folder. Neither may exist before,
@@ -110,7 +115,7 @@ impl Core {
         let mut files = Files::default();
         let features =
             image.map_or_else(|| "default".to_owned(), |image| image.features().collect::<Vec<_>>().join(" "));
-        let library = fs::read(self.library(&features)?)?;
+        let library = self.library(&features)?;
         files.put("lib/libactq.a", &library);
         let capi = root().join("capi");
         for header in ["actq.h", "actq.hpp"] {

@@ -3,8 +3,10 @@
 use std::fs;
 use std::path::Path;
 
+use actq::runtime::ImageBuffer;
 use actq_bench::capi::Core;
-use actq_bench::{root, skipped};
+use actq_bench::{firmware, root, skipped};
+use actq_kernels::Image;
 use anyhow::{Context as _, Result, bail, ensure};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -49,6 +51,31 @@ fn check_common(package: &Path) -> Result<()> {
     ensure!(named.len() == 2, "{zephyr}");
     for path in named {
         exists(&format!("zephyr/{}", path.split(')').next().unwrap_or_default()))?;
+    }
+    Ok(())
+}
+
+/// Cargo gives the libraries of all features one name.
+#[test]
+fn packages_that_are_made_together_have_their_own_libraries() -> Result<()> {
+    let file = firmware::built_in()?;
+    let buffer = ImageBuffer::read(file)?;
+    let image = buffer.image(file)?;
+    let core = Core::of("cortex-m4f").context("a core")?;
+    let library = &|only: Option<&Image<'_>>| -> Result<Vec<u8>> {
+        let dir = TempDir::new()?;
+        core.package(dir.path(), only)?;
+        Ok(fs::read(dir.path().join("lib/libactq.a"))?)
+    };
+    let alone = [library(None)?, library(Some(&image))?];
+    ensure!(alone[0] != alone[1], "the features make no difference");
+    for _ in 0..3 {
+        let [any, this] = std::thread::scope(|scope| {
+            [None, Some(&image)]
+                .map(|only| scope.spawn(move || library(only)))
+                .map(|made| made.join().expect("no panic"))
+        });
+        ensure!([any?, this?] == alone, "a package has the other's library");
     }
     Ok(())
 }
