@@ -59,8 +59,8 @@ pub struct Counts {
 }
 
 impl<'a> Schedule<'a> {
-    /// Begins with the jobs of a checked plan ([`crate::order::check`]); `is_done` says which have results. A job is
-    /// tried at most `tries` times.
+    /// Begins with the jobs of a checked plan ([`crate::order::check`]); `is_done` says which have results, and is asked once
+    /// for each: another process may be writing some. A job is tried at most `tries` times.
     pub fn new(jobs: &'a [Job], is_done: impl Fn(&Job) -> bool, tries: usize) -> Self {
         let index: BTreeMap<&str, usize> = jobs.iter().enumerate().map(|(i, job)| (job.address.as_str(), i)).collect();
         let state: Vec<State> = jobs
@@ -71,7 +71,8 @@ impl<'a> Schedule<'a> {
         for (i, job) in jobs.iter().enumerate() {
             for dep in job.deps.iter().filter_map(|dep| index.get(dep.as_str())) {
                 schedule.dependents[*dep].push(i);
-                if let (State::Waiting { open, .. }, true) = (&mut schedule.state[i], !is_done(&jobs[*dep])) {
+                let is_open = schedule.state[*dep] != State::Done;
+                if let (State::Waiting { open, .. }, true) = (&mut schedule.state[i], is_open) {
                     *open += 1;
                 }
             }

@@ -1,5 +1,7 @@
 //! Specs, plans and stores that are refused.
 
+use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
@@ -168,4 +170,19 @@ fn failed_jobs_are_tried_again_or_skip_their_dependents() {
     assert_eq!(schedule.start(2), None);
     schedule.end(alone, Ended::Never);
     assert!(schedule.start(2).is_some());
+}
+
+/// Jobs of a sweep that was killed may still run, and write results while the next one begins.
+#[test]
+fn no_job_starts_before_all_that_it_needs_have_ended() {
+    let plan = jobs(&folder(SPEC)).expect("a plan");
+    let asked = RefCell::new(BTreeSet::new());
+    let mut schedule = Schedule::new(&plan, |job| !asked.borrow_mut().insert(job.address.clone()), 1);
+    let mut ended = BTreeSet::new();
+    while let Some(job) = schedule.start(1) {
+        assert!(plan[job].deps.iter().all(|dep| ended.contains(dep)), "{}", plan[job].title);
+        schedule.end(job, Ended::Done);
+        ended.insert(plan[job].address.clone());
+    }
+    assert_eq!(ended.len(), plan.len());
 }
