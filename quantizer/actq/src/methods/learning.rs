@@ -13,7 +13,7 @@ pub struct Recipe {
     pub rate: f32,
     /// Factor on the expected error of rounding when widths are allocated. The higher, the fewer rows with more bits.
     pub rounding: f64,
-    /// Whether every hidden vector counts as much as any other when elements are removed.
+    /// `true` if all hidden vectors count alike when elements are removed.
     pub even: bool,
 }
 
