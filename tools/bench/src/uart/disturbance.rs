@@ -211,9 +211,10 @@ impl Rig {
                 self.controller.reset()?;
                 // A board that does not come back fails the check of resets.
                 for _ in 0..RESET_STEPS {
-                    if self.resets == resets {
-                        meanwhile(self, 0)?;
+                    if self.resets != resets {
+                        break;
                     }
+                    meanwhile(self, 0)?;
                 }
             }
             Disturbance::Update(image) => {

@@ -71,7 +71,7 @@ pub(super) fn choose_recipe(
     let mut candidates = vec![(recipe, first)];
     for &even in laws {
         let Recipe { rounding: best, .. } = chosen(&of_shapes);
-        let near = [best / NEXT, best, NEXT * best];
+        let near: [f64; EVEN] = [best / NEXT, best, NEXT * best];
         let roundings = if even { &near[..] } else { &ROUNDINGS[1..] };
         for &rounding in roundings.iter().filter(|rounding| **rounding >= ROUNDINGS[0]) {
             let recipe = Recipe { rounding, even, ..recipe };
