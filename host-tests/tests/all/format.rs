@@ -85,7 +85,7 @@ fn the_hex_example_reads_as_documented() {
     let bytes = example(&document());
     let buffer = ImageBuffer::new(&bytes);
     let image = Image::new_checked(buffer.bytes()).expect("the example is a valid image");
-    assert_eq!(image.bytes(), 292);
+    assert_eq!(image.bytes(), 252);
     assert_eq!(image.source_weights(), 6);
     assert_eq!(bytes[4 * h::W_CRC..][..4], checksum(&bytes).to_le_bytes());
     assert_eq!((image.kind(), image.chunk(), image.execute()), (Kind::Step, 1, 1));
@@ -126,13 +126,11 @@ fn the_hex_example_reads_as_documented() {
         assert!(document().contains(&format!("0x{word:08x}: row ")), "{word:08x}");
     }
 
-    assert_eq!(image.self_test_steps(), 3);
-    for step in 0..3 {
-        let (observation, action) = image.self_test(step).expect("the step exists");
-        let played = with_head::<_, anyhow::Error>(image, |head| Ok(head.step(&floats(observation))?.to_vec()));
-        assert_eq!(played.expect("the observation is finite"), floats(action));
-    }
-    assert!(image.self_test(3).is_none());
+    assert_eq!(image.self_test_steps(), 1);
+    let (observation, action) = image.self_test(0).expect("the step exists");
+    let played = with_head::<_, anyhow::Error>(image, |head| Ok(head.step(&floats(observation))?.to_vec()));
+    assert_eq!(played.expect("the observation is finite"), floats(action));
+    assert!(image.self_test(1).is_none());
 }
 
 #[test]

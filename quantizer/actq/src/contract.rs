@@ -130,6 +130,12 @@ impl ActionContract {
         ]
     }
 
+    /// Returns whether an action depends on earlier ones.
+    pub fn has_memory(&self) -> bool {
+        let Self { max_step, smoothing, binarise, playback: Playback { ensemble, overlap, .. }, .. } = self;
+        max_step.is_some() || smoothing.is_some() || binarise.is_some() || ensemble.is_some() || *overlap > 0
+    }
+
     /// Returns the lower and upper limit of action `i`, if it has both. If only other actions have some, f32's largest
     /// number stands in their place.
     pub fn limits(&self, i: usize) -> Option<[f32; 2]> {

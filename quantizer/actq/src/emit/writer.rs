@@ -164,9 +164,11 @@ impl Writer {
             self.push_floats(&ensemble.weights());
         }
         let name = self.push_bytes(policy.name.as_bytes());
-        // If observations are long, use fewer than those of a chunk and the next.
+        // One step tests everything if none depends on an earlier one. Else a chunk and the beginning of the next do, or as
+        // much of them as long observations leave room for.
+        let is_stateless = policy.kind == Kind::Step && program.state.len == 0 && !policy.contract.has_memory();
         let room = SELF_TEST_BYTES / (4 * (obs_len + policy.act_len));
-        let steps = (policy.execute.max(horizon) + 2).min(room.max(1));
+        let steps = if is_stateless { 1 } else { (policy.execute.max(horizon) + 2).min(room.max(1)) };
         let observations = match around {
             Some(_) => self_test_observations(&Graph::new(obs_len), steps),
             None => self_test_observations(&policy.graph, steps),
@@ -338,4 +340,41 @@ fn steps(rows: &[usize]) -> Result<Vec<u8>> {
 /// Returns a text's bytes, with zeros up to a whole word.
 fn whole_words(text: &str) -> impl Iterator<Item = u8> + use<'_> {
     text.bytes().chain(iter::repeat_n(0, text.len().next_multiple_of(4) - text.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use actq_kernels::Width;
+
+    use super::*;
+    use crate::budget::Budget;
+    use crate::contract::{Ensemble, Playback};
+    use crate::data::Recordings;
+    use crate::methods::{Method, Options};
+    use crate::pipeline::quantize;
+    use crate::testing;
+
+    /// Returns the steps of the self-test of a policy's image.
+    fn self_test_steps(policy: &Policy) -> usize {
+        let calib = Some(testing::dataset(&policy.graph, 2, 20));
+        let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
+        let made = quantize(policy, &Recordings { calib, heldout: None }, &options, ()).expect("an image");
+        ImageBuffer::new(&made.image).image(Path::new("the new image")).expect("it is valid").self_test_steps()
+    }
+
+    #[test]
+    fn a_self_test_has_more_than_one_step_where_actions_depend_on_earlier_steps() {
+        let feed_forward = Policy::of("mlp", testing::mlp());
+        assert_eq!(self_test_steps(&feed_forward), 1);
+        assert_eq!(self_test_steps(&Policy::of("lstm", testing::lstm())), 3);
+
+        let with = |contract| Policy { contract, ..feed_forward.clone() };
+        let ones = Some(vec![1.0; feed_forward.act_len]);
+        assert_eq!(self_test_steps(&with(ActionContract { max_step: ones.clone(), ..ActionContract::default() })), 3);
+        assert_eq!(self_test_steps(&with(ActionContract { smoothing: ones.clone(), ..ActionContract::default() })), 3);
+        assert_eq!(self_test_steps(&with(ActionContract { scale: ones, ..ActionContract::default() })), 1);
+        let ensemble = Some(Ensemble { horizon: 1, m: 0.1 });
+        let playback = Playback { ensemble, ..Playback::default() };
+        assert_eq!(self_test_steps(&with(ActionContract { playback, ..ActionContract::default() })), 3);
+    }
 }
