@@ -25,7 +25,7 @@
 //! - `w2`, `w3`, `w4`, `w8`: matrices of weights of these bits.
 //! - `single`, `paired`: matrices of one weight in a lane of 16 bits (activations above 127, or groups of 64 or 128), and
 //!   of two (all others). `groups`: group scales.
-//! - `functions`: GELU, SiLU, softplus, mish, exp, sine, cosine. (ReLU, ELU, tanh and sigmoid are in every build.)
+//! - `functions`: GELU, softplus, mish, exp, sine, cosine. (ReLU, ELU, SiLU, tanh and sigmoid are in every build.)
 //! - `norm`: layer norm and RMS norm. `recurrent`: LSTM and GRU cells. `flow`: flow and diffusion policies.
 //! - `chunks`: action chunks of more than one action, with overlap and temporal ensemble.
 //! - `around`: the operations around a network (`docs/DEPLOY.md`): raw values in, targets out.

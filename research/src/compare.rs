@@ -4,6 +4,7 @@ mod actquant_k;
 mod allowed;
 mod cell;
 mod jobs;
+mod least;
 mod making;
 mod plan;
 mod report;

@@ -63,7 +63,7 @@ impl Function {
 
     /// Returns `true` for the functions that every build has.
     pub(crate) const fn is_basic(self) -> bool {
-        matches!(self, Self::Relu | Self::Elu | Self::Tanh | Self::Sigmoid)
+        matches!(self, Self::Relu | Self::Elu | Self::Silu | Self::Tanh | Self::Sigmoid)
     }
 
     /// Applies the function to every element.
@@ -73,9 +73,9 @@ impl Function {
             Self::Elu => each_ratio(x, &ELU),
             Self::Tanh => each_ratio(x, &TANH),
             Self::Sigmoid => each_ratio(x, &SIGMOID),
+            Self::Silu => each(x, silu),
             // A checked image has none of the others.
             _ if !cfg!(feature = "functions") => {}
-            Self::Silu => each(x, silu),
             Self::Gelu => in_pairs(x, |pairs| each(pairs, |[a, b]| [gelu(a), gelu(b)])),
             Self::GeluTanh => each(x, gelu_tanh),
             Self::Exp => in_pairs(x, |pairs| each(pairs, |[a, b]| [exp(a), exp(b)])),

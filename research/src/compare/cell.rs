@@ -53,6 +53,13 @@ pub struct Made {
     pub default_group: bool,
 }
 
+impl Made {
+    /// Returns the predicted milliseconds with the faster of our kernels and CMSIS-NN's.
+    pub(super) fn fewest_milliseconds(&self) -> Option<f64> {
+        self.milliseconds.into_iter().chain(self.cmsis_nn_milliseconds).min_by(f64::total_cmp)
+    }
+}
+
 /// The result of a job that makes an image.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Attempted {

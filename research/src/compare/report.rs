@@ -14,6 +14,7 @@ use serde_json::Value;
 
 use super::allowed::Allowed;
 use super::cell::{Cell, CellKey, Made};
+use super::least;
 use super::plan::Contender;
 use super::results::{Header, Results};
 
@@ -229,6 +230,9 @@ fn section(text: &mut String, results: &Results, asked: &Asked, policy: &str) ->
     writeln!(text)?;
     if starred {
         writeln!(text, "{STARRED}\n")?;
+    }
+    if asked.budgets.len() > 1 {
+        least::write(text, &asked.methods, f32_cell, &cells)?;
     }
     reasons(text, &cells)?;
     not_driven(text, f32_cell, &cells)
