@@ -17,6 +17,8 @@ pub(super) fn write(
     cells: &[(Contender, Allowed, Option<&Cell>)],
 ) -> Result<()> {
     let Some([low, _]) = f32_cell.and_then(|cell| cell.outcome()?.interval()) else { return Ok(()) };
+    // In whole percent, as the table above gives the interval.
+    let low = (100.0 * low).round() / 100.0;
     writeln!(
         text,
         "The fewest bytes and milliseconds of an image above with at least {:.0}% success, where f32's interval begins:\n",
