@@ -26,14 +26,12 @@ pub(super) fn write(
     )?;
     writeln!(text, "| method | bytes | ms |\n|---|---:|---:|")?;
     for &method in methods {
-        let keeping = || {
-            let of_method = cells.iter().filter(move |(of, ..)| *of == method).filter_map(|(.., cell)| *cell);
-            of_method
-                .filter(|cell| cell.outcome().and_then(|outcome| outcome.success()).is_some_and(|share| share >= low))
-        };
-        let made = || keeping().filter_map(|cell| cell.made.as_ref());
-        let bytes = made().map(|made| made.bytes).min();
-        let milliseconds = made().filter_map(Made::fewest_milliseconds).min_by(f64::total_cmp);
+        let keeps =
+            |cell: &Cell| cell.outcome().and_then(|outcome| outcome.success()).is_some_and(|share| share >= low);
+        let of_method = cells.iter().filter(|(of, ..)| *of == method).filter_map(|(.., cell)| *cell);
+        let keeping: Vec<&Made> = of_method.filter(|cell| keeps(cell)).filter_map(|cell| cell.made.as_ref()).collect();
+        let bytes = keeping.iter().map(|made| made.bytes).min();
+        let milliseconds = keeping.iter().filter_map(|made| made.fewest_milliseconds()).min_by(f64::total_cmp);
         writeln!(
             text,
             "| {} | {} | {} |",
