@@ -140,8 +140,9 @@ fn a_library_for_one_image_is_smaller_and_gives_the_same_bits() -> Result<()> {
     Ok(())
 }
 
-/// The same for libraries that run an MLP with scales of rows and activations of 8 bits: of weights of 2 bits, and of all widths.
+/// The same for a library that runs an MLP of 2-bit weights with scales of rows and activations of 8 bits.
 const CODE_LIMIT_OF_MLP: u64 = 14 << 10;
+/// The same for one with weights of all widths.
 const CODE_LIMIT_OF_WIDTHS: u64 = 19 << 10;
 
 /// A program that plays an image's self-test, which compares bits.
@@ -170,7 +171,8 @@ fn a_library_for_an_mlp_of_all_widths_takes_less_than_19_kb() -> Result<()> {
     library_takes_at_most(CODE_LIMIT_OF_WIDTHS, &Width::ALL, Function::Silu, "w2 w3 w4 w8 paired")
 }
 
-/// The size of the library with these features for an MLP of these widths; its images must pass their self-test.
+/// Makes an MLP of these widths and the library for it: it must have these features, take at most `limit` bytes, and
+/// pass the image's self-test.
 fn library_takes_at_most(limit: u64, widths: &[Width], function: Function, features: &str) -> Result<()> {
     let mut network = Builder::new(48);
     let [mean, scale] = [network.values(48), network.values(48)];
