@@ -54,12 +54,11 @@ public:
 
     // Opens the image, which must stay where it is, and initializes the head in scratch, which belongs to it.
     Status open(span<const uint32_t> image, span<uint32_t> scratch) noexcept {
-        if (actq_abi() != ACTQ_ABI) {
-            return ACTQ_NOT_INITIALIZED;
-        }
-        const auto *bytes = reinterpret_cast<const uint8_t *>(image.data());
-        const actq_status opened = actq_image_open(&image_, bytes, 4 * image.size());
-        return opened != ACTQ_OK ? opened : actq_head_init(&head_, &image_, scratch.data(), scratch.size());
+        return open_with(actq_image_open, image, scratch);
+    }
+    // The same for an image that `actq export-c` wrote into the program.
+    Status open_checksummed(span<const uint32_t> image, span<uint32_t> scratch) noexcept {
+        return open_with(actq_image_open_checksummed, image, scratch);
     }
 
     Status reset() noexcept { return actq_reset(&head_); }
@@ -97,6 +96,16 @@ public:
     }
 
 private:
+    using Open = actq_status(actq_image *, const uint8_t *, size_t);
+    Status open_with(Open &open, span<const uint32_t> image, span<uint32_t> scratch) noexcept {
+        if (actq_abi() != ACTQ_ABI) {
+            return ACTQ_NOT_INITIALIZED;
+        }
+        const auto *bytes = reinterpret_cast<const uint8_t *>(image.data());
+        const actq_status opened = open(&image_, bytes, 4 * image.size());
+        return opened != ACTQ_OK ? opened : actq_head_init(&head_, &image_, scratch.data(), scratch.size());
+    }
+
     actq_image image_{};
     actq_head head_{};
 };

@@ -6,7 +6,7 @@ use core::task::Poll;
 use actq_kernels::{Head, StepError};
 
 use crate::image::{ActqImage, opened};
-use crate::memory::{addresses, all_apart, apart, check, put, seal, slice, slice_mut};
+use crate::memory::{Buffer, all_apart, apart, seal};
 use crate::status::{ActqStatus, Code, Failure, status};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTH");
@@ -33,36 +33,35 @@ struct Running {
 const _: () = assert!(size_of::<Running>() <= size_of::<ActqHead>() && align_of::<Running>() <= align_of::<ActqHead>());
 
 impl Running {
-    /// Requires that the caller's buffer shares no byte with this head, its scratch memory and its image.
-    fn apart_from<T>(&self, buffer: *const T, len: usize) -> Result<(), Failure> {
-        if len > 0 {
-            check(buffer, len)?;
-        }
-        let buffer = addresses(buffer, len);
+    /// Checks the caller's buffer: it shares no byte with this head, its scratch memory and its image.
+    fn buffer<T>(&self, pointer: *const T, len: usize) -> Result<Buffer<T>, Failure> {
+        let buffer = Buffer::or_empty(pointer, len)?;
         let [scratch, image] = &self.memory;
-        [&addresses(self, 1), scratch, image].into_iter().try_for_each(|own| apart(own, &buffer))
+        let head = self as *const Self as usize;
+        let head = head..head + size_of::<Self>();
+        [&head, scratch, image].into_iter().try_for_each(|own| apart(own, &buffer.addresses()))?;
+        Ok(buffer)
     }
 
     /// Checks an action's buffer. It is borrowed only when the action is ready: it may be the observation's, too.
-    fn check_action(&self, action: *mut f32, len: usize) -> Result<(), Failure> {
+    fn action(&self, action: *mut f32, len: usize) -> Result<Buffer<f32>, Failure> {
         if len != self.head.image().act_len() {
             return Err(Code::Length.into());
         }
-        self.apart_from(action, len)
+        self.buffer(action, len)
     }
 
     /// Borrows an observation.
     ///
     /// # Safety
     ///
-    /// As [`slice`].
+    /// As [`Buffer::read`].
     unsafe fn observation<'b>(&self, observation: *const f32, len: usize) -> Result<&'b [f32], Failure> {
         if len != self.head.image().obs_len() {
             return Err(Code::ObservationLength.into());
         }
-        self.apart_from(observation, len)?;
         // SAFETY: as the caller promises.
-        unsafe { slice(observation, len) }
+        Ok(unsafe { self.buffer(observation, len)?.read() })
     }
 }
 
@@ -70,13 +69,12 @@ impl Running {
 ///
 /// # Safety
 ///
-/// As [`slice_mut`].
-unsafe fn write(to: *mut f32, len: usize, action: &[f32]) -> Result<(), Failure> {
+/// As [`Buffer::write`].
+unsafe fn write(to: Buffer<f32>, action: &[f32]) {
     // SAFETY: as the caller promises.
-    let to = unsafe { slice_mut(to, len) }?;
+    let to = unsafe { to.write() };
     // The lengths are equal, which `copy_from_slice` would check again, with a panic.
     to.iter_mut().zip(action).for_each(|(to, value)| *to = *value);
-    Ok(())
 }
 
 /// Borrows an initialized head, and runs `run` with it.
@@ -87,10 +85,9 @@ unsafe fn write(to: *mut f32, len: usize, action: &[f32]) -> Result<(), Failure>
 /// the image's bytes and the scratch memory are still its own.
 unsafe fn with(head: *mut ActqHead, run: impl FnOnce(&mut Running) -> Result<(), Failure>) -> ActqStatus {
     let place = head.cast::<Running>();
-    // SAFETY: as the caller promises; a word is any bits.
-    let found = unsafe { slice(place.cast::<usize>(), 1) };
-    status(found.and_then(|found| {
-        if found.first() != Some(&seal(place, MAGIC)) {
+    status(Buffer::new(place.cast::<usize>(), 1).and_then(|found| {
+        // SAFETY: as the caller promises; a word is any bits.
+        if unsafe { found.read() } != [seal(place, MAGIC)] {
             return Err(Code::NotInitialized.into());
         }
         // SAFETY: only `actq_head_init` writes this seal, with a head after it, at this address.
@@ -108,19 +105,21 @@ pub unsafe extern "C" fn actq_head_init(
     words: usize,
 ) -> ActqStatus {
     let init = || {
+        let structure = Buffer::new(head.cast::<usize>(), size_of::<ActqHead>() / size_of::<usize>())?;
         // SAFETY: as the caller promises.
-        unsafe { slice_mut(head.cast::<usize>(), size_of::<ActqHead>() / size_of::<usize>()) }?.fill(0);
+        unsafe { structure.write() }.fill(0);
         // SAFETY: as the caller promises.
         let opened = unsafe { opened(image) }?;
-        check(scratch, words)?;
-        let memory = [addresses(scratch, words), opened.bytes()];
-        let structures = [addresses(head, 1), addresses(image, 1)];
+        let scratch = Buffer::new(scratch, words)?;
+        let memory = [scratch.addresses(), opened.bytes()];
+        let structures = [structure.addresses(), Buffer::new(image, 1)?.addresses()];
         all_apart(&[&structures[0], &structures[1], &memory[0], &memory[1]])?;
         // SAFETY: as the caller promises.
-        let new = Head::new(opened.image, unsafe { slice_mut(scratch, words) }?)?;
+        let new = Head::new(opened.image, unsafe { scratch.write() })?;
         let place = head.cast::<Running>();
         // SAFETY: valid as the words above.
-        unsafe { put(place, Running { seal: seal(place, MAGIC), memory, head: new, polling: false }) }
+        unsafe { place.write(Running { seal: seal(place, MAGIC), memory, head: new, polling: false }) };
+        Ok(())
     };
     status(init())
 }
@@ -171,9 +170,8 @@ pub unsafe extern "C" fn actq_step(
             if running.polling {
                 return Err(Code::Polling.into());
             }
-            running.check_action(action, action_len)?;
-            let computed = running.head.step(running.observation(observation, observation_len)?)?;
-            write(action, action_len, computed)?;
+            let action = running.action(action, action_len)?;
+            write(action, running.head.step(running.observation(observation, observation_len)?)?);
             Ok(())
         })
     }
@@ -211,11 +209,11 @@ pub unsafe extern "C" fn actq_poll(
     // SAFETY: as the caller promises.
     unsafe {
         with(head, |running| {
-            running.check_action(action, action_len)?;
+            let action = running.action(action, action_len)?;
             match running.head.poll(budget) {
                 Ok(Poll::Pending) => Err(Code::Pending.into()),
                 Ok(Poll::Ready(computed)) => {
-                    write(action, action_len, computed)?;
+                    write(action, computed);
                     running.polling = false;
                     Ok(())
                 }
@@ -247,8 +245,8 @@ pub unsafe extern "C" fn actq_play(head: *mut ActqHead, action: *mut f32, action
     // SAFETY: as the caller promises.
     unsafe {
         with(head, |running| {
-            running.check_action(action, action_len)?;
-            write(action, action_len, running.head.play()?)?;
+            let action = running.action(action, action_len)?;
+            write(action, running.head.play()?);
             Ok(())
         })
     }
@@ -273,8 +271,8 @@ pub unsafe extern "C" fn actq_saved_bytes(head: *mut ActqHead, bytes: *mut usize
     // SAFETY: as the caller promises.
     unsafe {
         with(head, |running| {
-            running.apart_from(bytes, 1)?;
-            put(bytes, running.head.saved_len())
+            running.buffer(bytes, 1)?.put(running.head.saved_len());
+            Ok(())
         })
     }
 }
@@ -284,12 +282,7 @@ pub unsafe extern "C" fn actq_saved_bytes(head: *mut ActqHead, bytes: *mut usize
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_save(head: *mut ActqHead, to: *mut u8, bytes: usize) -> ActqStatus {
     // SAFETY: as the caller promises.
-    unsafe {
-        with(head, |running| {
-            running.apart_from(to, bytes)?;
-            Ok(running.head.save(slice_mut(to, bytes)?)?)
-        })
-    }
+    unsafe { with(head, |running| Ok(running.head.save(running.buffer(to, bytes)?.write())?)) }
 }
 
 /// Restores a saved state. After an error the head is as it was.
@@ -298,8 +291,7 @@ pub unsafe extern "C" fn actq_restore(head: *mut ActqHead, from: *const u8, byte
     // SAFETY: as the caller promises.
     unsafe {
         with(head, |running| {
-            running.apart_from(from, bytes)?;
-            running.head.restore(slice(from, bytes)?)?;
+            running.head.restore(running.buffer(from, bytes)?.read())?;
             running.polling = false;
             Ok(())
         })

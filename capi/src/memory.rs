@@ -1,71 +1,83 @@
-//! Checked pointers of the caller.
+//! Memory of the caller.
 
 use core::mem::{align_of, size_of};
 use core::ops::Range;
+use core::ptr::NonNull;
 
 use crate::status::{Code, Failure};
 
-/// Checks a pointer to `len` values.
-pub(crate) fn check<T>(pointer: *const T, len: usize) -> Result<(), Failure> {
-    if pointer.is_null() {
+/// Memory of the caller: `len` values at an address that is not null and aligned, or none.
+pub(crate) struct Buffer<T> {
+    pointer: *mut T,
+    len: usize,
+}
+
+impl<T> Buffer<T> {
+    /// Checks a pointer to `len` values.
+    pub(crate) fn new(pointer: *const T, len: usize) -> Result<Self, Failure> {
+        check(pointer as usize, align_of::<T>(), size_of::<T>(), len)?;
+        Ok(Self { pointer: pointer.cast_mut(), len })
+    }
+
+    /// The same, where a buffer may be empty; it may be null then.
+    pub(crate) fn or_empty(pointer: *const T, len: usize) -> Result<Self, Failure> {
+        let pointer = if len == 0 { NonNull::dangling().as_ptr() } else { pointer };
+        Self::new(pointer, len)
+    }
+
+    /// Returns the addresses of the values. An empty buffer has none.
+    pub(crate) fn addresses(&self) -> Range<usize> {
+        // The check has refused a length for which this would wrap.
+        let from = self.pointer as usize;
+        from..from.wrapping_add(self.len * size_of::<T>())
+    }
+
+    /// Borrows the values to read.
+    ///
+    /// # Safety
+    ///
+    /// The pointer is valid for reads of `len` initialized values that nothing writes while `'a` lasts.
+    pub(crate) unsafe fn read<'a>(&self) -> &'a [T] {
+        // SAFETY: it is not null, aligned, and of a possible length; the caller promises the rest.
+        unsafe { core::slice::from_raw_parts(self.pointer, self.len) }
+    }
+
+    /// Borrows the values to write.
+    ///
+    /// # Safety
+    ///
+    /// The pointer is valid for reads and writes of `len` values that nothing else uses while `'a` lasts. Any bits are a
+    /// value of `T`.
+    pub(crate) unsafe fn write<'a>(&self) -> &'a mut [T] {
+        // SAFETY: it is not null, aligned, and of a possible length; the caller promises the rest.
+        unsafe { core::slice::from_raw_parts_mut(self.pointer, self.len) }
+    }
+
+    /// Writes the first value, of at least one.
+    ///
+    /// # Safety
+    ///
+    /// The pointer is valid for a write.
+    pub(crate) unsafe fn put(self, value: T) {
+        // SAFETY: it is not null and aligned; the caller promises the rest.
+        unsafe { self.pointer.write(value) };
+    }
+}
+
+/// Checks an address of values of any type.
+fn check(address: usize, align: usize, size: usize, len: usize) -> Result<(), Failure> {
+    if address == 0 {
         return Err(Code::Null.into());
     }
-    if !pointer.is_aligned() {
+    if !address.is_multiple_of(align) {
         return Err(Code::Alignment.into());
     }
     // The longest slice that Rust allows.
-    let bytes = len.checked_mul(size_of::<T>()).filter(|bytes| isize::try_from(*bytes).is_ok());
-    match bytes.and_then(|bytes| (pointer as usize).checked_add(bytes)) {
+    let bytes = len.checked_mul(size).filter(|bytes| isize::try_from(*bytes).is_ok());
+    match bytes.and_then(|bytes| address.checked_add(bytes)) {
         Some(_) => Ok(()),
         None => Err(Code::Length.into()),
     }
-}
-
-/// Borrows `len` values to read. An empty buffer may be null.
-///
-/// # Safety
-///
-/// `pointer` is null, misaligned, or valid for reads of `len` initialized values that nothing writes while `'a` lasts.
-pub(crate) unsafe fn slice<'a, T: Copy>(pointer: *const T, len: usize) -> Result<&'a [T], Failure> {
-    if len == 0 {
-        return Ok(&[]);
-    }
-    check(pointer, len)?;
-    // SAFETY: it is not null, aligned, and of a possible length; the caller promises the rest.
-    Ok(unsafe { core::slice::from_raw_parts(pointer, len) })
-}
-
-/// Borrows `len` values to write. An empty buffer may be null.
-///
-/// # Safety
-///
-/// `pointer` is null, misaligned, or valid for reads and writes of `len` values that nothing else uses while `'a`
-/// lasts. Any bits are a value of `T`.
-pub(crate) unsafe fn slice_mut<'a, T: Copy>(pointer: *mut T, len: usize) -> Result<&'a mut [T], Failure> {
-    if len == 0 {
-        return Ok(&mut []);
-    }
-    check(pointer, len)?;
-    // SAFETY: it is not null, aligned, and of a possible length; the caller promises the rest.
-    Ok(unsafe { core::slice::from_raw_parts_mut(pointer, len) })
-}
-
-/// Writes a value through a pointer of the caller.
-///
-/// # Safety
-///
-/// `pointer` is null, misaligned, or valid for a write.
-pub(crate) unsafe fn put<T>(pointer: *mut T, value: T) -> Result<(), Failure> {
-    check(pointer, 1)?;
-    // SAFETY: it is not null and aligned; the caller promises the rest.
-    unsafe { pointer.write(value) };
-    Ok(())
-}
-
-/// Returns the addresses of `len` values; the range is empty if they would wrap.
-pub(crate) fn addresses<T>(pointer: *const T, len: usize) -> Range<usize> {
-    let from = pointer as usize;
-    from..from.saturating_add(len.saturating_mul(size_of::<T>()))
 }
 
 /// Requires that two ranges share no byte.

@@ -49,7 +49,8 @@ fn run(bytes: &[u8], script: &[u8]) {
     // SAFETY: every pointer is null, or valid for the length beside it; the memory lives until the end.
     unsafe {
         std::ptr::copy_nonoverlapping(bytes.as_ptr(), start, bytes.len());
-        let opened = actq_image_open(image, start, script.length(bytes.len(), bytes.len()));
+        let open = [actq_image_open, actq_image_open_checksummed][script.next() % 2];
+        let opened = open(image, start, script.length(bytes.len(), bytes.len()));
         let (mut sizes, mut cost) = (Sizes::default(), CCost::default());
         actq_image_sizes(image, &mut sizes);
         if opened == 0 {

@@ -1,5 +1,5 @@
 //! Low-bit GEMV kernels and an action-head executor for microcontrollers: `no_std`, no allocation, no panic after
-//! [`Image::new_checked`].
+//! [`Image::new_checked`] or [`Image::new_checksummed`].
 //!
 //! The command `actq` quantizes a robot policy's last layers, or a whole small policy, into one image on a host. This
 //! crate runs that image in place from flash:
@@ -25,7 +25,8 @@
 //! - `w2`, `w3`, `w4`, `w8`: matrices of weights of these bits.
 //! - `single`, `paired`: matrices of one weight in a lane of 16 bits (activations above 127, or groups of 64 or 128), and
 //!   of two (all others). `groups`: group scales.
-//! - `functions`: GELU, softplus, mish, exp, sine, cosine. (ReLU, ELU, SiLU, tanh and sigmoid are in every build.)
+//! - `elu`: ELU, tanh and sigmoid. `silu`: SiLU. `functions`: GELU, softplus, mish, exp, sine, cosine. (ReLU is in every
+//!   build.)
 //! - `norm`: layer norm and RMS norm. `recurrent`: LSTM and GRU cells. `flow`: flow and diffusion policies.
 //! - `chunks`: action chunks of more than one action, with overlap and temporal ensemble.
 //! - `around`: the operations around a network (`docs/DEPLOY.md`): raw values in, targets out.

@@ -1,6 +1,6 @@
 //! Random changes of a valid image, with a correct checksum. An image that passes `Image::new_checked` runs without a
 //! panic, keeps its limits, and depends only on its observations. An image that changes after the check does not panic
-//! either. The tests need only this crate, so that they also run with words of 32 bits and in Miri.
+//! either, nor one that passes only `Image::new_checksummed`. The tests need only this crate, so that they also run with words of 32 bits and in Miri.
 
 #[path = "common/draft.rs"]
 mod draft;
@@ -148,6 +148,27 @@ fn damage_after_the_check_does_not_panic() {
         let observation = vec![0.5; image.obs_len()];
         let outcome = catch_unwind(AssertUnwindSafe(|| (0..3).all(|_| head.step(&observation).is_ok())));
         outcomes[usize::from(outcome.unwrap_or_else(|_| panic!("case {case}")))] += 1;
+    }
+    assert!(outcomes.iter().all(|n| *n > CASES / 20), "{outcomes:?}: too few to show anything");
+}
+
+#[test]
+fn a_correct_checksum_and_any_content_do_not_panic() {
+    let structure = structure();
+    // Refused by both, only by the whole check, and by none.
+    let mut outcomes = [0; 3];
+    for case in 0..CASES {
+        let mut random = Random::new(case);
+        let mut draft = Draft::of(VALID);
+        mutate(&mut random, &mut draft, &structure);
+        let checked = Image::new_checked(draft.bytes()).is_ok();
+        let image = Image::new_checksummed(draft.bytes());
+        assert!(image.is_ok() || !checked, "case {case}: {}", image.unwrap_err());
+        // Of an image with a damaged length, which no head has the memory for.
+        let image = image.ok().filter(|image| image.scratch_words() < 1 << 16);
+        let played = image.map(|image| catch_unwind(AssertUnwindSafe(|| play(image, 0, &mut random))).is_ok());
+        assert!(played != Some(false), "case {case}");
+        outcomes[usize::from(image.is_some()) + usize::from(checked)] += 1;
     }
     assert!(outcomes.iter().all(|n| *n > CASES / 20), "{outcomes:?}: too few to show anything");
 }

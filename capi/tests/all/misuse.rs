@@ -3,8 +3,9 @@
 use std::ptr::{null, null_mut};
 
 use actq_c::{
-    ActqHead, ActqImage, CPort, Code, actq_begin, actq_head_init, actq_image_cost, actq_image_open, actq_image_port,
-    actq_image_sizes, actq_poll, actq_reset, actq_restore, actq_save, actq_saved_bytes, actq_set_input, actq_step,
+    ActqHead, ActqImage, CPort, Code, actq_begin, actq_head_init, actq_image_cost, actq_image_open,
+    actq_image_open_checksummed, actq_image_port, actq_image_sizes, actq_poll, actq_reset, actq_restore, actq_save,
+    actq_saved_bytes, actq_set_input, actq_step,
 };
 
 use super::{Aligned, BYTES, OK, Program};
@@ -53,6 +54,7 @@ fn null_misaligned_and_short_buffers_are_errors() {
         actq_restore(head, null(), 100) => Null;
         actq_restore(head, saved, 3) => SavedLength;
         actq_image_open(null_mut(), bytes, 100) => Null;
+        actq_image_open_checksummed(null_mut(), bytes, 100) => Null;
         actq_image_cost(image, null_mut()) => Null;
         actq_image_sizes(image, null_mut()) => Null;
         actq_image_cost(null(), null_mut()) => Null;
@@ -121,6 +123,7 @@ fn overlapping_buffers_are_errors_and_an_action_may_replace_its_observation() {
         actq_head_init(head, image, BYTES.0.as_ptr().cast::<u32>().cast_mut(), 4) => Overlap;
         actq_head_init(head, image, scratch, words) => Ok;
         actq_image_open(image, image.cast(), 40) => Overlap;
+        actq_image_open_checksummed(image, image.cast(), 40) => Overlap;
     }
 }
 
@@ -164,6 +167,8 @@ fn a_damaged_image_and_values_that_are_not_finite_are_errors() {
         actq_set_input(image, c"velocity".as_ptr(), observation.as_ptr(), 1, action.as_mut_ptr(), act) => NoSuchPort;
         actq_set_input(image, null(), observation.as_ptr(), 1, action.as_mut_ptr(), act) => Null;
         actq_image_open(image, damaged.0.as_ptr(), damaged.0.len()) => ImageChecksum;
+        actq_image_open_checksummed(image, damaged.0.as_ptr(), damaged.0.len()) => ImageChecksum;
+        actq_image_open_checksummed(image, BYTES.0.as_ptr(), 4) => ImageTooShort;
         actq_image_open(image, BYTES.0.as_ptr().wrapping_add(1), 64) => ImageMisaligned;
         actq_image_open(image, BYTES.0.as_ptr(), 4) => ImageTooShort;
     }

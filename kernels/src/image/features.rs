@@ -4,7 +4,7 @@ use super::view::Image;
 use crate::layout::BlockShape;
 
 /// The features that leave something out when they are off, in the order of Cargo.toml.
-const FEATURES: [&str; 13] = [
+const FEATURES: [&str; 15] = [
     "w2",
     "w3",
     "w4",
@@ -12,6 +12,8 @@ const FEATURES: [&str; 13] = [
     "single",
     "paired",
     "groups",
+    "elu",
+    "silu",
     "functions",
     "norm",
     "recurrent",

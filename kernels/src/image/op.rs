@@ -125,7 +125,7 @@ impl OpKind {
     #[cfg(feature = "writer")]
     pub fn feature(self) -> Option<&'static str> {
         match self {
-            Self::Function(function) => Some("functions").filter(|_| !function.is_basic()),
+            Self::Function(function) => function.feature(),
             kind => Some(kind.texts()[2]).filter(|feature| !feature.is_empty()),
         }
     }
@@ -467,7 +467,7 @@ impl<'a> Image<'a> {
             OpKind::Normalize { .. } => OpKind::Normalize { added: detail == 1 },
             OpKind::Function(_) => {
                 let function = Function::from_code(detail).ok_or(ImageError::Op)?;
-                if !cfg!(feature = "functions") && !function.is_basic() {
+                if !function.is_built() {
                     return Err(ImageError::LeftOut);
                 }
                 OpKind::Function(function)

@@ -61,20 +61,38 @@ impl Function {
         Self::ALL.get(usize::from(code)).copied()
     }
 
-    /// Returns `true` for the functions that every build has.
-    pub(crate) const fn is_basic(self) -> bool {
-        matches!(self, Self::Relu | Self::Elu | Self::Silu | Self::Tanh | Self::Sigmoid)
+    /// Returns the feature of this crate with the function; `None` for ReLU, which every build has.
+    #[cfg(feature = "writer")]
+    pub(crate) const fn feature(self) -> Option<&'static str> {
+        match self {
+            Self::Relu => None,
+            Self::Elu | Self::Tanh | Self::Sigmoid => Some("elu"),
+            Self::Silu => Some("silu"),
+            _ => Some("functions"),
+        }
+    }
+
+    /// Returns `true` if this build has the function.
+    pub(crate) const fn is_built(self) -> bool {
+        match self {
+            Self::Relu => true,
+            Self::Elu | Self::Tanh | Self::Sigmoid => cfg!(feature = "elu"),
+            Self::Silu => cfg!(feature = "silu"),
+            _ => cfg!(feature = "functions"),
+        }
     }
 
     /// Applies the function to every element.
     pub fn apply(self, x: &mut [f32]) {
         match self {
             Self::Relu => in_pairs(x, |pairs| each(pairs, |[a, b]| [relu(a), relu(b)])),
+            // A checked image has no function that the build leaves out.
+            Self::Elu | Self::Tanh | Self::Sigmoid if !cfg!(feature = "elu") => {}
             Self::Elu => each_ratio(x, &ELU),
             Self::Tanh => each_ratio(x, &TANH),
             Self::Sigmoid => each_ratio(x, &SIGMOID),
+            Self::Silu if !cfg!(feature = "silu") => {}
             Self::Silu => each(x, silu),
-            // A checked image has none of the others.
             _ if !cfg!(feature = "functions") => {}
             Self::Gelu => in_pairs(x, |pairs| each(pairs, |[a, b]| [gelu(a), gelu(b)])),
             Self::GeluTanh => each(x, gelu_tanh),

@@ -40,7 +40,7 @@ fn header(image: &Image<'_>, bytes: &[u8], name: &str, golden: Option<&Golden>) 
     let mut more = format!(
         "/* SHA-256 of the image, and of the policy it was made from. */\n#define {capitals}_SHA256 \"{}\"\n\
          #define {capitals}_SOURCE_SHA256 \"{}\"\n\n#include <stdint.h>\n\n#ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
-         /* The image: pass it and {capitals}_IMAGE_BYTES to actq_image_open. */\nextern const uint32_t {name}_image[{words}];\n",
+         /* The image: pass it and {capitals}_IMAGE_BYTES to actq_image_open or actq_image_open_checksummed. */\nextern const uint32_t {name}_image[{words}];\n",
         sha256(bytes),
         hex(&image.digest())
     );
