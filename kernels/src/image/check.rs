@@ -64,7 +64,7 @@ impl<'a> Image<'a> {
 
     /// Checks the bytes as a whole: alignment, header, checksum.
     #[inline(always)]
-    fn whole(bytes: &'a [u8]) -> Result<Self, ImageError> {
+    pub(super) fn whole(bytes: &'a [u8]) -> Result<Self, ImageError> {
         if bytes.as_ptr().align_offset(4) != 0 {
             return Err(ImageError::Misaligned);
         }

@@ -85,9 +85,9 @@ mod tests {
     const VALID: &[u8] = include_bytes!("../../tests/valid.actq");
 
     #[test]
-    fn info_agrees_with_the_checked_image() {
+    fn info_agrees_with_the_image() {
         let words: Vec<u32> = VALID.as_chunks().0.iter().map(|word| u32::from_ne_bytes(*word)).collect();
-        let image = Image::new_checked(bytemuck::cast_slice(&words)).expect("the image is valid");
+        let image = Image::whole(bytemuck::cast_slice(&words)).expect("the image is whole");
         let (obs_len, act_len, scratch_words) = (image.obs_len(), image.act_len(), image.scratch_words());
         let info = ImageInfo { bytes: image.bytes(), obs_len, act_len, scratch_words };
         assert_eq!(ImageInfo::read(VALID), Ok(info));

@@ -394,7 +394,7 @@ mod tests {
     fn loops_give_the_bits_of_their_functions() {
         let functions = [relu, elu, silu, gelu, gelu_tanh, tanh, sigmoid, exp, sin, cos, softplus, mish];
         let x: [f32; 999] = core::array::from_fn(|i| (i as f32 - 499.0) / 31.0);
-        for (function, of) in Function::ALL.into_iter().zip(functions) {
+        for (function, of) in Function::ALL.into_iter().zip(functions).filter(|(function, _)| function.is_built()) {
             let mut y = x;
             function.apply(&mut y);
             assert_eq!(y.map(f32::to_bits), x.map(|x| of(x).to_bits()), "{}", function.name());

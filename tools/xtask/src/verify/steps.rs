@@ -137,7 +137,7 @@ impl Steps {
     fn least_kernels(&mut self) {
         let least = ["--release", "--package", "actq-kernels", "--no-default-features"];
         self.add("lints of the least kernels", &[&["clippy", "--all-targets"], &least[..], &DENY].concat());
-        self.add("test of the least kernels", &[&["test"], &least[..], &["--test", "left_out"]].concat());
+        self.add("test of the least kernels", &[&["test"], &least[..], &["--lib", "--test", "left_out"]].concat());
     }
 
     fn format_and_lints(&mut self) {
