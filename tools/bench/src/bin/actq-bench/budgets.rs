@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::{boards, heads, kernels};
 
 /// Tolerance above a budget, in percent, for a compiler other than the recorded one (the compiler is not pinned) and,
-/// for a head, another processor: widths and activations follow from sums that it may round otherwise.
+/// for a head, another C library: a few choices follow from its logarithms.
 const TOLERANCE_PERCENT: u64 = 2;
 
 /// Limit for the bytes of code of the runtime without sliced steps: 24 KiB for step and chunk policies, and 8 for
