@@ -7,7 +7,8 @@
  *
  * A pointer must be null, or valid for the length that goes with it. Everything else is checked: a null or misaligned
  * pointer, a short buffer, overlapping buffers, a structure that was not opened or was copied, and a damaged image give
- * an error and change nothing. */
+ * an error and change nothing, except that a failed actq_image_open or actq_head_init leaves its structure unopened. Begin
+ * with zeros in every actq_image and actq_head: other memory may hold an old structure from the same address. */
 
 #ifndef ACTQ_H
 #define ACTQ_H
@@ -97,7 +98,7 @@ enum actq_code {
   ACTQ_SAVED_IMAGE = 72,
   /** saved state is damaged; reset instead */
   ACTQ_SAVED_DAMAGED = 73,
-  /** a step is not ready; poll it to its end before saving the state */
+  /** a step is being polled; poll it to its end, or reset, before saving or restoring */
   ACTQ_SAVED_BEGUN = 74,
   /** observation has another length than the policy takes */
   ACTQ_OBSERVATION_LENGTH = 80,
@@ -130,7 +131,9 @@ enum actq_code {
   /** a step is being polled; poll it to its end, or reset */
   ACTQ_POLLING = 133,
   /** the image has no raw input or target of this name or number */
-  ACTQ_NO_SUCH_PORT = 134
+  ACTQ_NO_SUCH_PORT = 134,
+  /** the header and the library are of different versions */
+  ACTQ_ABI_DIFFERS = 135
 };
 
 
@@ -314,19 +317,29 @@ actq_status actq_step(struct actq_head *head,
                       size_t action_len);
 
 /**
- * Begins a step with an observation; `actq_poll` does the work. A step that has begun and is not ready is dropped.
+ * Begins a step with an observation; `actq_poll` does the work. A step that has begun and is not ready is dropped; if a
+ * poll has already worked on it, the recurrent state is reset. The first call takes longer, unless `actq_least_budget`
+ * was called before.
  */
 actq_status actq_begin(struct actq_head *head, const float *observation, size_t observation_len);
 
 /**
+ * Gives the smallest budget of a poll, instructions. The first call for a head computes it, which takes about as long as a
+ * short step: call it before the control loop.
+ */
+actq_status actq_least_budget(struct actq_head *head,
+                              uint32_t *budget);
+
+/**
  * Runs a slice of the step that has begun, of at most `budget` instructions by the cost model, at least
  * `actq_cost.least_budget`. Returns `ACTQ_PENDING` until the action is ready and written. However a step is cut,
- * its bits are the same.
+ * its bits are the same. After that it returns the same action until the next `actq_begin`. Instructions are those of a
+ * Cortex-M4 with FPU: on other cores a slice takes another time.
  */
 actq_status actq_poll(struct actq_head *head, uint32_t budget, float *action, size_t action_len);
 
 /**
- * Lets control periods pass without an action: the actions for these periods never play.
+ * Skips `periods` control periods: the chunk's actions for them never play.
  */
 actq_status actq_pass(struct actq_head *head, size_t periods);
 
@@ -354,7 +367,7 @@ actq_status actq_saved_bytes(struct actq_head *head, size_t *bytes);
 actq_status actq_save(struct actq_head *head, uint8_t *to, size_t bytes);
 
 /**
- * Restores a saved state. After an error the head is as it was.
+ * Restores a saved state. After an error, as while a step is being polled, the head is as it was.
  */
 actq_status actq_restore(struct actq_head *head, const uint8_t *from, size_t bytes);
 

@@ -7,6 +7,8 @@
 
 #include "actq.h"
 
+static_assert(ACTQ_ABI == 1, "actq.h and actq.hpp are of different versions");
+
 namespace actq {
 
 // Values that follow each other in memory: as std::span of C++20, which microcontrollers' toolchains often lack. It
@@ -72,6 +74,7 @@ public:
     Status begin(span<const float> observation) noexcept {
         return actq_begin(&head_, observation.data(), observation.size());
     }
+    Status least_budget(uint32_t &budget) noexcept { return actq_least_budget(&head_, &budget); }
     Status poll(uint32_t budget, span<float> action) noexcept {
         return actq_poll(&head_, budget, action.data(), action.size());
     }
@@ -99,7 +102,7 @@ private:
     using Open = actq_status(actq_image *, const uint8_t *, size_t);
     Status open_with(Open &open, span<const uint32_t> image, span<uint32_t> scratch) noexcept {
         if (actq_abi() != ACTQ_ABI) {
-            return ACTQ_NOT_INITIALIZED;
+            return ACTQ_ABI_DIFFERS;
         }
         const auto *bytes = reinterpret_cast<const uint8_t *>(image.data());
         const actq_status opened = open(&image_, bytes, 4 * image.size());

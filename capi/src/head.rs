@@ -106,14 +106,19 @@ pub unsafe extern "C" fn actq_head_init(
 ) -> ActqStatus {
     let init = || {
         let structure = Buffer::new(head.cast::<usize>(), size_of::<ActqHead>() / size_of::<usize>())?;
+        let of_image = Buffer::new(image, 1)?.addresses();
+        apart(&structure.addresses(), &of_image)?;
+        // SAFETY: as the caller promises.
+        let (opened, scratch) = (unsafe { opened(image) }, Buffer::new(scratch, words));
+        let memory = [
+            scratch.as_ref().map_or(0..0, |scratch| scratch.addresses()),
+            opened.as_ref().map_or(0..0, |opened| opened.bytes()),
+        ];
+        all_apart(&[&structure.addresses(), &of_image, &memory[0], &memory[1]])?;
+        // From here on the former head is gone, whatever happens.
         // SAFETY: as the caller promises.
         unsafe { structure.write() }.fill(0);
-        // SAFETY: as the caller promises.
-        let opened = unsafe { opened(image) }?;
-        let scratch = Buffer::new(scratch, words)?;
-        let memory = [scratch.addresses(), opened.bytes()];
-        let structures = [structure.addresses(), Buffer::new(image, 1)?.addresses()];
-        all_apart(&[&structures[0], &structures[1], &memory[0], &memory[1]])?;
+        let (opened, scratch) = (opened?, scratch?);
         // SAFETY: as the caller promises.
         let new = Head::new(opened.image, unsafe { scratch.write() })?;
         let place = head.cast::<Running>();
@@ -177,7 +182,9 @@ pub unsafe extern "C" fn actq_step(
     }
 }
 
-/// Begins a step with an observation; `actq_poll` does the work. A step that has begun and is not ready is dropped.
+/// Begins a step with an observation; `actq_poll` does the work. A step that has begun and is not ready is dropped; if a
+/// poll has already worked on it, the recurrent state is reset. The first call takes longer, unless `actq_least_budget`
+/// was called before.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_begin(
     head: *mut ActqHead,
@@ -196,9 +203,24 @@ pub unsafe extern "C" fn actq_begin(
     }
 }
 
+/// Gives the smallest budget of a poll, instructions. The first call for a head computes it, which takes about as long as a
+/// short step: call it before the control loop.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn actq_least_budget(head: *mut ActqHead, budget: *mut u32) -> ActqStatus {
+    // SAFETY: as the caller promises.
+    unsafe {
+        with(head, |running| {
+            let budget = running.buffer(budget, 1)?;
+            budget.put(running.head.least_budget());
+            Ok(())
+        })
+    }
+}
+
 /// Runs a slice of the step that has begun, of at most `budget` instructions by the cost model, at least
 /// `actq_cost.least_budget`. Returns `ACTQ_PENDING` until the action is ready and written. However a step is cut,
-/// its bits are the same.
+/// its bits are the same. After that it returns the same action until the next `actq_begin`. Instructions are those of a
+/// Cortex-M4 with FPU: on other cores a slice takes another time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_poll(
     head: *mut ActqHead,
@@ -226,7 +248,7 @@ pub unsafe extern "C" fn actq_poll(
     }
 }
 
-/// Lets control periods pass without an action: the actions for these periods never play.
+/// Skips `periods` control periods: the chunk's actions for them never play.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_pass(head: *mut ActqHead, periods: usize) -> ActqStatus {
     // SAFETY: as the caller promises.
@@ -285,7 +307,7 @@ pub unsafe extern "C" fn actq_save(head: *mut ActqHead, to: *mut u8, bytes: usiz
     unsafe { with(head, |running| Ok(running.head.save(running.buffer(to, bytes)?.write())?)) }
 }
 
-/// Restores a saved state. After an error the head is as it was.
+/// Restores a saved state. After an error, as while a step is being polled, the head is as it was.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_restore(head: *mut ActqHead, from: *const u8, bytes: usize) -> ActqStatus {
     // SAFETY: as the caller promises.

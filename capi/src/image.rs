@@ -155,12 +155,15 @@ unsafe fn open(
 ) -> ActqStatus {
     let open = || {
         let structure = Buffer::new(to.cast::<usize>(), size_of::<ActqImage>() / size_of::<usize>())?;
+        let content = Buffer::new(bytes, len);
+        if let Ok(content) = &content {
+            apart(&structure.addresses(), &content.addresses())?;
+        }
+        // From here on the former image is closed, whatever happens.
         // SAFETY: as the caller promises.
         unsafe { structure.write() }.fill(0);
-        let content = Buffer::new(bytes, len)?;
-        apart(&structure.addresses(), &content.addresses())?;
         // SAFETY: as the caller promises.
-        let image = parse(unsafe { content.read() })?;
+        let image = parse(unsafe { content?.read() })?;
         let place = to.cast::<Opened>();
         // SAFETY: valid as the words above.
         unsafe { place.write(Opened { seal: seal(place, MAGIC), at: bytes as usize, image }) };

@@ -113,7 +113,7 @@ codes! {
     /// The saved state is damaged.
     SavedDamaged = 73, c"saved state is damaged; reset instead";
     /// A step has begun and is not ready.
-    SavedBegun = 74, c"a step is not ready; poll it to its end before saving the state";
+    SavedBegun = 74, c"a step is being polled; poll it to its end, or reset, before saving or restoring";
     /// The observation's length differs from the image's.
     ObservationLength = 80, c"observation has another length than the policy takes";
     /// A value of the observation is NaN or infinite.
@@ -146,6 +146,8 @@ codes! {
     Polling = 133, c"a step is being polled; poll it to its end, or reset";
     /// The image has no raw input or target of this name or number.
     NoSuchPort = 134, c"the image has no raw input or target of this name or number";
+    /// The header is that of another library. (Only `actq.hpp` returns it.)
+    AbiDiffers = 135, c"the header and the library are of different versions";
 }
 
 /// The status of a call that failed: a [`Code`], or the number of the kernels' error, which a code has, too.

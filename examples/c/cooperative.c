@@ -46,6 +46,16 @@ int main(void) {
     if (status == ACTQ_OK) {
         status = actq_head_init(&head, &image, scratch, POLICY_SCRATCH_WORDS);
     }
+    /* Before the loop: the first call takes as long as a short step. */
+    uint32_t least = 0;
+    if (status == ACTQ_OK) {
+        status = actq_least_budget(&head, &least);
+    }
+    if (status != ACTQ_OK || actq_abi() != ACTQ_ABI || least > SLICE) {
+        print(status != ACTQ_OK ? actq_status_text(status) : "another library, or too short slices");
+        print("\n");
+        return 1;
+    }
     RVR = 0xffffff;
     CVR = 0;
     CSR = 5;
@@ -59,9 +69,14 @@ int main(void) {
         longest = taken > longest ? taken : longest;
         turns++;
     }
+    if (status != ACTQ_OK) {
+        print(actq_status_text(status));
+        print("\n");
+        return 1;
+    }
     print_number(step);
     print(" actions in ");
     print_number(turns);
     print(longest <= LONGEST ? " turns, none longer than a millisecond\n" : " turns, one longer than a millisecond\n");
-    return status != ACTQ_OK || longest > LONGEST;
+    return longest > LONGEST;
 }

@@ -46,6 +46,12 @@ extern "C" void tick() {
 int main() {
     if (const actq::Status status = head.open({policy_image, POLICY_IMAGE_BYTES / 4}, scratch); !status) {
         print(status.text());
+        print("\n");
+        return 1;
+    }
+    uint32_t least = 0;
+    if (!head.least_budget(least) || least > slice) {
+        print("the slices are too short\n");
         return 1;
     }
     rvr = period - 1;
@@ -63,6 +69,7 @@ int main() {
         }
         if (!status) {
             print(status.text());
+            print("\n");
             return 1;
         }
         for (unsigned i = 0; i < POLICY_ACTION_LEN; i++) {

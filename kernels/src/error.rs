@@ -192,7 +192,7 @@ errors! {
         /// The checksum differs, or a number is impossible: the bytes are damaged.
         Damaged = 73, "saved state is damaged; reset instead";
         /// A step has begun and is not ready: poll it to its end, or reset.
-        Begun = 74, "a step is not ready; poll it to its end before saving the state";
+        Begun = 74, "a step is being polled; poll it to its end, or reset, before saving or restoring";
     }
 }
 

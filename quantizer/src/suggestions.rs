@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{CommandFactory as _, Error, Parser as _};
+use clap::{Arg, Command, CommandFactory as _, Error, FromArgMatches as _};
 
 use crate::args::Cli;
 
@@ -14,7 +14,8 @@ const MOST_TYPOS: usize = 1;
 
 /// Parses the command line. Prints an error, or the help or version that is asked for, and returns the exit status.
 pub(crate) fn parse() -> Result<Cli, ExitCode> {
-    Cli::try_parse().map_err(|mut error| {
+    let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    parsed.map_err(|mut error| {
         suggest(&mut error);
         let is_asked_for = !error.use_stderr();
         match error.print().and_then(|()| io::stdout().flush()) {
@@ -26,6 +27,17 @@ pub(crate) fn parse() -> Result<Cli, ExitCode> {
             _ => u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from),
         }
     })
+}
+
+/// Returns the command line's definition. A negative number is a value of an option, which tells what it takes, and not
+/// an unknown option.
+fn command() -> Command {
+    fn with_numbers(command: Command) -> Command {
+        let takes_numbers = |arg: &Arg| arg.get_action().takes_values() && !arg.is_positional();
+        let command = command.mut_args(|arg| if takes_numbers(&arg) { arg.allow_negative_numbers(true) } else { arg });
+        command.mut_subcommands(with_numbers)
+    }
+    with_numbers(Cli::command())
 }
 
 /// Adds a suggestion that clap misses: its similarity measure finds swapped letters in long names only.
@@ -42,7 +54,7 @@ fn suggest(error: &mut Error) {
 
 /// Returns the nearest option of the subcommand, if it differs by at most [`MOST_TYPOS`] letters.
 fn nearest(given: &str) -> Option<String> {
-    let mut command = Cli::command();
+    let mut command = command();
     for word in env::args_os().skip(1) {
         command = command.find_subcommand(&word).cloned().unwrap_or(command);
     }

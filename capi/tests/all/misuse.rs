@@ -127,6 +127,27 @@ fn overlapping_buffers_are_errors_and_an_action_may_replace_its_observation() {
     }
 }
 
+/// A structure where the caller's other memory lies.
+#[test]
+fn a_structure_over_other_memory_is_an_error_before_anything_is_written() {
+    let mut program = Program::start();
+    let mut bytes = Box::new(Aligned(BYTES.0));
+    let in_bytes = bytes.0.as_mut_ptr().wrapping_add(64);
+    let scratch = program.scratch.as_mut_ptr();
+    let words = program.scratch.len();
+    let (image, mut other) = (program.image(), Box::new(std::mem::MaybeUninit::<ActqImage>::zeroed()));
+    let other = other.as_mut_ptr();
+    gives! {
+        actq_image_open(in_bytes.cast(), bytes.0.as_ptr(), bytes.0.len()) => Overlap;
+        actq_image_open(other, bytes.0.as_ptr(), bytes.0.len()) => Ok;
+        actq_head_init(in_bytes.cast(), other, scratch, words) => Overlap;
+        actq_head_init(other.cast(), other, scratch, words) => Overlap;
+        actq_head_init(scratch.cast(), image, scratch, words) => Overlap;
+        actq_image_cost(other, null_mut()) => Null;
+    }
+    assert_eq!(bytes.0, BYTES.0, "the image is as it was");
+}
+
 #[test]
 fn a_step_during_polls_is_an_error_until_the_action_or_a_reset() {
     let mut program = Program::start();

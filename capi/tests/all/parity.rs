@@ -2,8 +2,8 @@
 
 use actq_c::{
     ACTQ_ABI, ActqHead, ActqImage, CCost, CPort, Code, Sizes, Text, actq_abi, actq_begin, actq_image_cost,
-    actq_image_name, actq_pass, actq_play, actq_poll, actq_reset, actq_restore, actq_save, actq_saved_bytes, actq_seed,
-    actq_self_test, actq_status_text, actq_step,
+    actq_image_name, actq_least_budget, actq_pass, actq_play, actq_poll, actq_reset, actq_restore, actq_save,
+    actq_saved_bytes, actq_seed, actq_self_test, actq_status_text, actq_step,
 };
 use actq_kernels::{Head, HeadError, Image, ImageError, SavedError, StepError};
 use actq_testkit::Random;
@@ -90,6 +90,9 @@ fn names_costs_and_numbers_are_those_of_the_image() {
         (cost.instructions, cost.cycles, cost.least_budget),
         (step.instructions, step.cycles, expected.least_budget())
     );
+    let (head, mut least) = (program.head(), 0);
+    // SAFETY: the pointers are valid.
+    assert_eq!((unsafe { actq_least_budget(head, &mut least) }, least), (OK, cost.least_budget));
     assert_eq!(program.lengths(), (expected.obs_len(), expected.act_len()));
     assert_eq!((program.sizes.crc, program.sizes.image_bytes), (expected.crc(), BYTES.0.len()));
     assert_eq!(actq_abi(), ACTQ_ABI);
@@ -160,8 +163,9 @@ fn structures_and_numbers_are_those_of_the_interfaces_version() {
                 Code::Overlap,
                 Code::Polling,
                 Code::NoSuchPort,
+                Code::AbiDiffers,
             ],
-            vec![0, -1, 128, 129, 130, 131, 132, 133, 134],
+            vec![0, -1, 128, 129, 130, 131, 132, 133, 134, 135],
         )
     );
 }

@@ -147,7 +147,7 @@ fn no_output_overwrites_an_input_or_another_output() -> Result<()> {
 fn writing_to_a_link_writes_its_target() -> Result<()> {
     let fixture = Fixture::new()?;
     fs::create_dir(fixture.path("images"))?;
-    fs::write(fixture.path("images/there.actq"), "old")?;
+    fs::write(fixture.path("images/there.actq"), "ACTQ old")?;
     // To an existing file, to a missing one, and through another link.
     for (link, to) in [("a", "images/there.actq"), ("b", "images/new.actq"), ("c", "b2"), ("b2", "images/third.actq")] {
         symlink(to, fixture.path(link))?;
@@ -162,6 +162,23 @@ fn writing_to_a_link_writes_its_target() -> Result<()> {
     failed(&fixture.quantize("--out round")?, 1, &["round: cannot write the file"])?;
     symlink("none/image.actq", fixture.path("lost"))?;
     failed(&fixture.quantize("--out lost")?, 1, &["lost: cannot write the file", "none"])
+}
+
+#[test]
+fn an_image_does_not_replace_a_file_of_another_kind() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let out = fixture.path("train.py");
+    fs::write(&out, "import torch\n")?;
+    failed(
+        &fixture.quantize("--out train.py")?,
+        1,
+        &["train.py: exists and is not an actq image; choose another name"],
+    )?;
+    ensure!(fs::read(&out)? == b"import torch\n", "the file was replaced");
+    fs::write(&out, "")?;
+    succeeded(&fixture.quantize("--out train.py")?)?;
+    ensure!(fs::read(&out)? == fixture.image()?, "an empty file is replaced");
+    Ok(())
 }
 
 #[test]
@@ -216,19 +233,19 @@ fn a_replaced_file_keeps_its_permissions() -> Result<()> {
     File::create(fixture.path("new"))?;
     ensure!(mode(&out)? == mode(&fixture.path("new"))?, "{:o}: not the mode of a new file", mode(&out)?);
     for permissions in [0o600, 0o664, 0o4755] {
-        fs::write(&out, "old")?;
+        fs::write(&out, "ACTQ old")?;
         fs::set_permissions(&out, Permissions::from_mode(permissions))?;
         succeeded(&fixture.quantize("--out image.actq")?)?;
         ensure!(mode(&out)? == permissions & 0o777, "{permissions:o} became {:o}", mode(&out)?);
         ensure!(fs::read(&out)? == fixture.image()?, "another image");
     }
-    fs::write(&out, "old")?;
+    fs::write(&out, "ACTQ old")?;
     fs::set_permissions(&out, Permissions::from_mode(0o444))?;
     failed(
         &fixture.quantize("--out image.actq")?,
         1,
         &["image.actq: cannot write the file: the existing file is read-only"],
     )?;
-    ensure!(fs::read(&out)? == b"old", "a read-only file was replaced");
+    ensure!(fs::read(&out)? == b"ACTQ old", "a read-only file was replaced");
     Ok(())
 }

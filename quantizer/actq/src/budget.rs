@@ -122,8 +122,8 @@ impl fmt::Display for BudgetTooSmall {
         if image {
             return write!(
                 f,
-                "the budget is too small: the smallest image of this policy by this method takes {bytes} bytes, but {limit} are \
-                 allowed; allow {bytes} bytes or more"
+                "the budget is too small: the smallest image of this policy by this method takes {bytes} bytes, and the limit is \
+                 {limit}; allow {bytes} bytes or more"
             );
         }
         let bits = |bytes: f64| 8.0 * bytes / weights.max(1) as f64;
@@ -131,8 +131,8 @@ impl fmt::Display for BudgetTooSmall {
         let enough = (1000.0 * bits(bytes as f64)).ceil() / 1000.0;
         write!(
             f,
-            "the budget is too small: with scales and padding the weights take at least {bytes} bytes, but {limit:.0} are \
-             allowed ({:.3} bits per weight); allow {enough:.3} bits per weight or more",
+            "the budget is too small: with scales and padding the weights take at least {bytes} bytes, and the limit is \
+             {limit:.0} ({:.3} bits per weight); allow {enough:.3} bits per weight or more",
             bits(limit)
         )
     }

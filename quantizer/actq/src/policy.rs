@@ -8,6 +8,7 @@ use crate::around::Around;
 use crate::contract::ActionContract;
 use crate::error::{Result, ensure};
 use crate::graph::Graph;
+use crate::text::count;
 
 /// A policy as it was trained.
 #[derive(Clone, Debug)]
@@ -68,7 +69,7 @@ impl Policy {
     /// Names the key in policy.json that does not fit.
     pub fn check(&self) -> Result<()> {
         let (len, expected) = (self.graph.len_of(self.graph.output()), self.chunk * self.act_len);
-        ensure!(len == expected, "the last op gives {len} values, but chunk * act_dim is {expected}");
+        ensure!(len == expected, "the last op gives {}, but chunk * act_dim is {expected}", count(len, "value"));
         self.contract.playback.check(self.chunk, self.execute)?;
         self.contract.check(self.act_len)
     }

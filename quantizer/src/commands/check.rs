@@ -9,7 +9,8 @@ use anyhow::{Context as _, Result, ensure};
 
 use crate::args::CheckArgs;
 use crate::report::deployment::{Target, targets};
-use crate::terminal::print;
+use crate::report::notes::useless;
+use crate::terminal::{note, print};
 
 /// Runs an image on the raw inputs of a reference, and compares its targets with the expected ones.
 pub(crate) fn run(args: &CheckArgs) -> Result<()> {
@@ -58,8 +59,9 @@ pub(crate) fn run(args: &CheckArgs) -> Result<()> {
         .collect();
     print(&targets(&found, frames.len()))?;
     let worst = found.iter().map(|target| target.nmse).fold(0.0, f64::max);
+    note(useless(worst));
     if let Some(limit) = args.max_nmse {
-        ensure!(worst <= limit, "{shown}: the targets' NMSE is {worst:.3e}, above {limit}; quantize at more bits");
+        ensure!(worst <= limit, "{shown}: the targets' NMSE is {worst:.3e}, above {limit:e}; quantize at more bits");
     }
     Ok(())
 }

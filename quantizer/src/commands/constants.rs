@@ -21,6 +21,10 @@ pub(crate) fn run(args: &ConstantsArgs) -> Result<()> {
         _ => bail!("{shown}: give a name that ends in .rs for Rust, or in .h for C and C++"),
     };
     let prefix = args.out.file_stem().and_then(OsStr::to_str).with_context(|| format!("{shown}: no name of a file"))?;
+    ensure!(
+        prefix.is_ascii() && prefix.starts_with(|c: char| c.is_ascii_alphabetic()),
+        "{shown}: the names of the constants begin with that of the file: use ASCII, a letter first"
+    );
     let outputs = reserve([&args.out], [&args.image].into_iter().chain(&args.gains))?;
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;

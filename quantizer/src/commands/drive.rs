@@ -162,8 +162,10 @@ impl DriveCommand<'_> {
         }
         let status = group::wait(child).with_context(|| format!("cannot wait for {name}"))?;
         if !status.success() {
+            // Rounds have their images in a folder that only --keep keeps.
+            let kept = if self.recordings.is_some() { "with --keep DIR, " } else { "" };
             let message = format!(
-                "{name} failed ({status}): {}; to see why, run it alone with POLICY_CMD={} in the environment",
+                "{name} failed ({status}): {}; to see why, {kept}run it alone with POLICY_CMD={} in the environment",
                 self.command,
                 quoted(policy_command.as_ref())?
             );

@@ -12,7 +12,7 @@ use anyhow::{Context as _, Result, ensure};
 
 use crate::args::EvalArgs;
 use crate::importers::{load, source_files};
-use crate::report::notes::activation_share;
+use crate::report::notes::{activation_share, useless};
 use crate::terminal::{Progress, note, print};
 
 /// Runs an image over recordings and prints its error against the f32 policy.
@@ -43,6 +43,7 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
         Ok(calib) => note(calib.and_then(|calib| Range::of(&calib).warning(&dataset))),
         Err(error) => note([format!("cannot check the range of the observations: {error:#}")]),
     }
+    note(useless(report.nmse));
     if args.json {
         let mut json = serde_json::to_value(&report)?;
         if let Some(own) = own {

@@ -35,7 +35,14 @@ pub fn export(
     let is_identifier = name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
     ensure!(is_identifier, "--name {name:?}: use lower-case letters, digits and underscores, a letter first");
+    ensure!(name != "actq", "--name actq: {name}.h is the library's header; choose another name");
     let run = golden.map(|(recording, steps)| replay(image, recording, steps)).transpose()?;
+    let stale = folder.join(format!("{name}_golden.c"));
+    ensure!(
+        run.is_some() || !stale.exists(),
+        "{}: it is of an earlier export; remove it, or pass --golden",
+        stale.display()
+    );
     let files = files(&image, bytes, name, run.as_ref());
 
     let _folder = OutputFolder::new(folder)?;

@@ -15,6 +15,7 @@ use anyhow::{Result, bail};
 
 use crate::args::{ActivationArg, BudgetArgs, QuantizeArgs};
 use crate::importers::{learned as learned_from, load, policy_files};
+use crate::outputs::files::refuse_foreign;
 use crate::report::learned::learned;
 use crate::report::{notes, quantized, time};
 use crate::terminal::{Progress, note, print, reserve};
@@ -30,6 +31,7 @@ pub fn run(
     let calib = files_of(&args.calib)?;
     let inputs = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned());
     let outputs = reserve([&args.out].into_iter().chain(&args.save_stats), inputs)?;
+    refuse_foreign(&args.out)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
     let source = load(&args.policy_dir)?;
     let has_calib = !calib.is_empty() || Recording::Calib.find(&args.policy_dir)?.is_some();

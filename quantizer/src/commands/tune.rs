@@ -14,6 +14,7 @@ use anyhow::{Context as _, Result, ensure};
 use super::drive::Drive;
 use crate::args::{DistillArgs, LearnArgs, TuneArgs};
 use crate::importers::{load, policy_files};
+use crate::outputs::files::refuse_foreign;
 use crate::outputs::unfinished::{OutputFolder, Scratch};
 use crate::report;
 use crate::terminal::{Progress, note, print, reserve};
@@ -38,6 +39,7 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     }
     let inputs = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned());
     let outputs = reserve([&args.out].into_iter().chain(&args.json), inputs)?;
+    refuse_foreign(&args.out)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
     let policy = load(&args.policy_dir)?;
     ensure!(

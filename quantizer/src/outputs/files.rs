@@ -2,11 +2,12 @@
 
 use std::ffi::OsStr;
 use std::fs::{self, File, Metadata, OpenOptions, Permissions};
-use std::io::{ErrorKind, Write as _};
+use std::io::{ErrorKind, Read as _, Write as _};
 #[cfg(unix)]
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 
+use actq_kernels::Image;
 use anyhow::{Context, Result, bail, ensure};
 
 use super::unfinished::{Part, hold};
@@ -105,6 +106,23 @@ pub fn reserve(outputs: &[&Path], inputs: &[PathBuf]) -> Result<Outputs> {
         before.push((own, output));
     }
     outputs.iter().map(|path| Output::new(path)).collect::<Result<_>>().map(Outputs)
+}
+
+/// Refuses an output for an image that would replace a file of another kind: a wrong name must not cost a file.
+pub fn refuse_foreign(output: &Path) -> Result<()> {
+    let is_file = fs::metadata(output).is_ok_and(|metadata| metadata.is_file());
+    if !is_file {
+        return Ok(());
+    }
+    let mut start = Vec::new();
+    // A file that cannot be read cannot be compared; `reserve` finds out whether it can be written.
+    let read = File::open(output).and_then(|file| file.take(4).read_to_end(&mut start));
+    ensure!(
+        read.is_err() || start.is_empty() || start == Image::MAGIC.to_le_bytes(),
+        "{}: exists and is not an actq image; choose another name, or remove it",
+        output.display()
+    );
+    Ok(())
 }
 
 /// Refuses an output that is one of the inputs, under any name.

@@ -17,12 +17,12 @@ pub fn summary(reading: &Reading) -> String {
         let source = reading.sources.get(&row.name).cloned().unwrap_or_default();
         parts.add_row([row.section.to_owned(), row.name, row.content, source]);
     }
-    let rate = reading.description.rate_hz;
+    let rate = (reading.description.rate_hz * 1e6).round() / 1e6;
     let profile = reading.profile.as_ref().map_or(String::new(), |[upstream, commit]| {
         format!("; its profile was read from {upstream} at {}", commit.get(..12).unwrap_or(commit))
     });
     format!(
-        "family    {}{profile}\nrate      {rate:.6} Hz\naction    {}\n\n{parts}\n\n",
+        "family    {}{profile}\nrate      {rate} Hz\naction    {}\n\n{parts}\n\n",
         reading.family, reading.description.action
     )
 }

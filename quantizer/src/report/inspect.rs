@@ -60,8 +60,9 @@ pub fn report(image: &Image<'_>) -> String {
         let _ = writeln!(text, "playback      {}", playback.join(", "));
     }
     let _ = writeln!(text, "weights       {:.3} bits each, with scales and padding", bits_per_weight(image));
-    let _ =
-        writeln!(text, "scratch       {} bytes, {} of them state", 4 * image.scratch_words(), 4 * image.state().len);
+    let words = image.scratch_words();
+    let state = 4 * image.state().len;
+    let _ = writeln!(text, "scratch       {words} words ({} bytes), {state} bytes of them state", 4 * words);
     let Peak { op, words, placed } = peak(image);
     let name = image.ops().nth(op).map_or("", |op| op.kind.name());
     let _ = writeln!(text, "values        {} bytes, {} of them in use at op {op} ({name})", 4 * placed, 4 * words);

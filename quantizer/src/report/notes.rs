@@ -27,7 +27,10 @@ pub fn activation_share(of: &ActivationShare) -> String {
         n if n == of.linear => "int16".to_owned(),
         _ => format!("int8; linear operations in int16: {}", runs(&of.int16)),
     };
-    format!("{:.0}% of the error ({types})", 100.0 * of.share)
+    let percent = 100.0 * of.share;
+    // Not "-0%".
+    let percent = if percent.abs() < 0.5 { 0.0 } else { percent };
+    format!("{percent:.0}% of the error ({types})")
 }
 
 /// Returns the error for a missing calibration recording, with the steps to record one.
@@ -47,8 +50,9 @@ pub fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Opt
     let without: Vec<usize> = limits.filter(|(_, limits)| limits.is_none()).map(|(i, _)| i).collect();
     (!without.is_empty()).then(|| {
         format!(
-            "no finite limits for actions {}: a motor controller refuses to arm without limits; set low and high of action in \
+            "no finite limits for {} {}: a motor controller refuses to arm without limits; set low and high of action in \
              policy.json, or build the firmware by cargo xtask firmware --limits LOW:HIGH",
+            if without.len() == 1 { "action" } else { "actions" },
             runs(&without)
         )
     })
@@ -100,12 +104,16 @@ pub fn overfit_warning(check: &Check) -> Option<String> {
 
 /// Returns a warning if the image's actions are far from the policy's. An error of 1 is that of a constant action.
 pub fn error_warning(check: &Check) -> Option<String> {
-    let nmse = check.nmse()?;
+    let useless = useless(check.nmse()?)?;
+    Some(format!("{useless}; allow more bits (--bpw, --flash), record more steps for --calib, or try --activations 16"))
+}
+
+/// Returns a warning if actions with this error are far from the policy's.
+pub fn useless(nmse: f64) -> Option<String> {
     // A NaN counts as an error above the limit.
     (nmse.is_nan() || nmse > USELESS).then(|| {
         format!(
-            "the error is {nmse:.2} (0: the policy's actions, 1: no better than their mean): do not drive a robot with this image; allow \
-             more bits (--bpw, --flash), record more steps for --calib, or try --activations 16"
+            "the error is {nmse:.2} (0: the policy's actions, 1: no better than their mean): do not drive a robot with this image"
         )
     })
 }

@@ -35,7 +35,7 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   python   Build and test the Python package in a virtual environment; --optional with torch
   doctor   Check and install the other commands' requirements: Rust targets and QEMU
 
-demo, verify, bench, budgets, compare, faults, fit, firmware, python and stack show their options with --help.";
+demo, verify, bench, budgets, capi, compare, faults, fit, firmware, python and stack show their options with --help.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -17,6 +17,7 @@ pub(crate) fn ensure(targets: &[Target]) -> Result<()> {
         rust_target(target.triple())?;
     }
     let mut emulators: Vec<_> = targets.iter().map(|target| target.board().emulator).collect();
+    emulators.sort_unstable();
     emulators.dedup();
     for emulator in emulators {
         if version(emulator).is_err() {

@@ -99,6 +99,8 @@ fn constants_are_refused_for_other_languages_and_without_gains() -> Result<()> {
     fs::write(dir.path().join("deploy.toml"), GAINS.replace("gains = {", "constants = {} # {"))?;
     for (out, gains, message) in [
         ("made.py", None, "ends in .rs for Rust, or in .h"),
+        ("\u{e4}.h", None, "use ASCII, a letter first"),
+        ("2.h", None, "use ASCII, a letter first"),
         ("made.h", Some("deploy.toml"), "it has no table [gains]; add it"),
     ] {
         let (image, out) = (path("made.actq"), path(out));

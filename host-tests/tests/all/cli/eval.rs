@@ -50,6 +50,11 @@ fn eval_names_the_fault_of_a_recording() -> Result<()> {
     eval(&["heldout.npz", "obs"]).context("observations of another width")?;
     write_recording(&path, &obs, Some(&action(CHUNK * ACT)), full)?;
     eval(&["heldout.npz", "vary"]).context("actions that never vary")?;
+    let other = Array3::from_shape_fn((EPISODES, STEPS, CHUNK * ACT), |(e, t, i)| ((7 * e + 3 * t + i) as f32).sin());
+    write_recording(&path, &obs, Some(&other), full)?;
+    let useless = run(actq(&["eval", &image, "--policy", &text(&fixture.policy()), "--json"]), b"")?;
+    let found = notes(&useless).context("actions of another policy")?;
+    ensure!(found.iter().any(|note| note.ends_with("do not drive a robot with this image")), "{found:?}");
     write_recording(&path, &obs, Some(&action(CHUNK * ACT)), [0; EPISODES])?;
     eval(&["heldout.npz"]).context("no steps")?;
     fs::remove_file(&path)?;

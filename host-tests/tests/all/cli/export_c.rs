@@ -78,7 +78,9 @@ fn exported_sources_compile_and_have_the_image_and_the_actions_of_this_host() ->
             compiles(command.arg(standard).args(STRICT).arg("-I").arg(&include).arg(at("wrapper.cpp")))?;
         }
     }
-    Ok(())
+    // The golden run of this export would stay beside the files of the next one.
+    let again = run(actq(&["export-c", &from, "--out", &out, "--name", "walker"]), b"")?;
+    failed(&again, 1, &["walker_golden.c: it is of an earlier export; remove it, or pass --golden"])
 }
 
 #[test]
@@ -88,9 +90,12 @@ fn names_that_are_no_identifiers_and_files_that_are_no_images_are_refused() -> R
     fs::write(dir.path().join("made.actq"), four_bits(&Made::deployment()?.1.policy)?)?;
     fs::write(dir.path().join("text.actq"), "no image")?;
     let [image, none, out] = ["made.actq", "text.actq", "out"].map(at);
-    for (image, name, message) in
-        [(&image, "2walk", "a letter first"), (&image, "a-b", "use lower-case letters"), (&none, "walker", "text.actq")]
-    {
+    for (image, name, message) in [
+        (&image, "2walk", "a letter first"),
+        (&image, "a-b", "use lower-case letters"),
+        (&image, "actq", "actq.h is the library's header"),
+        (&none, "walker", "text.actq"),
+    ] {
         failed(&run(actq(&["export-c", image, "--out", &out, "--name", name]), b"")?, 1, &[message])?;
     }
     failed(&run(actq(&["export-c", &image, "--out", &none]), b"")?, 1, &["text.actq: exists and is not a folder"])?;

@@ -34,7 +34,7 @@ fn send(signal: &str, child: &Child) -> Result<()> {
 fn signals_leave_no_file_and_set_the_status() -> Result<()> {
     let fixture = Fixture::with_long_recording()?;
     let out = fixture.out("image.actq");
-    fs::write(&out, "an image that is in use")?;
+    fs::write(&out, "ACTQ: an image that is in use")?;
     let before = fixture.snapshot()?;
     for (signal, status) in [("HUP", 129), ("INT", 130), ("TERM", 143)] {
         let mut command = Command::new("env");
@@ -139,13 +139,13 @@ fn signals_at_any_time_leave_whole_images() -> Result<()> {
     let (whole, time) = (fs::read(&out)?, began.elapsed());
     let mut in_time = 0;
     for i in 0..TRIES {
-        fs::write(&out, "old")?;
+        fs::write(&out, "ACTQ old")?;
         let mut child = start()?;
         sleep(time * i / TRIES);
         send("TERM", &child)?;
         child.wait()?;
         let found = fs::read(&out)?;
-        ensure!(found == b"old" || found == whole, "{} bytes after signal {i}", found.len());
+        ensure!(found == b"ACTQ old" || found == whole, "{} bytes after signal {i}", found.len());
         assert_eq!(names(&fixture.out(""))?, ["image.actq"], "after signal {i}");
         in_time += u32::from(found != whole);
     }

@@ -255,7 +255,7 @@ fn faulty_policies_are_named_and_leave_no_file() -> Result<()> {
         let fixture = Fixture::new()?;
         change(&fixture.policy())?;
         let out = fixture.out("image.actq");
-        for old in [None, Some("an image that is in use")] {
+        for old in [None, Some("ACTQ: an image that is in use")] {
             if let Some(old) = old {
                 fs::write(&out, old)?;
             }

@@ -31,7 +31,7 @@ fn a_budget_of_time_is_kept_or_refused() -> Result<()> {
     ensure!(succeeded(&quantize(&["--ms", "1000"])?)?.contains("Predicted time of a step"), "the time is not printed");
     let slowest = time()?;
     let refused = quantize(&["--ms", "0.001"])?;
-    failed(&refused, 1, &["0.001 ms are allowed", "the fastest step takes", "1 MHz"])?;
+    failed(&refused, 1, &["the limit is 0.001 ms", "the fastest step takes", "1 MHz"])?;
     let limit = 0.98 * slowest;
     let kept = quantize(&["--ms", &limit.to_string()])?;
     succeeded(&kept)?;
@@ -120,7 +120,7 @@ fn impossible_budgets_are_refused_before_reading_recordings() -> Result<()> {
     let out = fixture.out("small.actq");
     for (options, words) in [
         ("--flash 600 --method distill", "the smallest image of this policy by this method takes"),
-        ("--flash 600", "600 are allowed; allow"),
+        ("--flash 600", "the limit is 600; allow"),
         ("--bpw 0.01 --method distill", "bits per weight or more"),
     ] {
         failed(&fixture.quantize(&out, options)?, 1, &["the budget is too small", words])?;
@@ -240,7 +240,7 @@ fn the_same_input_gives_the_same_bytes() -> Result<()> {
         let first = fs::read(fixture.image(options)?)?;
         // Another folder, and the old image in the way.
         let copy = Fixture::new()?;
-        fs::write(copy.out(&format!("{options}.actq")), "old")?;
+        fs::write(copy.out(&format!("{options}.actq")), "ACTQ old")?;
         ensure!(first == fs::read(copy.image(options)?)?, "{options}: two runs differ");
     }
     Ok(())

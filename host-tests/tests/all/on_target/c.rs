@@ -114,8 +114,15 @@ fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
     ensure!(names.contains(&"actq_step") && !names.iter().any(|name| name.contains("panic")), "{names:?}");
 
     // Every function of the interface that the program calls stays within the stack that the header states.
-    for function in ["actq_image_open", "actq_head_init", "actq_step", "actq_begin", "actq_poll"] {
-        let path = deepest_path(&at("main-mps2-an386.elf"), function)?;
+    let functions = ["actq_image_open", "actq_head_init", "actq_step", "actq_begin", "actq_poll"];
+    keeps_its_stack(&at("main-mps2-an386.elf"), &functions)?;
+    keeps_its_stack(&at("cooperative.elf"), &["actq_least_budget"])
+}
+
+/// Requires that calls of these functions take no more stack than the header states.
+fn keeps_its_stack(program: &Path, functions: &[&str]) -> Result<()> {
+    for function in functions {
+        let path = deepest_path(program, function)?;
         let bytes: u32 = path.iter().map(|call| call.frame).sum();
         println!("{function}: {bytes} bytes of stack");
         ensure!(bytes as usize <= ACTQ_STACK_BYTES, "{function}: {bytes} bytes of stack: {path:?}");
@@ -222,6 +229,7 @@ fn library_takes_at_most(limits: Limits, widths: &[Width], function: Function, f
     for (open, limit) in ["actq_image_open", "actq_image_open_checksummed"].into_iter().zip(limits) {
         let code = firmware::flash_bytes(&dir.path().join(format!("minimal-{open}.elf")))? - image_bytes;
         println!("{open}: {code} bytes of code with the features {features}");
+        keeps_its_stack(&dir.path().join(format!("self_test-{open}.elf")), &[open, "actq_self_test"])?;
         ensure!(code <= limit, "{open}: {code} bytes of code, more than {limit}");
     }
     Ok(())

@@ -91,7 +91,7 @@ impl Dataset {
         ensure!(episodes > 0 && steps > 0, "array \"obs\" is empty: {:?}", obs.shape);
         ensure!(
             width == sizes.obs,
-            "array \"obs\" has {} per step, but the policy takes {}",
+            "array \"obs\" has {} per step, and {} are needed",
             count(width, "value"),
             sizes.obs
         );

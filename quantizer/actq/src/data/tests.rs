@@ -165,7 +165,7 @@ fn spoilt() -> Vec<(Vec<Named>, &'static str)> {
         ),
         (vec![("obs", floats(&[0, 5, 3]))], "array \"obs\" is empty: [0, 5, 3]"),
         (vec![("obs", floats(&[2, 0, 3]))], "array \"obs\" is empty: [2, 0, 3]"),
-        (vec![("obs", floats(&[2, 5, 4]))], "array \"obs\" has 4 values per step, but the policy takes 3"),
+        (vec![("obs", floats(&[2, 5, 4]))], "array \"obs\" has 4 values per step, and 3 are needed"),
         (
             vec![("obs", ints(&[1]))],
             "array \"obs\" has the shape [1]; use [episode, step, value], or [frame, value] for one episode",
@@ -481,7 +481,7 @@ fn arrays_in_memory_are_checked_as_those_of_files() {
     assert_eq!((&given.obs, &given.length, &*given.name()), (&read.obs, &read.length, "given"));
     for (arrays, expected) in [
         (vec![("observation", floats(&[5, 3]))], "given: array \"obs\" is missing; the file holds observation"),
-        (vec![("obs", floats(&[5, 2]))], "given: array \"obs\" has 2 values per step, but the policy takes 3"),
+        (vec![("obs", floats(&[5, 2]))], "given: array \"obs\" has 2 values per step, and 3 are needed"),
         (vec![("obs", tensor(&[5, 3], Values::Other("uint8".into())))], "given: array \"obs\" is of type uint8"),
     ] {
         let error = format!("{:#}", of(&arrays).expect_err(expected));

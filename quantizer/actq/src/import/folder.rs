@@ -39,12 +39,18 @@ impl Importer for PolicyFolder {
 impl Policy {
     /// Reads `policy.json` and `policy.safetensors` from a folder. Every error names the file and the op or tensor.
     pub fn load(path: &Path) -> Result<Self> {
+        ensure!(path.exists(), "{}: no such file or folder", path.display());
         ensure!(
             path.is_dir(),
-            "{}: not a folder; name a folder that holds policy.json, or an .onnx file",
+            "{}: not a folder; name a folder that holds policy.json, or an .onnx file; `actq import` reads deploy bundles",
             path.display()
         );
         let [json_path, weights_path] = FILES.map(|name| path.join(name));
+        ensure!(
+            json_path.exists(),
+            "{}: cannot read the file: it does not exist; of a deploy bundle, `actq import` makes a policy folder",
+            json_path.display()
+        );
         let json = fs::read(&json_path).with_context(|| format!("{}: cannot read the file", json_path.display()))?;
         let weights =
             fs::read(&weights_path).with_context(|| format!("{}: cannot read the file", weights_path.display()))?;

@@ -13,6 +13,7 @@ use crate::error::{Context, Result, ensure};
 use crate::graph::{Evaluator, Graph};
 use crate::policy::Policy;
 use crate::runtime::with_head;
+use crate::text::count;
 
 /// Errors of the raw network output against recorded f32 actions.
 #[derive(Clone, Debug, Serialize)]
@@ -208,8 +209,9 @@ impl ErrorSums {
             .collect();
         ensure!(
             !ratios.is_empty(),
-            "{}: the recorded actions never vary; record episodes in which the robot acts",
-            recording.display()
+            "{}: the policy's actions never vary over its {}; record episodes in which the robot acts",
+            recording.display(),
+            count(self.steps, "observation")
         );
         let (worst_dimension, worst_nmse) =
             ratios.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();

@@ -193,7 +193,7 @@ impl Options {
         let given = given.join(" and ");
         ensure!(
             given.is_empty() || self.method == Method::Distill,
-            "{given}: method {} does not learn; remove {given}, or pass --method distill and a recording",
+            "{given}: method {} does not learn; remove {given}, or pass --method distill and a recording (without one, the method is rtn)",
             self.method
         );
         ensure!(given.is_empty() || self.learns(), "{given}: --steps 0 does not learn; remove one of them");

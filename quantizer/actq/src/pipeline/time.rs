@@ -115,7 +115,7 @@ impl Draft<'_> {
         let TimeLimit { milliseconds, clock_hz, .. } = self.limit;
         ensure!(
             fastest <= milliseconds,
-            "{milliseconds} ms are allowed, but the fastest step takes {fastest:.3} ms at {} MHz",
+            "the limit is {milliseconds} ms, but the fastest step takes {fastest:.3} ms at {} MHz",
             clock_hz / 1e6
         );
         Ok(())

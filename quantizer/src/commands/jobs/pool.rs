@@ -58,7 +58,11 @@ pub fn complete(jobs: &[Job], store: &Store, pool: &Pool<'_>) -> Result<()> {
         ),
         false => String::new(),
     };
-    ensure!(failed == 0, "{} failed, and {skipped} that need them did not run{kept}", count(failed, "job"));
+    let skipped = match skipped {
+        0 => String::new(),
+        _ => format!(", and {} after them did not run", count(skipped, "job")),
+    };
+    ensure!(failed == 0, "{} failed{skipped}{kept}", count(failed, "job"));
     Ok(())
 }
 
