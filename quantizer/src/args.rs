@@ -10,12 +10,13 @@ use std::path::{Path, PathBuf};
 use actq::methods::{Effort, Method};
 use actq_kernels::Width;
 use anyhow::{Result, bail};
-use clap::{Parser, Subcommand, ValueEnum, value_parser};
+use clap::{Parser, Subcommand, ValueEnum};
 
 use jobs::{JobArgs, MergeArgs, PlanArgs, PoolArgs};
 use link::{KeygenArgs, LinkArgs, SignArgs};
 use values::{
-    clock, command, effort, forced, group, minutes, npz, pair, positive, rounds, size, steps, two_files, width,
+    clock, command, effort, forced, group, minutes, npz, pair, positive, rounds, seed, size, steps, threads, two_files,
+    width,
 };
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
@@ -579,10 +580,10 @@ pub(crate) struct DistillArgs {
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct RunArgs {
     /// Seed of all random numbers
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = seed)]
     pub(crate) seed: u64,
-    /// Threads, at most 256; results do not depend on their number [default: all cores]
-    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = value_parser!(u16).range(..=256))]
+    /// Threads, at most 256, 0 for the default; results do not depend on their number [default: all cores]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = threads)]
     pub(crate) threads: u16,
     /// Show no progress
     #[arg(long)]

@@ -6,7 +6,7 @@ use std::fmt;
 use std::path::Path;
 
 use actq::data::arrays;
-use actq::error::{Context as _, Error, Result, bail, ensure};
+use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::count;
 
 use crate::conventions::{Variant, variants};
@@ -246,19 +246,5 @@ impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { tick, kind, what, got, expected } = self;
         write!(f, "tick {tick}, {kind}: {what} is {got:.6}, and the reference has {expected:.6}")
-    }
-}
-
-impl Comparison {
-    /// Fails with the first difference, if there is one.
-    ///
-    /// # Errors
-    ///
-    /// The first difference.
-    pub fn require_equal(&self) -> Result<()> {
-        match &self.first {
-            None => Ok(()),
-            Some(first) => Err(Error::input(first.to_string())),
-        }
     }
 }

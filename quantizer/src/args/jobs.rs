@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::value_parser;
 
+use super::values::threads;
+
 #[derive(clap::Args)]
 pub(crate) struct PlanArgs {
     /// The spec (SPEC.toml), or a plan
@@ -24,9 +26,9 @@ pub struct JobArgs {
     /// The folder of the results
     #[arg(long, value_name = "DIR")]
     pub(crate) store: PathBuf,
-    /// Threads, at most 256; results do not depend on their number [default: the job's cpus, or fewer if this process may
+    /// Threads, at most 256, 0 for the default; results do not depend on their number [default: the job's cpus, or fewer if this process may
     /// not use as many]
-    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = value_parser!(u16).range(..=256))]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = threads)]
     pub(crate) threads: u16,
     /// Print the progress to standard output, one JSON object a line: work and share (0 to 1); at the end address, cached
     /// and seconds

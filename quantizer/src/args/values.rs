@@ -65,6 +65,17 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "use a number above 0".to_owned())
 }
 
+/// Reads a number of threads.
+pub(super) fn threads(text: &str) -> Result<u16, String> {
+    let number = text.parse().ok().filter(|threads| *threads <= 256);
+    number.ok_or_else(|| "use a number from 0 (the default) to 256".to_owned())
+}
+
+/// Reads a seed.
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| "use a whole number, 0 or more".to_owned())
+}
+
 pub(super) fn finite(text: &str) -> Result<f32, String> {
     let number = text.parse().ok().filter(|x: &f32| x.is_finite());
     number.ok_or_else(|| "use a finite number".to_owned())

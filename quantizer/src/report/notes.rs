@@ -175,7 +175,7 @@ mod tests {
     }
 
     fn check(calib: Option<f64>, heldout: f64) -> Check {
-        let activations = ActivationShare { unrounded_nmse: 0.0, share: 0.125, int16: vec![0, 4], linear: 5 };
+        let activations = ActivationShare { share: 0.125, int16: vec![0, 4], linear: 5 };
         let checked = |nmse: f64, recorded: usize| Checked { report: report(nmse), recorded };
         Check { heldout: Some(checked(heldout, 7)), calib: calib.map(|nmse| checked(nmse, 30)), activations }
     }

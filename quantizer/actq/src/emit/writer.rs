@@ -116,7 +116,9 @@ fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
 
 fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
     let buffer = ImageBuffer::new(bytes);
-    let image = buffer.image(Path::new("the new image"))?;
+    let image = buffer
+        .image(Path::new("the new image"))
+        .context("no image can hold the result; recorded observations near the limits of f32 are a common cause")?;
     with_head(image, |head| {
         observations.iter().map(|obs| Ok(head.step(obs).context("self-test of the new image")?.to_vec())).collect()
     })

@@ -52,9 +52,7 @@ pub fn network_nmse(graph: &Graph, dataset: &Dataset) -> Result<f64> {
 /// Error that rounding the activations adds to an image.
 #[derive(Clone, Debug)]
 pub struct ActivationShare {
-    /// Error (NMSE) of the image's weights with activations in f32.
-    pub unrounded_nmse: f64,
-    /// Share of the image's error that disappears then; below 0 if rounding the activations happens to help.
+    /// Share of the image's error that disappears with activations in f32; below 0 if rounding the activations happens to help.
     pub share: f64,
     /// Linear operations, counted from 0, whose input is rounded to more than int8.
     pub int16: Vec<usize>,
@@ -68,7 +66,7 @@ pub fn activation_share(image: Image<'_>, dataset: &Dataset, nmse: f64) -> Resul
     let limits: Vec<u16> = image.ops().filter_map(|op| op.matrix()).map(|matrix| matrix.x_max).collect();
     let share = if nmse > 0.0 { (nmse - unrounded_nmse) / nmse } else { 0.0 };
     let int16 = (0..limits.len()).filter(|&i| limits[i] > 127).collect();
-    Ok(ActivationShare { unrounded_nmse, share, int16, linear: limits.len() })
+    Ok(ActivationShare { share, int16, linear: limits.len() })
 }
 
 /// A network that gives raw outputs, step by step.

@@ -38,7 +38,12 @@ pub(crate) fn agrees(name: &str, expect: &str, answers: &str) -> Result<()> {
     let comparison = reference.compare(Plan::new(&reading.description, &bundle)?)?;
     println!("{name}, {expect}: {:?}, unread {:?}", comparison.largest, reading.unread);
     ensure!(reading.unread.is_empty(), "{name}: nothing reads {:?}", reading.unread);
-    comparison.require_equal()
+    ensure!(
+        comparison.first.is_none(),
+        "{name}: {}",
+        comparison.first.map_or_else(String::new, |first| first.to_string())
+    );
+    Ok(())
 }
 
 /// Returns the message of an error with its contexts.
