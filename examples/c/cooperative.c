@@ -52,9 +52,7 @@ int main(void) {
         status = actq_least_budget(&head, &least);
     }
     if (status != ACTQ_OK || actq_abi() != ACTQ_ABI || least > SLICE) {
-        print(status != ACTQ_OK ? actq_status_text(status) : "another library, or too short slices");
-        print("\n");
-        return 1;
+        return fail(status != ACTQ_OK ? actq_status_text(status) : "another library, or too short slices");
     }
     RVR = 0xffffff;
     CVR = 0;
@@ -70,9 +68,7 @@ int main(void) {
         turns++;
     }
     if (status != ACTQ_OK) {
-        print(actq_status_text(status));
-        print("\n");
-        return 1;
+        return fail(actq_status_text(status));
     }
     print_number(step);
     print(" actions in ");

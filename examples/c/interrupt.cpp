@@ -45,14 +45,11 @@ extern "C" void tick() {
 
 int main() {
     if (const actq::Status status = head.open({policy_image, POLICY_IMAGE_BYTES / 4}, scratch); !status) {
-        print(status.text());
-        print("\n");
-        return 1;
+        return fail(status.text());
     }
     uint32_t least = 0;
     if (!head.least_budget(least) || least > slice) {
-        print("the slices are too short\n");
-        return 1;
+        return fail("the slices are too short");
     }
     rvr = period - 1;
     cvr = 0;
@@ -68,9 +65,7 @@ int main() {
             } while (status.pending());
         }
         if (!status) {
-            print(status.text());
-            print("\n");
-            return 1;
+            return fail(status.text());
         }
         for (unsigned i = 0; i < POLICY_ACTION_LEN; i++) {
             union {

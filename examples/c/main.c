@@ -16,9 +16,7 @@ static uint32_t scratch[POLICY_SCRATCH_WORDS];
 static int failed(const char *what, actq_status status) {
     print(what);
     print(": ");
-    print(actq_status_text(status));
-    print("\n");
-    return 1;
+    return fail(actq_status_text(status));
 }
 
 /* Counts the values with other bits than the host's. */

@@ -14,6 +14,13 @@ static inline intptr_t semihosting(int operation, const void *argument) {
 /* SYS_WRITE0 */
 static inline void print(const char *text) { semihosting(0x04, text); }
 
+/* Prints why a program fails, and returns its status. */
+static inline int fail(const char *why) {
+    print(why);
+    print("\n");
+    return 1;
+}
+
 static inline void print_number(unsigned number) {
     char text[11];
     char *digit = text + sizeof text - 1;

@@ -1,6 +1,7 @@
 //! Random changes of a valid image, with a correct checksum. An image that passes `Image::new_checked` runs without a
 //! panic, keeps its limits, and depends only on its observations. An image that changes after the check does not panic
-//! either, nor one that passes only `Image::new_checksummed`. The tests need only this crate, so that they also run with words of 32 bits and in Miri.
+//! either, nor one that passes only `Image::new_checksummed`. The tests need only this crate, so that they also run with
+//! words of 32 bits and in Miri.
 
 #[path = "common/draft.rs"]
 mod draft;
@@ -54,15 +55,21 @@ fn mutate(random: &mut Random, draft: &mut Draft, structure: &[usize]) {
     draft.seal();
 }
 
+/// Returns the mutations of a test: the number of the case, its random numbers, and the image.
+fn mutations() -> impl Iterator<Item = (u64, Random, Draft)> {
+    let structure = structure();
+    (0..CASES).map(move |case| {
+        let (mut random, mut draft) = (Random::new(case), Draft::of(VALID));
+        mutate(&mut random, &mut draft, &structure);
+        (case, random, draft)
+    })
+}
+
 /// Passes each accepted mutation to `see` and returns their number. If `see` panics, the test fails with the numbers of
 /// all such cases.
 fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
-    let structure = structure();
     let (mut seen, mut failed) = (0, Vec::new());
-    for case in 0..CASES {
-        let mut random = Random::new(case);
-        let mut draft = Draft::of(VALID);
-        mutate(&mut random, &mut draft, &structure);
+    for (case, mut random, draft) in mutations() {
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             let image = Image::new_checked(draft.bytes()).ok();
             image.map(|image| see(image, &mut random)).is_some()
@@ -133,13 +140,9 @@ fn a_reset_clears_everything() {
 
 #[test]
 fn damage_after_the_check_does_not_panic() {
-    let structure = structure();
+    let scratch = Draft::of(VALID).get(h::W_SCRATCH);
     let mut outcomes = [0; 2];
-    for case in 0..CASES {
-        let mut random = Random::new(case);
-        let mut draft = Draft::of(VALID);
-        let scratch = draft.get(h::W_SCRATCH);
-        mutate(&mut random, &mut draft, &structure);
+    for (case, _, mut draft) in mutations() {
         // The head's memory stays as the header had it.
         draft.set(h::W_SCRATCH, scratch);
         let image = Image::unchecked(draft.bytes()).expect("the header is there");
@@ -154,13 +157,9 @@ fn damage_after_the_check_does_not_panic() {
 
 #[test]
 fn a_correct_checksum_and_any_content_do_not_panic() {
-    let structure = structure();
     // Refused by both, only by the whole check, and by none.
     let mut outcomes = [0; 3];
-    for case in 0..CASES {
-        let mut random = Random::new(case);
-        let mut draft = Draft::of(VALID);
-        mutate(&mut random, &mut draft, &structure);
+    for (case, mut random, draft) in mutations() {
         let checked = Image::new_checked(draft.bytes()).is_ok();
         let image = Image::new_checksummed(draft.bytes());
         assert!(image.is_ok() || !checked, "case {case}: {}", image.unwrap_err());

@@ -7,7 +7,7 @@ use super::limits::zero_or_nan;
 use crate::round::ROUND;
 
 macro_rules! functions {
-    ($($(#[$doc:meta])* $function:ident = $code:literal, $name:literal;)*) => {
+    ($($(#[$doc:meta])* $function:ident = $code:literal, $name:literal $(if $feature:literal)?;)*) => {
         /// The elementwise functions of an image.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
@@ -25,6 +25,22 @@ macro_rules! functions {
                     $(Self::$function => $name,)*
                 }
             }
+
+            /// Returns the feature of this crate with the function; `None` if every build has it.
+            #[cfg(feature = "writer")]
+            pub(crate) fn feature(self) -> Option<&'static str> {
+                let features: &[&'static str] = match self {
+                    $(Self::$function => &[$($feature)?],)*
+                };
+                features.first().copied()
+            }
+
+            /// Returns `true` if this build has the function.
+            pub(crate) const fn is_built(self) -> bool {
+                match self {
+                    $(Self::$function => true $(&& cfg!(feature = $feature))?,)*
+                }
+            }
         }
     };
 }
@@ -32,54 +48,33 @@ functions! {
     /// `max(x, 0)`
     Relu = 0, "relu";
     /// `x` if positive, otherwise `exp(x) - 1`
-    Elu = 1, "elu";
+    Elu = 1, "elu" if "elu";
     /// `x * sigmoid(x)`
-    Silu = 2, "silu";
+    Silu = 2, "silu" if "silu";
     /// `x * Phi(x)` with the exact normal distribution
-    Gelu = 3, "gelu";
+    Gelu = 3, "gelu" if "functions";
     /// GELU by its tanh approximation, as torch's `approximate="tanh"`
-    GeluTanh = 4, "gelu_tanh";
+    GeluTanh = 4, "gelu_tanh" if "functions";
     /// Hyperbolic tangent
-    Tanh = 5, "tanh";
+    Tanh = 5, "tanh" if "elu";
     /// `1 / (1 + exp(-x))`
-    Sigmoid = 6, "sigmoid";
+    Sigmoid = 6, "sigmoid" if "elu";
     /// `e^x`
-    Exp = 7, "exp";
+    Exp = 7, "exp" if "functions";
     /// Sine, of radians
-    Sin = 8, "sin";
+    Sin = 8, "sin" if "functions";
     /// Cosine, of radians
-    Cos = 9, "cos";
+    Cos = 9, "cos" if "functions";
     /// `ln(1 + exp(x))`
-    Softplus = 10, "softplus";
+    Softplus = 10, "softplus" if "functions";
     /// `x * tanh(softplus(x))`
-    Mish = 11, "mish";
+    Mish = 11, "mish" if "functions";
 }
 
 impl Function {
     /// Returns the function of a code in an image.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.get(usize::from(code)).copied()
-    }
-
-    /// Returns the feature of this crate with the function; `None` for ReLU, which every build has.
-    #[cfg(feature = "writer")]
-    pub(crate) const fn feature(self) -> Option<&'static str> {
-        match self {
-            Self::Relu => None,
-            Self::Elu | Self::Tanh | Self::Sigmoid => Some("elu"),
-            Self::Silu => Some("silu"),
-            _ => Some("functions"),
-        }
-    }
-
-    /// Returns `true` if this build has the function.
-    pub(crate) const fn is_built(self) -> bool {
-        match self {
-            Self::Relu => true,
-            Self::Elu | Self::Tanh | Self::Sigmoid => cfg!(feature = "elu"),
-            Self::Silu => cfg!(feature = "silu"),
-            _ => cfg!(feature = "functions"),
-        }
     }
 
     /// Applies the function to every element.

@@ -163,8 +163,11 @@ int main(void) {
 }
 "#;
 
-/// Bytes of code beside the image, at most: of a program that checks the image, and of one that checks its checksum.
-type Limits = [u64; 2];
+/// Functions that open an image: with a check of its content, and of its checksum only.
+const OPEN: [&str; 2] = ["actq_image_open", "actq_image_open_checksummed"];
+
+/// Bytes of code beside the image, at most: of a program with each of these functions.
+type Limits = [u64; OPEN.len()];
 
 #[test]
 fn a_library_for_an_mlp_of_2_bits_is_small() -> Result<()> {
@@ -213,7 +216,7 @@ fn library_takes_at_most(limits: Limits, widths: &[Width], function: Function, f
     let settings =
         listings(&document, "sh")[0].lines().filter(|line| line.contains("=\"")).collect::<Vec<_>>().join("\n");
     let build = "set -e
-        for open in actq_image_open actq_image_open_checksummed; do
+        for open in $OPEN; do
           for file in c/minimal.c c/self_test.c c/startup.c policy/policy.c; do
             arm-none-eabi-gcc $CORE $STRICT -std=c99 $INCLUDE -DOPEN=$open -c $file -o $(basename $file .c).o
           done
@@ -222,11 +225,11 @@ fn library_takes_at_most(limits: Limits, widths: &[Width], function: Function, f
             qemu-system-arm -M mps2-an386 -display none -semihosting -kernel $program-$open.elf
           done
         done";
-    shell(&dir, &format!("{settings}\n{build}"))?;
+    shell(&dir, &format!("OPEN='{}'\n{settings}\n{build}", OPEN.join(" ")))?;
     let manifest = fs::read_to_string(dir.path().join("actq-cortex-m4f/manifest.json"))?;
     let manifest: serde_json::Value = serde_json::from_str(&manifest)?;
     ensure!(manifest["features"] == features, "{}", manifest["features"]);
-    for (open, limit) in ["actq_image_open", "actq_image_open_checksummed"].into_iter().zip(limits) {
+    for (open, limit) in OPEN.into_iter().zip(limits) {
         let code = firmware::flash_bytes(&dir.path().join(format!("minimal-{open}.elf")))? - image_bytes;
         println!("{open}: {code} bytes of code with the features {features}");
         keeps_its_stack(&dir.path().join(format!("self_test-{open}.elf")), &[open, "actq_self_test"])?;

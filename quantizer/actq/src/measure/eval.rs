@@ -52,7 +52,8 @@ pub fn network_nmse(graph: &Graph, dataset: &Dataset) -> Result<f64> {
 /// Error that rounding the activations adds to an image.
 #[derive(Clone, Debug)]
 pub struct ActivationShare {
-    /// Share of the image's error that disappears with activations in f32; below 0 if rounding the activations happens to help.
+    /// Share of the image's error that disappears with activations in f32; below 0 if rounding the activations happens
+    /// to help.
     pub share: f64,
     /// Linear operations, counted from 0, whose input is rounded to more than int8.
     pub int16: Vec<usize>,
