@@ -3,6 +3,7 @@
 
 pub(crate) mod application;
 mod c;
+mod compact;
 mod cost;
 mod counting;
 mod denoising;

@@ -4,15 +4,40 @@
 //! assembler for Cortex-M4, M7 and M33, and `armv7em_fpu` assembler that also needs their FPU's registers. All of them
 //! compute the same bits; the tests run them on the same data. The build script detects the backends of a target.
 
-/// Assembles a file. A module's assembler accepts the instructions of its architecture, which for Armv8-M exclude the
-/// DSP extension whatever processor the build names; so the file names the processor.
+/// The first line of a file. A module's assembler accepts the instructions of its architecture, which for Armv8-M
+/// exclude the DSP extension whatever processor the build names; so the file names the processor.
+#[cfg(all(actq_armv7em, actq_armv8m))]
+macro_rules! processor {
+    () => {
+        ".cpu cortex-m33"
+    };
+}
+#[cfg(all(actq_armv7em, not(actq_armv8m)))]
+macro_rules! processor {
+    () => {
+        ""
+    };
+}
+
+/// The symbol `COMPACT` in a file: 1 where loops are short.
+#[cfg(all(actq_armv7em, feature = "compact"))]
+macro_rules! compact {
+    () => {
+        ".set COMPACT, 1"
+    };
+}
+#[cfg(all(actq_armv7em, not(feature = "compact")))]
+macro_rules! compact {
+    () => {
+        ".set COMPACT, 0"
+    };
+}
+
+/// Assembles a file.
 #[cfg(actq_armv7em)]
 macro_rules! assembler {
     ($file:literal) => {
-        #[cfg(actq_armv8m)]
-        core::arch::global_asm!(".cpu cortex-m33", include_str!($file), options(raw));
-        #[cfg(not(actq_armv8m))]
-        core::arch::global_asm!(include_str!($file), options(raw));
+        core::arch::global_asm!(processor!(), compact!(), include_str!($file), options(raw));
     };
 }
 

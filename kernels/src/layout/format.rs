@@ -31,6 +31,9 @@ impl Cell {
     }
 }
 
+/// `true` if the kernels in assembler have short loops, which take less code and more time.
+pub(super) const COMPACT: bool = cfg!(feature = "compact");
+
 /// The form of the prepared activations for a layout: they are cut into column chunks, whose sums a kernel separates
 /// before they can overflow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

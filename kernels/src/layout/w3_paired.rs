@@ -19,7 +19,7 @@
 //! half holds `8*sum((code - 3.5) * x) + 0x8000`: at most `8 * 3.5 * 127 * 8 = 28448` away from the middle after a
 //! chunk of 8 columns. The rest is as in [`super::w2_paired`].
 
-use super::format::{Cell, Format, QUAD, Start, Sums, XLayout, smlad};
+use super::format::{COMPACT, Cell, Format, QUAD, Start, Sums, XLayout, smlad};
 use super::width::Width;
 
 /// The codes of a set.
@@ -58,7 +58,7 @@ impl Format for W3Paired {
     const STEP: usize = 8;
     const X: XLayout = XLayout {
         shift: 3,
-        run: 64,
+        run: if COMPACT { 32 } else { 64 },
         chunk: 8,
         start_words: 1,
         starts: [Start { bias: 0x8000, factor: -28 }, Start::NONE],

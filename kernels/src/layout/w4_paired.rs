@@ -20,7 +20,7 @@
 //! `B = (p - A) / 2^12` and `D = (q - C) / 2^12` are exact. That holds while all sums have 20 bits:
 //! `15 * 127 * 256 = 487680` is below `2^19 = 524288`, so a chunk has up to 256 columns.
 
-use super::format::{Cell, Format, STRIP, Start, Sums, XLayout, smlad};
+use super::format::{COMPACT, Cell, Format, STRIP, Start, Sums, XLayout, smlad};
 use super::width::Width;
 
 /// Rows a and b, or, rotated, c and d.
@@ -41,7 +41,7 @@ impl Format for W4Paired {
     const STEP: usize = 8;
     const X: XLayout = XLayout {
         shift: 1,
-        run: 32,
+        run: if COMPACT { 8 } else { 32 },
         chunk: 256,
         // Even rows have codes, for 2*code - 15; odd rows code - 8, for 2*(code - 8) + 1.
         start_words: 2,

@@ -12,7 +12,7 @@
 //! MACs. Both start from `-128 * sum(x)`, and the odd row's sum is their difference over 2^8. It has 24 bits as long as
 //! `128 * 127 * 512 = 8323072` is below `2^23 = 8388608`: a chunk has up to 512 columns.
 
-use super::format::{Cell, Format, QUAD, Start, Sums, XLayout, smlad};
+use super::format::{COMPACT, Cell, Format, QUAD, Start, Sums, XLayout, smlad};
 use super::width::Width;
 
 /// The even row in both lanes, as UXTB16 extracts it.
@@ -31,7 +31,7 @@ impl Format for W8Paired {
     const STEP: usize = 8;
     const X: XLayout = XLayout {
         shift: 0,
-        run: 64,
+        run: if COMPACT { 8 } else { 64 },
         chunk: 512,
         start_words: 1,
         starts: [Start { bias: 0, factor: -128 }, Start::NONE],

@@ -56,6 +56,10 @@ impl Core {
         self.flags.iter().find_map(|flag| flag.strip_prefix("-mcpu="))
     }
 
+    fn has_assembler(self) -> bool {
+        self.target.is_some_and(Target::has_assembler)
+    }
+
     /// Templates of the package's files for build systems (in `capi/package`), and their names in the package.
     fn templates(self) -> Vec<(&'static str, &'static str)> {
         let mut all = vec![
@@ -82,7 +86,7 @@ impl Core {
     ///
     /// If cargo cannot build it, or the file cannot be read.
     fn library(self, features: &str) -> Result<Vec<u8>> {
-        let profile = if self.target.is_some_and(Target::has_assembler) { "capi" } else { "capi-portable" };
+        let profile = if self.has_assembler() { "capi" } else { "capi-portable" };
         let mut arguments = vec!["rustc", "--quiet", "--package", "actq-capi", "--lib", "--crate-type", "staticlib"];
         let features = format!("panic-handler {features}");
         arguments.extend(["--no-default-features", "--features", &features, "--profile", profile]);
@@ -102,19 +106,25 @@ impl Core {
 
     /// Writes the package to `out`: an archive if its name ends in `.zip`, otherwise a folder. Neither may exist before,
     /// but for an empty folder. The library runs any image, or only images that need no other features of the kernels
-    /// than `image`.
+    /// than `image`; its loops are short if `compact`.
     ///
     /// # Errors
     ///
-    /// If the library cannot be built, or a file cannot be written.
-    pub fn package(self, out: &Path, image: Option<&Image<'_>>) -> Result<()> {
+    /// If the core has no loops that could be short, the library cannot be built, or a file cannot be written.
+    pub fn package(self, out: &Path, image: Option<&Image<'_>>, compact: bool) -> Result<()> {
+        ensure!(
+            !compact || self.has_assembler(),
+            "--compact shortens loops in assembler, and {} has none; leave it out",
+            self.name
+        );
         let is_archive = out.extension().is_some_and(|extension| extension == "zip");
         let is_free =
             if is_archive { !out.exists() } else { fs::read_dir(out).map_or(true, |mut files| files.next().is_none()) };
         ensure!(is_free, "{}: exists already; remove it, or name another file or folder", out.display());
         let mut files = Files::default();
-        let features =
-            image.map_or_else(|| "default".to_owned(), |image| image.features().collect::<Vec<_>>().join(" "));
+        let mut features = image.map_or_else(|| vec!["default"], |image| image.features().collect());
+        features.extend(compact.then_some("compact"));
+        let features = features.join(" ");
         let library = self.library(&features)?;
         files.put("lib/libactq.a", &library);
         let capi = root().join("capi");

@@ -128,6 +128,17 @@ pub fn binary_in(profile: &str, name: &str, target: Target) -> Result<PathBuf> {
     Ok(build(BENCH, &[name], features, &target_dir(), target, profile, &[])?.join(name))
 }
 
+/// Does the same as [`binary`] for a Cortex-M4 with the kernels' feature `compact` and the image of [`harness`].
+pub fn compact_binary(name: &str) -> Result<PathBuf> {
+    let target = Target::Fpu;
+    let build = || {
+        let image = built_in()?.to_string_lossy();
+        let binaries = ["bench", "golden", HARNESS];
+        build(BENCH, &binaries, "compact", &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &image)])
+    };
+    Ok(build_once("compact", target, build)?.join(name))
+}
+
 /// Does the same as [`binary`] without the assembler (`ACTQ_BACKEND=portable`).
 pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
     if !target.has_assembler() {

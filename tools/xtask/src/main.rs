@@ -31,7 +31,7 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   stack    Compute the maximum stack of the controller from the calls in its ELF file: --board NAME, or --elf FILE
   fit      Measure the cost model's rates again (after every change of the kernels)
   verify   Format, lints, tests, a smoke run in QEMU; with --all everything that CI checks
-  capi     Package the C interface: --target CORE --out DIR [--image F.actq]
+  capi     Package the C interface: --target CORE --out DIR [--image F.actq] [--compact]
   python   Build and test the Python package in a virtual environment; --optional with torch
   doctor   Check and install the other commands' requirements: Rust targets and QEMU
 

@@ -29,7 +29,7 @@ fn image(policy: &Policy, options: &Options) -> Result<Vec<u8>> {
     Ok(quantize(policy, &Recordings::load(policy)?, options, ())?.image)
 }
 
-fn distill(bits: f64) -> Options {
+pub(super) fn distill(bits: f64) -> Options {
     // Learning changes the weights' values, on which no time depends.
     Options { steps: Some(2), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) }
 }
@@ -138,10 +138,15 @@ fn steps_of_shared_policies_match_the_prediction() -> Result<()> {
     Ok(())
 }
 
-/// Runs every image in polls of several budgets: each poll stays within its budget, and the actions have the host's
-/// bits. Returns the number of budgets that were not below the least.
-fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
-    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
+/// Runs every image in polls of several budgets, which depend on the image's least one: each poll stays within its budget,
+/// and the actions have the host's bits. Returns the number of budgets that were not below the least.
+pub(super) fn polls_keep_their_budget(
+    elf: &Path,
+    dir: &Path,
+    images: &[Options],
+    budgets: impl Fn(u32) -> Vec<u32>,
+) -> Result<usize> {
+    let counter = Counter::build()?;
     let policy = Policy::load(dir)?;
     let observations = observations(dir, &policy)?;
     let mut tried = 0;
@@ -152,12 +157,12 @@ fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
         let expected = with_head(image, |head| {
             observations[..4].iter().map(|obs| Ok(head.step(obs)?.to_vec())).collect::<Result<Vec<_>>>()
         })?;
-        for budget in [2_000, 5_000, 20_000, image.least_budget()] {
+        for budget in budgets(image.least_budget()) {
             let at = || format!("{}, {options:?} in polls of {budget}", policy.name);
             let arguments = format!("poll {budget}");
             if budget < image.least_budget() {
                 let slot = qemu::slot(&bytes)?;
-                let command = qemu::command(&elf, Some(slot.path()), &arguments)?;
+                let command = qemu::command(elf, Some(slot.path()), &arguments)?;
                 let output = qemu::run(command, &qemu::step_request(&observations[0]))?;
                 let refusal = StepError::Budget { needed: image.least_budget(), given: budget };
                 let stderr = String::from_utf8_lossy(&output.stderr);
@@ -165,7 +170,7 @@ fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
                 ensure!(stderr.trim_end() == format!("firmware: step: {refusal}"), "{}: {stderr}", at());
                 continue;
             }
-            let run = profile::regions(&elf, &counter, &bytes, &arguments, &observations[..4]);
+            let run = profile::regions(elf, &counter, &bytes, &arguments, &observations[..4]);
             let (costs, actions) = run.with_context(at)?;
             ensure!(bits(&actions.concat()) == bits(&expected.concat()), "{}: other bits", at());
             let largest = costs.iter().map(|c| c.instructions).max().unwrap_or(0);
@@ -178,9 +183,14 @@ fn polls_keep_their_budget(dir: &Path, images: &[Options]) -> Result<usize> {
     Ok(tried)
 }
 
+/// Budgets of an image with this least one.
+fn budgets(least: u32) -> Vec<u32> {
+    vec![2_000, 5_000, 20_000, least]
+}
+
 #[test]
 fn polls_stay_within_their_budget() -> Result<()> {
-    let tried = polls_keep_their_budget(&ur3(), &images())?;
+    let tried = polls_keep_their_budget(&firmware::harness(Target::Fpu)?, &ur3(), &images(), budgets)?;
     ensure!(tried >= 10, "only {tried} budgets were not below the least");
     Ok(())
 }
@@ -188,8 +198,10 @@ fn polls_stay_within_their_budget() -> Result<()> {
 #[test]
 fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
+    let elf = firmware::harness(Target::Fpu)?;
     for name in ["go1_mlp", "g1_lstm256", "fetch_pickplace"] {
-        polls_keep_their_budget(&policies.join(name), &[distill(2.0), rtn(Width::W4, 32, Activations::Int8)])?;
+        let images = [distill(2.0), rtn(Width::W4, 32, Activations::Int8)];
+        polls_keep_their_budget(&elf, &policies.join(name), &images, budgets)?;
     }
     Ok(())
 }

@@ -15,7 +15,7 @@ use super::c::{Runs, folder, is_installed, shell};
 use crate::docs::listings;
 
 fn package(dir: &TempDir, core: &str) -> Result<()> {
-    Core::of(core).context("a core")?.package(&dir.path().join(core), None)
+    Core::of(core).context("a core")?.package(&dir.path().join(core), None, false)
 }
 
 /// Returns the values of `key` in a text of lines `key<separator>value`.
@@ -64,7 +64,7 @@ fn packages_that_are_made_together_have_their_own_libraries() -> Result<()> {
     let core = Core::of("cortex-m4f").context("a core")?;
     let library = &|only: Option<&Image<'_>>| -> Result<Vec<u8>> {
         let dir = TempDir::new()?;
-        core.package(dir.path(), only)?;
+        core.package(dir.path(), only, false)?;
         Ok(fs::read(dir.path().join("lib/libactq.a"))?)
     };
     let alone = [library(None)?, library(Some(&image))?];

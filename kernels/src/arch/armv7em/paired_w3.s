@@ -87,9 +87,14 @@ actq_w3_paired_row:
     strd r12, r12, [sp, #16]
     tbh [pc, r9, lsl #1]
 7:
-    .irp step, 2f, 11f, 12f, 13f, 14f, 15f, 16f, 17f
+    .irp step, 2f, 11f, 12f, 13f
     .hword (\step - 7b) / 2
     .endr
+    .if !COMPACT
+    .irp step, 14f, 15f, 16f, 17f
+    .hword (\step - 7b) / 2
+    .endr
+    .endif
     .balign 4
 1:
     ldmia.w sp, {r1, r10-r12}
@@ -99,10 +104,16 @@ actq_w3_paired_row:
     add r10, r10, r9
     add r11, r11, r6
     pkhtb r12, r6, r9, asr #16
-    .irp step, 11, 12, 13, 14, 15, 16, 17
+    .irp step, 11, 12, 13
 \step:
     d3_next_chunk
     .endr
+    .if !COMPACT
+    .irp step, 14, 15, 16, 17
+\step:
+    d3_next_chunk
+    .endr
+    .endif
     ldrd r7, r8, [sp, #16]
     ldr lr, [sp, #32]
     sxtah r7, r7, r12

@@ -143,6 +143,9 @@ actq_w4_paired_row:
     addne lr, r2, #32
     str lr, [sp, #36]
     mov r2, r12
+    .if COMPACT
+    b.n 1f
+    .else
     beq.n 1f
 9:
     ldmia.w sp, {r1, r3-r8}
@@ -152,6 +155,7 @@ actq_w4_paired_row:
     .irp step, 10f, 11f, 12f, 13f
     .hword (\step - 7b) / 2
     .endr
+    .endif
 3:
     c4_start
     b.n 2f
@@ -160,11 +164,13 @@ actq_w4_paired_row:
     ldmia.w sp, {r1, r3-r8}
 2:
     ldr r10, [r1], #4
+    .if !COMPACT
     .irp step, 10, 11, 12
 \step:
     c4_cols8
     .endr
 13:
+    .endif
     c4_cols8 0, 1
     ldr lr, [sp, #40]
     cmp r1, lr
@@ -191,8 +197,12 @@ actq_w4_paired_row:
     ldr r9, [sp, #28]
     strd r12, r11, [sp, #32]
     str r9, [sp, #40]
+    .if COMPACT
+    b.n 1b
+    .else
     ldr r11, [sp, #52]
     b.w 9b
+    .endif
 8:
     add sp, sp, #60
     pop {r4-r11, pc}

@@ -72,6 +72,9 @@ actq_w8_paired_row:
     it ne
     addne r11, r2, #16
     str r11, [sp, #28]
+    .if COMPACT
+    b.n 1f
+    .else
     beq.n 1f
 9:
     ldmia.w sp, {r1, r6-r9}
@@ -80,6 +83,7 @@ actq_w8_paired_row:
     .irp step, 10f, 11f, 12f, 13f, 14f, 15f, 16f, 17f
     .hword (\step - 7b) / 2
     .endr
+    .endif
 3:
     r8_start
     b.n 2f
@@ -87,10 +91,14 @@ actq_w8_paired_row:
 1:
     ldmia.w sp, {r1, r6-r9}
 2:
+    .if COMPACT
+    r8_cols8
+    .else
     .irp step, 10, 11, 12, 13, 14, 15, 16, 17
 \step:
     r8_cols8
     .endr
+    .endif
     ldr r2, [sp, #32]
     cmp r1, r2
     bne.w 2b
@@ -113,8 +121,12 @@ actq_w8_paired_row:
     add r11, r10, #16
     strd r10, r11, [sp, #24]
     str r2, [sp, #32]
+    .if COMPACT
+    b.n 1b
+    .else
     ldr r10, [sp, #44]
     b.w 9b
+    .endif
 8:
     add sp, sp, #52
     pop {r4-r11, pc}

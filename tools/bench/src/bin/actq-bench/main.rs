@@ -88,17 +88,21 @@ enum Command {
         /// Leave out what this image does not need: widths, operations, functions. The library refuses images that need it
         #[arg(long, value_name = "F.actq")]
         image: Option<PathBuf>,
+        /// Use shorter loops: up to 1.8 KB of code less, up to 13 % more time, the same bits (not on cores without the assembler:
+        /// cortex-m0plus, cortex-m3, rv32imac, host)
+        #[arg(long)]
+        compact: bool,
     },
 }
 
 /// Packages the C interface for a core.
-fn capi(core: &str, out: &Path, image: Option<&Path>) -> Result<()> {
+fn capi(core: &str, out: &Path, image: Option<&Path>, compact: bool) -> Result<()> {
     let names: Vec<_> = CORES.iter().map(|core| core.name).collect();
     let known = Core::of(core);
     let known = known.with_context(|| format!("--target {core}: use one of {}", names.join(", ")))?;
     match image {
-        None => known.package(out, None)?,
-        Some(path) => known.package(out, Some(&ImageBuffer::read(path)?.image(path)?))?,
+        None => known.package(out, None, compact)?,
+        Some(path) => known.package(out, Some(&ImageBuffer::read(path)?.image(path)?), compact)?,
     }
     println!("{}: the C interface for {core}; build with {}", out.display(), known.flags.join(" "));
     Ok(())
@@ -111,7 +115,7 @@ fn main() -> ExitCode {
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
         Command::Fit => fit::run(),
-        Command::Capi { target, out, image } => capi(&target, &out, image.as_deref()),
+        Command::Capi { target, out, image, compact } => capi(&target, &out, image.as_deref(), compact),
         Command::Stack { board: Some(board), .. } => stack::of_board(&board),
         Command::Stack { elf, .. } => stack::show(&elf.unwrap_or_default()),
     };
