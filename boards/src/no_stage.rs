@@ -12,6 +12,8 @@ pub struct NoStage<const TOP: u16> {
     phases: [NoPhase<TOP>; 3],
     /// `true` if the stage is enabled.
     pub on: bool,
+    /// `true` if the break input is active.
+    pub broken: bool,
 }
 
 impl<const TOP: u16> NoStage<TOP> {
@@ -48,12 +50,16 @@ impl<const TOP: u16> Stage for NoStage<TOP> {
     }
 
     fn enable(&mut self) -> bool {
-        self.on = true;
-        true
+        self.on = !self.broken;
+        self.on
     }
 
     fn is_on(&mut self) -> bool {
         self.on
+    }
+
+    fn is_broken(&mut self) -> bool {
+        self.broken
     }
 
     fn disable(&mut self) {

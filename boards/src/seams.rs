@@ -60,6 +60,8 @@ pub enum Cause {
     Software,
     /// A watchdog.
     Watchdog,
+    /// A supply voltage that was too low.
+    Brownout,
 }
 
 impl Cause {
@@ -71,6 +73,7 @@ impl Cause {
             Self::Pin => "pin",
             Self::Software => "software",
             Self::Watchdog => "watchdog",
+            Self::Brownout => "brown-out",
         }
     }
 }
@@ -88,6 +91,9 @@ pub trait Stage {
 
     /// Returns `true` while the outputs are enabled; a break input disables them.
     fn is_on(&mut self) -> bool;
+
+    /// Returns `true` while the break input is active, whether or not the outputs are enabled.
+    fn is_broken(&mut self) -> bool;
 
     /// Switches all six outputs off immediately.
     fn disable(&mut self);

@@ -22,8 +22,11 @@ const ATTEMPTS: usize = 3;
 /// Fails, with the reason, if a controller that was armed is not any more.
 pub(crate) fn require_armed(status: &Status) -> Result<()> {
     if status.state != State::Armed {
-        let why = status.fault.map_or("it was disarmed".to_owned(), |fault| fault.to_string());
-        bail!("the controller is {}: {why}", status.state);
+        // A fault stays in the status after the controller was disarmed.
+        match status.fault {
+            Some(fault) if status.state == State::Latched => bail!("the controller is {}: {fault}", status.state),
+            _ => bail!("the controller is {}", status.state),
+        }
     }
     Ok(())
 }
@@ -182,16 +185,32 @@ impl Client {
         outcome.with_context(|| format!("cannot set {parameter} of axis {axis} to {value}"))
     }
 
-    /// Arms the controller.
+    /// Arms the controller. If one of several repetitions of the request may have armed it, and it is not armed any more,
+    /// it is not armed again: it may have stopped for a reason.
     ///
     /// # Errors
     ///
-    /// Fails if the controller refuses, or without an answer.
+    /// Fails if the controller refuses, does not answer, or may have stopped since.
     pub fn arm(&mut self) -> Result<()> {
-        // A repetition whose first answer was lost has an old token, too.
-        let is_armed = |client: &mut Self| Ok(client.status()?.state == State::Armed);
-        let outcome = self.change_unless(|token| Message::Arm { token }, is_armed)?;
-        outcome.context("not armed")?;
+        let begun = Instant::now();
+        for attempt in 1.. {
+            let (outcome, sent) = self.with_token(|token| Message::Arm { token })?;
+            if outcome != Err(Refusal::Token) {
+                outcome.context("not armed")?;
+                break;
+            }
+            // A repetition whose first answer was lost has an old token, too.
+            let status = self.status()?;
+            if status.state == State::Armed {
+                break;
+            }
+            if sent > 1 {
+                require_armed(&status).context("not armed, or not any more; arm it again if nothing is wrong")?;
+            }
+            if attempt >= ATTEMPTS && begun.elapsed() >= self.timeout {
+                outcome.context("not armed")?;
+            }
+        }
         // Earlier statuses describe the earlier state.
         self.events.retain(|event| !matches!(event, Event::Status(_)));
         Ok(())
@@ -206,37 +225,27 @@ impl Client {
         self.request(&Message::Disarm)?.1.context("not disarmed")
     }
 
-    /// Sends a request that is valid in any state with the current token.
+    /// Sends a request that may be repeated with the current token, until the token is accepted or time is over: a
+    /// repetition of an earlier request, or a silent line, may have changed the token again.
     pub(crate) fn change<'m>(&mut self, message: impl Fn(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
-        self.change_unless(message, |_| Ok(false))
-    }
-
-    /// As [`Self::with_token`], until the token is accepted, `is_done` is true, or time is over: a repetition of an
-    /// earlier request, or a silent line, may have changed the token again.
-    fn change_unless<'m>(
-        &mut self,
-        message: impl Fn(u32) -> Message<'m>,
-        is_done: impl Fn(&mut Self) -> Result<bool>,
-    ) -> Result<Result<(), Refusal>> {
         let (begun, mut attempts) = (Instant::now(), 0);
         loop {
-            let outcome = self.with_token(&message)?;
-            if outcome != Err(Refusal::Token) {
-                return Ok(outcome);
-            }
-            if is_done(self)? {
-                return Ok(Ok(()));
-            }
+            let (outcome, _) = self.with_token(&message)?;
             attempts += 1;
-            if attempts >= ATTEMPTS && begun.elapsed() >= self.timeout {
+            if outcome != Err(Refusal::Token) || attempts >= ATTEMPTS && begun.elapsed() >= self.timeout {
                 return Ok(outcome);
             }
         }
     }
 
-    /// Sends a request with the current token.
-    fn with_token<'m>(&mut self, message: impl FnOnce(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
+    /// Sends a request with the current token; returns the outcome, and how often it was sent.
+    fn with_token<'m>(&mut self, message: impl FnOnce(u32) -> Message<'m>) -> Result<(Result<(), Refusal>, usize)> {
         let token = self.status()?.token;
-        Ok(self.request(&message(token))?.1)
+        self.ask(&message(token), |event, numbers| match event {
+            Event::Ack { of, refusal, .. } if numbers.contains(of) => {
+                Some((refusal.map_or(Ok(()), Err), numbers.len()))
+            }
+            _ => None,
+        })
     }
 }

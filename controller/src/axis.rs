@@ -13,7 +13,7 @@ pub enum SafeAction {
     Coast,
     /// Drives the last value down to zero.
     Ramp {
-        /// Change in a tick, above 0.
+        /// Change in a tick, above 0. A smaller rate of the axis comes first.
         step: f32,
     },
 }
@@ -147,7 +147,10 @@ impl Axis {
             (SafeAction::Coast, _) => Output::Coast,
             (SafeAction::Hold | SafeAction::Ramp { .. }, Output::Brake | Output::Coast) => last,
             (SafeAction::Hold, Output::Drive(_)) => last,
-            (SafeAction::Ramp { step }, Output::Drive(value)) => Output::Drive(towards(value, 0.0, step)),
+            (SafeAction::Ramp { step }, Output::Drive(value)) => {
+                let step = if self.rate < step { self.rate } else { step };
+                Output::Drive(towards(value, 0.0, step))
+            }
         }
     }
 }

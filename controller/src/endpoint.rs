@@ -18,10 +18,6 @@ use crate::requests::{Settings, request};
 use crate::safety::{Safety, Shared};
 use crate::update::Update;
 
-/// Ticks without a good frame, while not armed, after which the controller accepts any sequence number, because the
-/// host may have restarted.
-pub const QUIET: u32 = 1000;
-
 /// Facts that a controller reports about itself, besides its decisions.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
@@ -157,14 +153,14 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
     }
 
     /// While not armed: resets the clock tracking if no valid observation arrived in time, and the sequence numbers if
-    /// no good frame arrived for [`QUIET`] ticks. An earlier frame could then be accepted again, so the token is
+    /// no good frame arrived for [`Settings::quiet`] ticks. An earlier frame could then be accepted again, so the token is
     /// renewed.
     fn relearn<const AXES: usize>(&mut self, safety: &mut impl Shared<AXES>) {
         let (ticks, stale, state) = safety.with(|safety| (safety.ticks(), safety.is_stale(), safety.state()));
         if state == State::Armed {
             return;
         }
-        let is_quiet = ticks.wrapping_sub(self.heard_at) > QUIET;
+        let is_quiet = ticks.wrapping_sub(self.heard_at) > self.settings.quiet;
         if stale || is_quiet {
             self.guard.reopen();
         }

@@ -13,7 +13,7 @@ pub enum Check {
     Clock,
     /// The watchdog runs.
     Watchdog,
-    /// No break input and no overrun since the last clearing.
+    /// The break input is not active, and the outputs are as they should be.
     Hardware,
 }
 

@@ -42,13 +42,14 @@ impl core::error::Error for LimitsError {}
 
 impl Limits {
     /// Returns the limits of axis `i`: the stricter of the image's and the build's. `built` has limits for each axis,
-    /// or one for all. Returns `None` without any limits, and if the two do not overlap.
+    /// or one for all; the image's may be infinite. Returns `None` without finite limits, and if the two do not overlap.
     pub fn of_axis(i: usize, image: Option<[f32; 2]>, built: &[Self]) -> Option<Self> {
         let image = image.map(|[low, high]| Self { low, high, rate: None });
-        match (image, built.get(i).or(built.first())) {
+        let limits = match (image, built.get(i).or(built.first())) {
             (Some(image), Some(built)) => built.within(image),
             (image, built) => image.or(built.copied()),
-        }
+        };
+        limits.filter(|limits| limits.low.is_finite() && limits.high.is_finite())
     }
 
     fn within(self, other: Self) -> Option<Self> {

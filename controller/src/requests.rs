@@ -15,6 +15,9 @@ pub struct Settings {
     pub status_period: u32,
     /// `true` if flash can be erased and written while the outputs are driven: code is not fetched from the same bank.
     pub flash_while_armed: bool,
+    /// Ticks without a good frame, while not armed, after which any sequence number is accepted, because the host may
+    /// have restarted: those of a second.
+    pub quiet: u32,
 }
 
 impl Settings {
@@ -60,10 +63,7 @@ pub(crate) fn request<const OBS: usize, const AXES: usize>(
         Message::Chunk { offset, bytes } => settings.may_write(safety).and_then(|()| update.chunk(offset, bytes)),
         Message::Commit { .. } if safety.with(|safety| safety.state()) == State::Armed => Err(Refusal::Armed),
         Message::Commit { signature } => settings.may_write(safety).and_then(|()| update.commit(signature)),
-        Message::Abort => {
-            update.abort();
-            Ok(())
-        }
+        Message::Abort => update.abort(),
         _ => return None,
     };
     Some(outcome)

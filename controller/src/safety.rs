@@ -99,6 +99,14 @@ impl<const AXES: usize> Safety<AXES> {
         self.since_observation = 0;
     }
 
+    /// Notes that ticks may have been lost, as while flash was written: nobody knows how old the last observation is, so
+    /// arming needs another. No effect while armed, when nothing may hold up the tick.
+    pub fn stalled(&mut self) {
+        if !matches!(self.state, State::Armed(_)) {
+            self.since_observation = u32::MAX;
+        }
+    }
+
     /// Takes an action of the head. While armed, applies it and returns the outputs' targets, within the limits.
     ///
     /// # Errors
@@ -145,8 +153,14 @@ impl<const AXES: usize> Safety<AXES> {
         if let State::Armed(_) = self.state {
             return Some(Refusal::Armed);
         }
+        // Only disarming clears these: the outputs then coast, whatever the safe action.
+        let hardware = match &self.state {
+            State::Latched(latched) => matches!(latched.fault(), Fault::Break | Fault::Overrun),
+            _ => false,
+        };
         let limits = || self.axes.iter().any(Axis::is_still).then_some(Refusal::Limits);
-        self.health.ready().err().or(self.is_stale().then_some(Refusal::Stale)).or_else(limits)
+        let stale = self.is_stale().then_some(Refusal::Stale);
+        self.health.ready().err().or(hardware.then_some(Refusal::Hardware)).or(stale).or_else(limits)
     }
 
     /// Arms the controller.
@@ -154,7 +168,8 @@ impl<const AXES: usize> Safety<AXES> {
     /// # Errors
     ///
     /// Fails without any change if the token differs from [`Self::token`], or if the controller is already armed. The
-    /// same holds after a failed or missing check, without a recent observation, and with an axis without limits.
+    /// same holds after a failed or missing check, after a break or an overrun that latched until the controller is
+    /// disarmed, without a recent observation, and with an axis without limits.
     pub fn arm(&mut self, token: u32) -> Result<(), Refusal> {
         if token != self.token {
             return Err(Refusal::Token);
@@ -238,9 +253,15 @@ impl<const AXES: usize> Safety<AXES> {
         self.ticks
     }
 
-    /// Returns the axes.
+    /// Returns the axes, with the limits that apply now.
     pub const fn axes(&self) -> &[Axis; AXES] {
         &self.axes
+    }
+
+    /// Returns the axes of the build: what the outputs' units refer to. A host's stricter limits narrow the values that
+    /// an output may have, and not their meaning.
+    pub const fn built_axes(&self) -> &[Axis; AXES] {
+        &self.built.axes
     }
 }
 

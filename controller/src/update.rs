@@ -38,7 +38,11 @@ pub trait Update {
     fn commit(&mut self, signature: Option<&[u8; 64]>) -> Result<(), Refusal>;
 
     /// Cancels the update.
-    fn abort(&mut self);
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Refusal::Busy`] while an image waits for its test, which it may pass.
+    fn abort(&mut self) -> Result<(), Refusal>;
 
     /// Returns the number of accepted bytes of the image.
     fn written(&self) -> u32;
@@ -64,7 +68,9 @@ impl Update for NoUpdate {
         Err(Refusal::Unsupported)
     }
 
-    fn abort(&mut self) {}
+    fn abort(&mut self) -> Result<(), Refusal> {
+        Ok(())
+    }
 
     fn written(&self) -> u32 {
         0

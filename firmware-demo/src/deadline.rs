@@ -82,7 +82,7 @@ mod tests {
         safety.set(safety.token(), Parameter::Deadline, 0, deadline as f32).expect("any deadline is allowed here");
         let breadcrumb = Record::report(ResetCause::Power, None);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
-        let settings = Settings { status_period: 0, flash_while_armed: false };
+        let settings = Settings { status_period: 0, flash_while_armed: false, quiet: 1000 };
         let mut endpoint = Endpoint::<32, { frame::bytes(128) }>::new(Guard::full(&[], u32::MAX >> 1), facts, settings);
         let mut host = Host { sender: Sender::new(0), observations: 0, queue: VecDeque::new(), waits_until: 0 };
         let (mut ticked, mut step, mut out) = (phase, None, [0; 128]);

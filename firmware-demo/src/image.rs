@@ -38,12 +38,20 @@ pub fn open<'i, 's>(
 }
 
 /// Returns an axis for each value of an image's actions, at `hz` ticks per second. It has the stricter of the
-/// contract's and the build's limits; the build has limits for each axis, or one for all. Without finite limits an axis
-/// is [`Axis::STILL`].
+/// contract's and the build's limits; the build has limits for each axis, or one for all. Without finite limits, and
+/// all of them without an image, because a damaged one may have had limits, an axis is [`Axis::STILL`].
 pub fn axes<const AXES: usize>(image: Option<&Image<'_>>, built: &[Limits], hz: f32) -> [Axis; AXES] {
+    image.map_or([Axis::STILL; AXES], |image| axes_within(|i| image.limits(i), built, hz))
+}
+
+fn axes_within<const AXES: usize>(
+    contract: impl Fn(usize) -> Option<[f32; 2]>,
+    built: &[Limits],
+    hz: f32,
+) -> [Axis; AXES] {
     let mut axes = [Axis::STILL; AXES];
     for (i, axis) in axes.iter_mut().enumerate() {
-        let limits = Limits::of_axis(i, image.and_then(|image| image.limits(i)), built);
+        let limits = Limits::of_axis(i, contract(i), built);
         *axis = limits.and_then(|limits| limited(limits, hz)).unwrap_or(Axis::STILL);
     }
     axes
@@ -72,17 +80,27 @@ mod tests {
     #[test]
     fn axes_have_the_limits_of_the_build() {
         let limits = |text: &str| text.parse::<Limits>().expect("valid limits");
-        let all = axes::<2>(None, &[limits("-1:3")], 1000.0);
+        let all = axes_within::<2>(|_| None, &[limits("-1:3")], 1000.0);
         assert_eq!(all.map(|axis| (axis.low(), axis.high(), axis.rate(), axis.start())), [(-1.0, 3.0, 0.04, 0.0); 2]);
-        let [ramps, coasts, fixed] = axes(None, &["-1:1:20", "2:4:8", "3:3"].map(limits), 1000.0);
+        let [ramps, coasts, fixed] = axes_within(|_| None, &["-1:1:20", "2:4:8", "3:3"].map(limits), 1000.0);
         assert_eq!((ramps.rate(), ramps.safe()), (0.02, SafeAction::Ramp { step: 0.02 }));
         assert_eq!((coasts.rate(), coasts.start(), coasts.safe()), (0.008, 2.0, SafeAction::Coast));
         assert_eq!((fixed.low(), fixed.high(), fixed.start(), fixed.is_still()), (3.0, 3.0, 3.0, false));
     }
 
     #[test]
+    fn one_limit_of_the_contract_makes_the_builds_stricter() {
+        let contract = |i: usize| [None, Some([f32::NEG_INFINITY, 0.5]), Some([0.25, f32::INFINITY])][i];
+        let built = "-1:1".parse::<Limits>().expect("valid limits");
+        let of = |built: &[Limits]| axes_within::<3>(contract, built, 1000.0).map(|axis| (axis.low(), axis.high()));
+        assert_eq!(of(&[built]), [(-1.0, 1.0), (-1.0, 0.5), (0.25, 1.0)]);
+        assert_eq!(axes_within::<3>(contract, &[], 1000.0), [Axis::STILL; 3]);
+    }
+
+    #[test]
     fn without_an_image_nothing_may_move() {
-        assert_eq!(axes::<3>(None, &[], 1000.0), [Axis::STILL; 3]);
+        let built = "-1:1".parse().expect("valid limits");
+        assert_eq!(axes::<3>(None, &[built], 1000.0), [Axis::STILL; 3]);
         assert_eq!(open(&[0; 8], &mut [], [1; 2], &mut WatchdogMock::default()).err(), Some(Refusal::Unfit));
     }
 }

@@ -8,7 +8,7 @@ use actq_boards::seams::Stage;
 use actq_controller::foc::{CurrentLoop, Gains, Measured, Observer, Rotor, Stator};
 use actq_controller::{Axis, Output};
 
-use crate::output::{Bridges, share};
+use crate::output::Bridges;
 
 /// A slow motor with a gear, which a tick of 1 kHz can also control: ohm, henry, volt second, pole pairs.
 const RESISTANCE: f32 = 1.0;
@@ -20,7 +20,7 @@ const INERTIA: f32 = 1e-3;
 const FRICTION: f32 = 0.05;
 /// Supply voltage in volt.
 const SUPPLY: f32 = 24.0;
-/// Current at an axis' limits, in ampere.
+/// Current at the limit of an axis that is farther from 0, in ampere. A value of 0 is no current.
 const CURRENT: f32 = 1.0;
 /// Bandwidth of the current loop, in rad/s.
 const BANDWIDTH: f32 = 300.0;
@@ -58,9 +58,8 @@ impl<S: Stage> Motor<S> {
         let measured = self.measure();
         let duties = match (outputs.first(), axes.first(), measured) {
             (Some(Output::Drive(value)), Some(axis), Some(measured)) => {
-                // An axis with a single value commands no current.
-                let still = axis.low() == axis.high();
-                let q = if still { 0.0 } else { (2.0 * share(*value, axis) - 1.0) * CURRENT };
+                let largest = largest(axis);
+                let q = if largest > 0.0 { value / largest * CURRENT } else { 0.0 };
                 self.control.step(&measured, Rotor { d: 0.0, q }).map(|tick| tick.duties)
             }
             (Some(Output::Brake), ..) => {
@@ -74,11 +73,15 @@ impl<S: Stage> Motor<S> {
             Some(duties) => self.bridges.drive(duties),
             None => {
                 self.control.reset();
-                self.bridges.coast();
-                outputs.first() == Some(&Output::Coast)
+                self.bridges.coast() && outputs.first() == Some(&Output::Coast)
             }
         }
     }
+}
+
+/// Returns the largest magnitude within the limits. It compares, as [`Axis`] does.
+fn largest(axis: &Axis) -> f32 {
+    if axis.high() > -axis.low() { axis.high() } else { -axis.low() }
 }
 
 impl<S> Motor<S> {
@@ -166,6 +169,21 @@ mod tests {
     }
 
     #[test]
+    fn zero_is_no_current_whatever_the_limits() {
+        for (low, high, half) in [(0.0, 1.0, 0.5f32), (-0.5, 2.0, 1.0), (-2.0, 0.0, -1.0)] {
+            let axes = [Axis::new(low, high, 1.0, 0.0, SafeAction::Ramp { step: 0.1 }).expect("the axis is valid")];
+            let mut motor = Motor::new(Mock::default(), 1000);
+            for (value, current) in [(half, 0.5 * half.signum()), (0.0, 0.0)] {
+                for _ in 0..2000 {
+                    assert!(motor.apply(&[Output::Drive(value)], &axes));
+                }
+                assert!((torque_current(&motor) - current).abs() < 0.03, "{}", torque_current(&motor));
+            }
+            assert!(motor.motor.speed.abs() < 0.1, "{}", motor.motor.speed);
+        }
+    }
+
+    #[test]
     fn coasting_disables_and_braking_shorts_the_bridges() {
         let axes = [Axis::STILL];
         let mut motor = Motor::new(Mock::default(), 1000);
@@ -178,6 +196,10 @@ mod tests {
         // A lost sensor.
         motor.motor.flux = Stator::default();
         assert!(!motor.apply(&[Output::Drive(0.0)], &axes) && !motor.bridges.stage().on);
+        // The break input.
+        motor.bridges.stage().broken = true;
+        assert!(!motor.apply(&[Output::Coast], &axes) && !motor.apply(&[Output::Brake], &axes));
+        motor.bridges.stage().broken = false;
         // Outputs that no controller gives.
         assert!(!motor.apply(&[Output::Drive(f32::NAN)], &[Axis::STILL; 0]) && !motor.bridges.stage().on);
     }

@@ -18,8 +18,8 @@ impl<S: Stage> Bridges<S> {
         Self { stage, on: false }
     }
 
-    /// Applies the outputs of a tick; returns `false` if the stage is off and should be on. All bridges share one
-    /// enable: if one axis coasts, all of them do.
+    /// Applies the outputs of a tick; returns `false` if the stage is off and should be on, or coasts and the break
+    /// input is active. All bridges share one enable: if one axis coasts, all of them do.
     pub fn apply(&mut self, outputs: &[Output], axes: &[Axis]) -> bool {
         let mut shares = [0.0; 3];
         for ((place, output), axis) in shares.iter_mut().zip(outputs).zip(axes) {
@@ -27,19 +27,17 @@ impl<S: Stage> Bridges<S> {
                 Output::Drive(value) => share(*value, axis),
                 // The lower switches are on.
                 Output::Brake => 0.0,
-                Output::Coast => {
-                    self.coast();
-                    return true;
-                }
+                Output::Coast => return self.coast(),
             };
         }
         self.drive(shares)
     }
 
-    /// Switches all bridges off.
-    pub(crate) fn coast(&mut self) {
+    /// Switches all bridges off; returns `false` if the break input is active.
+    pub(crate) fn coast(&mut self) -> bool {
         self.stage.disable();
         self.on = false;
+        !self.stage.is_broken()
     }
 
     /// Sets the bridges' duty cycles, 0 to 1; returns `false` if the stage is off and should be on.
@@ -57,8 +55,8 @@ impl<S: Stage> Bridges<S> {
     }
 
     #[cfg(all(test, feature = "foc"))]
-    pub(crate) fn stage(&self) -> &S {
-        &self.stage
+    pub(crate) fn stage(&mut self) -> &mut S {
+        &mut self.stage
     }
 }
 
@@ -74,7 +72,8 @@ mod tests {
     use std::io::ErrorKind;
 
     use actq_boards::no_stage::NoStage;
-    use actq_controller::SafeAction;
+    use actq_controller::{Check, SafeAction, Safety};
+    use actq_link::code::Parameter;
     use embedded_hal_mock::eh1::MockError;
     use embedded_hal_mock::eh1::pwm::{Mock as Phase, Transaction};
 
@@ -98,6 +97,10 @@ mod tests {
 
         fn is_on(&mut self) -> bool {
             true
+        }
+
+        fn is_broken(&mut self) -> bool {
+            false
         }
 
         fn disable(&mut self) {}
@@ -137,6 +140,38 @@ mod tests {
         assert_eq!((duties(&bridges), bridges.stage.on), ([500, 0, 0], true));
         assert!(bridges.apply(&[Output::Drive(0.0), Output::Coast, Output::Brake, Output::Brake], &axes));
         assert!(!bridges.stage.on);
+    }
+
+    #[test]
+    fn an_active_break_input_is_a_fault_while_coasting_too() {
+        let mut bridges = Bridges::new(Mock::default());
+        bridges.stage.broken = true;
+        assert!(!bridges.apply(&[Output::Coast; 3], &[Axis::STILL; 3]));
+        bridges.stage.broken = false;
+        assert!(bridges.apply(&[Output::Coast; 3], &[Axis::STILL; 3]));
+    }
+
+    /// A host narrows the limits of the second controller: an action within both has the same duty cycle.
+    #[test]
+    fn stricter_limits_do_not_change_what_a_value_means() {
+        let axis = Axis::new(-1.0, 1.0, 2.0, 0.0, SafeAction::Ramp { step: 2.0 }).expect("the axis is valid");
+        let duty = |limits: &[(Parameter, f32)], action: f32| {
+            let mut safety = Safety::new([axis], 1..=100, 1);
+            Check::ALL.into_iter().for_each(|check| safety.check(check, true));
+            for &(parameter, value) in limits {
+                safety.set(safety.token(), parameter, 0, value).expect("stricter");
+            }
+            safety.observed();
+            safety.arm(safety.token()).expect("armed");
+            safety.act(&[action]).expect("applied");
+            let (outputs, mut bridges) = (safety.tick(), Bridges::new(Mock::default()));
+            assert!(bridges.apply(&outputs, safety.built_axes()));
+            bridges.stage.duties()[0]
+        };
+        let stricter = [(Parameter::Low, -0.5), (Parameter::High, 0.5)];
+        for (action, wide, narrow) in [(0.25, 625, 625), (0.0, 500, 500), (1.0, 1000, 750), (-1.0, 0, 250)] {
+            assert_eq!((duty(&[], action), duty(&stricter, action)), (wide, narrow), "{action}");
+        }
     }
 
     #[test]

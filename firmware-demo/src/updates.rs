@@ -71,10 +71,8 @@ impl<F: NorFlash, A: Authority> Update for Updates<F, A> {
         self.0.as_mut().map_or_else(|| NoUpdate.commit(signature), |updater| updater.commit(signature))
     }
 
-    fn abort(&mut self) {
-        if let Some(updater) = &mut self.0 {
-            updater.abort();
-        }
+    fn abort(&mut self) -> Result<(), Refusal> {
+        self.0.as_mut().map_or(Ok(()), Update::abort)
     }
 
     fn written(&self) -> u32 {

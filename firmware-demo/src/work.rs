@@ -114,7 +114,10 @@ where
         let _ = self.watchdog.start(TIMEOUTS.long);
         let candidate = self.updates.work();
         let watched = self.watchdog.start(TIMEOUTS.turn);
-        self.safety.with(|safety| safety.check(Check::Watchdog, watched));
+        self.safety.with(|safety| {
+            safety.check(Check::Watchdog, watched);
+            safety.stalled();
+        });
         candidate
     }
 
@@ -238,7 +241,7 @@ pub(crate) mod tests {
         let (updates, _) = Updates::new(Ram(flash.0), Some(Anyone), &mut WatchdogMock::default(), |_, _| false);
         let breadcrumb = Record::report(ResetCause::Power, None);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
-        let settings = Settings { status_period, flash_while_armed: false };
+        let settings = Settings { status_period, flash_while_armed: false, quiet: 1000 };
         let endpoint = Endpoint::new(Guard::full(&[], 0), facts, settings);
         let (safety, rates) = (Safety::new([Axis::STILL; 1], 1..=10, 0), Rates::new(1_000_000, 1000));
         Work { port, watchdog, safety, endpoint, updates, rates, stack: || 0, out, state: State::default() }

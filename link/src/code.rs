@@ -102,7 +102,7 @@ codes! {
         Watchdog = 5, "the watchdog is not running";
         /// No valid observation arrived within the deadline.
         Stale = 6, "no valid observation arrived within the deadline; send observations before arming";
-        /// The controller is armed.
+        /// The controller is armed, or, for a request that needs the disarmed state, latched.
         Armed = 7, "the controller is armed; disarm it first";
         /// Unknown parameter or axis.
         Parameter = 8, "unknown parameter or axis";
@@ -129,7 +129,7 @@ codes! {
         Unsupported = 18, "the controller does not support this request";
         /// The kernels refuse the image, or its input and output lengths do not match the controller.
         Unfit = 19, "this controller cannot run the image";
-        /// A break or overrun has not been cleared.
+        /// The break input is active, or a break or an overrun latched and the controller was not disarmed since.
         Hardware = 20, "the hardware reports a fault";
         /// An axis has no finite limits, neither from the built-in image nor from the build.
         Limits = 21, "an axis has no limits, so no output may move; build the firmware with --limits LOW:HIGH, or with an image \
@@ -172,7 +172,7 @@ codes! {
 }
 
 codes! {
-    /// A parameter, which can be read at any time and set while not armed. Values are f32; counts are whole numbers.
+    /// A parameter, which can be read at any time and set while disarmed. Values are f32; counts are whole numbers.
     Parameter {
         /// Ticks without a valid observation, or without an action, before the safe action.
         Deadline = 1, "deadline in ticks";

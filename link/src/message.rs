@@ -69,7 +69,7 @@ pub enum Message<'a> {
         of: u32,
         /// `true` if the outputs follow the action.
         applied: bool,
-        /// The values; after limits and rate limits if the action is applied.
+        /// The values; after limits if the action is applied.
         values: Floats<'a>,
     },
     /// The state and counters.

@@ -13,7 +13,7 @@ use actq_client::port::Address;
 use actq_controller::Output;
 use actq_controller::slots::Anyone;
 use actq_link::code::{Crash, Fault, Parameter, Refusal, ResetCause, State};
-use actq_link::report::BUILT_IN;
+use actq_link::report::{BUILT_IN, Counters, Status};
 use actq_link::{Message, Receiver, Sender, frame};
 
 use crate::simulated::{OBSERVATION, Simulated};
@@ -134,6 +134,85 @@ fn addresses_parse_as_displayed() {
     }
     actq_client::port::list().expect("the system lists its serial ports");
 }
+
+/// A controller in its place: answers each message, or not.
+fn answering(
+    answer: impl Fn(usize, u32, &Message<'_>) -> Option<Message<'static>> + Send + 'static,
+) -> (Client, thread::JoinHandle<usize>) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let controller = thread::spawn(move || {
+        let (mut stream, _) = listener.accept().expect("the client opens the port");
+        let (mut receiver, mut sender, mut byte) = (Receiver::<{ frame::bytes(64) }>::new(), Sender::new(1), [0]);
+        let mut armings = 0;
+        while matches!(stream.read(&mut byte), Ok(1)) {
+            let Some(received) = receiver.push(byte[0]) else { continue };
+            armings += usize::from(matches!(received.message, Message::Arm { .. }));
+            if let Some(answer) = answer(armings, received.sequence, &received.message) {
+                stream.write_all(sender.frame(&answer, 0, &mut [0; 64]).expect("it fits")).expect("the client reads");
+            }
+        }
+        armings
+    });
+    let hang = Duration::from_secs(600);
+    let connection = Connection::open(Address::Tcp(address), hang).expect("the port is open");
+    (Client::new(connection, hang), controller)
+}
+
+/// The controller was armed, its answer was lost, and an overrun latched: a repetition must not arm it again.
+#[test]
+fn a_controller_that_stopped_meanwhile_is_not_armed_again() {
+    let (mut client, controller) = answering(|armings, of, message| match message {
+        Message::Ask(_) => Some(Message::Status(Status {
+            state: if armings == 0 { State::Disarmed } else { State::Latched },
+            fault: (armings > 0).then_some(Fault::Overrun),
+            token: if armings == 0 { 1 } else { 2 },
+            ..IDLE
+        })),
+        Message::Arm { token } if armings > 1 => {
+            let refusal = (*token != 2).then_some(Refusal::Token);
+            Some(Message::Ack { of, refusal, written: 0 })
+        }
+        _ => None,
+    });
+    let error = client.arm().expect_err("it stopped");
+    let text = format!("{error:#}");
+    assert!(text.contains("arm it again") && text.contains(&Fault::Overrun.to_string()), "{text}");
+    drop(client);
+    assert_eq!(controller.join().expect("the controller ends"), 2);
+}
+
+/// Only the token changed, as on a line that was silent: the one request did not arm.
+#[test]
+fn a_request_with_an_old_token_is_repeated_with_the_new_one() {
+    let (mut client, controller) = answering(|armings, of, message| match message {
+        Message::Ask(_) => Some(Message::Status(Status { token: 1 + armings as u32, ..IDLE })),
+        Message::Arm { token } => {
+            let refusal = (*token < 2).then_some(Refusal::Token);
+            Some(Message::Ack { of, refusal, written: 0 })
+        }
+        _ => None,
+    });
+    client.arm().expect("the second request has the new token");
+    drop(client);
+    assert_eq!(controller.join().expect("the controller ends"), 2);
+}
+
+const IDLE: Status = Status {
+    state: State::Disarmed,
+    fault: None,
+    refusal: None,
+    reset: ResetCause::Power,
+    token: 0,
+    ticks: 0,
+    image: 0,
+    slot: BUILT_IN,
+    axes: 1,
+    observation: 1,
+    payload: 64,
+    refused: 0,
+    counters: Counters { good: 0, damaged: 0, malformed: 0, repeated: 0, lost: 0 },
+};
 
 /// A controller that is late sends an answer and what follows it at once.
 #[test]

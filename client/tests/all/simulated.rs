@@ -175,7 +175,7 @@ fn run<A: Authority>(
     let facts =
         Facts { image: 0x1234, slot: BUILT_IN, timing: Timing { period: 1_000_000, ..Timing::default() }, breadcrumb };
     let guard = Guard::new(OBSERVATION, &[], 1_000_000).expect("the guard has room");
-    let mut endpoint = End::new(guard, facts, Settings { status_period: 20, flash_while_armed: false });
+    let mut endpoint = End::new(guard, facts, Settings { status_period: 20, flash_while_armed: false, quiet: 1000 });
 
     let (mut inward, mut outward) = (Line::new(1, faults), Line::new(2, faults));
     let (mut stream, mut ticks, mut quiet) = (None::<TcpStream>, 0, 0);

@@ -70,20 +70,21 @@ impl CurrentLoop {
     /// Computes one tick towards `target`. The voltage stays within the supply's limit. If it is not enough for both
     /// axes, d has priority, which preserves the flux.
     ///
-    /// Returns `None` without any change if a value or the supply's square is not finite, the supply is not positive,
+    /// Returns `None` without any change if a value, a gain or the supply's square is not finite, the supply is not positive,
     /// or the angle is beyond [`MAX_RADIANS`]. The sensor is then broken, and the firmware must switch the outputs off.
     pub fn step(&mut self, measured: &Measured, target: Rotor) -> Option<Tick> {
         let Measured { phases, angle, supply } = *measured;
         let [a, b, c] = phases;
         let limit = REACH * supply;
         let square = limit * limit;
-        let finite = [a, b, c, square, target.d, target.q].iter().all(|value| value.is_finite());
+        let Gains { proportional, integral } = self.gains;
+        let values = [a, b, c, square, target.d, target.q, proportional, integral];
+        let finite = values.iter().all(|value| value.is_finite());
         if !finite || supply <= 0.0 || !(-MAX_RADIANS..=MAX_RADIANS).contains(&angle) {
             return None;
         }
         let angle = Angle::new(angle);
         let current = Stator::of_phases(phases).to_rotor(angle);
-        let Gains { proportional, integral } = self.gains;
         let d = self.d.step(target.d - current.d, proportional, integral, limit);
         // The square of the voltage that d leaves for q.
         let left = square - d * d;

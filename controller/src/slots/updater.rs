@@ -31,8 +31,8 @@ enum Phase<H> {
     Checking { plan: Plan, slot: Slot, signature: Option<[u8; 64]>, readback: Readback<H> },
     /// The image waits for its test.
     Testing { plan: Plan, slot: Slot },
-    /// The update ended, with or without success.
-    Done { plan: Plan, outcome: Result<(), Refusal> },
+    /// The update ended, with or without success; `is_told` after an acknowledgement of the outcome.
+    Done { plan: Plan, outcome: Result<(), Refusal>, is_told: bool },
 }
 
 /// Accepted bytes; the last of them wait until a unit of writing is full.
@@ -94,7 +94,7 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
     fn erase(&mut self, plan: Plan, slot: Slot, next: u32) -> Work {
         let sector = next.saturating_add(F::ERASE_SIZE as u32);
         self.phase = match self.slots.flash.erase(next, sector) {
-            Err(_) => Phase::Done { plan, outcome: Err(Refusal::Flash) },
+            Err(_) => Phase::Done { plan, outcome: Err(Refusal::Flash), is_told: false },
             Ok(()) if sector < self.slots.layout.range(slot).end => Phase::Erasing { plan, slot, next: sector },
             Ok(()) => Phase::Receiving { plan, slot, tail: Tail { taken: 0, unit: [0xff; MAX_WRITE] } },
         };
@@ -115,13 +115,17 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
                 let generation = self.slots.next_generation();
                 let record = Record { plan, generation, signature };
                 let written = self.slots.write_record(slot, record) && self.slots.begin_trial(slot);
+                if !written {
+                    // What was written may be a whole record, which the next start would try.
+                    self.slots.reject(slot);
+                }
                 (!written).then_some(Refusal::Flash)
             }
             Found::Damaged => Some(Refusal::Checksum),
             Found::Unsigned => Some(Refusal::Signature),
         };
         self.phase = match refused {
-            Some(refusal) => Phase::Done { plan, outcome: Err(refusal) },
+            Some(refusal) => Phase::Done { plan, outcome: Err(refusal), is_told: false },
             None => Phase::Testing { plan, slot },
         };
         Work::More
@@ -143,13 +147,12 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
                 self.running = Some(slot);
                 Ok(())
             }
-            Ok(()) => Err(Refusal::Flash),
-            Err(refusal) => {
+            failed => {
                 self.slots.reject(slot);
-                Err(refusal)
+                Err(failed.err().unwrap_or(Refusal::Flash))
             }
         };
-        self.phase = Phase::Done { plan, outcome };
+        self.phase = Phase::Done { plan, outcome, is_told: false };
         outcome.is_ok()
     }
 
@@ -180,7 +183,8 @@ impl<F: NorFlash, A: Authority> Update for Updater<F, A> {
         match &self.phase {
             Phase::Erasing { plan: old, .. } if *old == plan => return Err(Refusal::Busy),
             Phase::Receiving { plan: old, tail, .. } if *old == plan && tail.taken == 0 => return Ok(()),
-            Phase::Done { plan: old, outcome: Err(Refusal::Flash) } if *old == plan => {
+            // The erase that an earlier repetition of this request began.
+            Phase::Done { plan: old, outcome: Err(Refusal::Flash), is_told: false } if *old == plan => {
                 self.phase = Phase::Idle;
                 return Err(Refusal::Flash);
             }
@@ -213,7 +217,7 @@ impl<F: NorFlash, A: Authority> Update for Updater<F, A> {
             return Err(Refusal::Offset);
         }
         if !self.append(slot, &mut tail, bytes, plan.length) {
-            self.phase = Phase::Done { plan, outcome: Err(Refusal::Flash) };
+            self.phase = Phase::Done { plan, outcome: Err(Refusal::Flash), is_told: true };
             return Err(Refusal::Flash);
         }
         self.phase = Phase::Receiving { plan, slot, tail };
@@ -223,7 +227,10 @@ impl<F: NorFlash, A: Authority> Update for Updater<F, A> {
     fn commit(&mut self, signature: Option<&[u8; 64]>) -> Result<(), Refusal> {
         match self.phase {
             Phase::Idle => Err(Refusal::NoUpdate),
-            Phase::Done { outcome, .. } => outcome,
+            Phase::Done { plan, outcome, .. } => {
+                self.phase = Phase::Done { plan, outcome, is_told: true };
+                outcome
+            }
             Phase::Receiving { plan, slot, tail } if tail.taken == plan.length => {
                 let readback = Readback::new(&self.slots.authority);
                 self.phase = Phase::Checking { plan, slot, signature: signature.copied(), readback };
@@ -234,11 +241,12 @@ impl<F: NorFlash, A: Authority> Update for Updater<F, A> {
         }
     }
 
-    /// Cancels the update; an image that waits for its test is still tested.
-    fn abort(&mut self) {
-        if !matches!(self.phase, Phase::Testing { .. }) {
-            self.phase = Phase::Idle;
+    fn abort(&mut self) -> Result<(), Refusal> {
+        if let Phase::Testing { .. } = self.phase {
+            return Err(Refusal::Busy);
         }
+        self.phase = Phase::Idle;
+        Ok(())
     }
 
     fn written(&self) -> u32 {

@@ -4,7 +4,7 @@
 use std::collections::{HashMap, HashSet};
 
 use actq_controller::breadcrumb::Record;
-use actq_controller::endpoint::{Facts, QUIET};
+use actq_controller::endpoint::Facts;
 use actq_controller::update::NoUpdate;
 use actq_controller::{Axis, Check, Endpoint, Guard, SafeAction, Safety, Settings};
 use actq_link::code::{ResetCause, State};
@@ -12,6 +12,8 @@ use actq_link::report::{BUILT_IN, Timing};
 use actq_link::{Floats, Message, Receiver, Sender, frame};
 use actq_testkit::{Line, Random};
 
+/// [`Settings::quiet`].
+const QUIET: u32 = 1000;
 const FRAMES: usize = 1_000_000;
 const FRAME: usize = frame::bytes(64);
 const DEADLINE: u32 = 20;
@@ -45,7 +47,7 @@ impl Controller {
         Check::ALL.into_iter().for_each(|check| safety.check(check, true));
         let breadcrumb = Record::report(ResetCause::Power, None);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Timing::default(), breadcrumb };
-        let settings = Settings { status_period: 100, flash_while_armed: false };
+        let settings = Settings { status_period: 100, flash_while_armed: false, quiet: QUIET };
         let endpoint = Endpoint::new(Guard::full(&[], 50_000), facts, settings);
         Self { safety, endpoint, head: Head::default(), step: None }
     }

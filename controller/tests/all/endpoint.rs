@@ -3,7 +3,7 @@
 use actq_boards::stm32f405::flash::model::Model;
 use actq_boards::stm32f405::flash::{Flash, LARGE};
 use actq_controller::breadcrumb::Record;
-use actq_controller::endpoint::{Facts, QUIET};
+use actq_controller::endpoint::Facts;
 use actq_controller::slots::{Anyone, Layout, Slots, Updater, Work};
 use actq_controller::update::{NoUpdate, Update};
 use actq_controller::{Axis, Check, Endpoint, Guard, Output, SafeAction, Safety, Settings};
@@ -13,6 +13,8 @@ use actq_link::report::{BUILT_IN, Status, Timing};
 use actq_link::{Floats, Message, Receiver, Sender, frame};
 use proptest::prelude::*;
 
+/// [`Settings::quiet`].
+const QUIET: u32 = 1000;
 const FRAME: usize = frame::bytes(128);
 const OBSERVATION: [f32; 3] = [0.5, -0.5, 0.0];
 const DEADLINE: u32 = 10;
@@ -30,7 +32,7 @@ struct Bench<U = NoUpdate> {
 
 impl Bench {
     fn new() -> Self {
-        Self::of(Settings { status_period: 0, flash_while_armed: false }, NoUpdate)
+        Self::of(Settings { status_period: 0, flash_while_armed: false, quiet: QUIET }, NoUpdate)
     }
 }
 
@@ -247,7 +249,7 @@ fn an_update_that_stalls_the_tick_needs_disarming() {
         [begin, Message::Chunk { offset: 0, bytes: &[0; 4] }, Message::Commit { signature: None }]
     };
     for flash_while_armed in [false, true] {
-        let mut bench = Bench::of(Settings { status_period: 0, flash_while_armed }, NoUpdate);
+        let mut bench = Bench::of(Settings { status_period: 0, flash_while_armed, quiet: QUIET }, NoUpdate);
         let outcomes = |bench: &mut Bench| requests(bench.status().token).map(|request| bench.ask(&request));
         let (done, armed) = (Err(Refusal::Unsupported), Err(Refusal::Armed));
         assert_eq!(outcomes(&mut bench), [done; 3]);
@@ -279,7 +281,7 @@ fn an_update_continues_after_a_disarm() {
     let flash = Flash::new(Model::new(vec![0; 2 * LARGE as usize], begin, 1), begin);
     let layout = Layout::new(&flash, 0..LARGE, LARGE..2 * LARGE).expect("the slots are valid");
     let updater = Updater::new(Slots::new(flash, layout, Anyone), None);
-    let mut bench = Bench::of(Settings { status_period: 0, flash_while_armed: false }, updater);
+    let mut bench = Bench::of(Settings { status_period: 0, flash_while_armed: false, quiet: QUIET }, updater);
     // Arms, then makes a request after a disarm.
     let after_a_disarm = |bench: &mut Bench<Updater<Flash<Model>, Anyone>>, request: fn(u32) -> Message<'static>| {
         bench.arm();

@@ -1,7 +1,7 @@
 //! Every event in every state, against the table of docs/SAFETY.md.
 
 use actq_controller::{Axis, Check, Output, SafeAction, Safety};
-use actq_link::code::{Fault, Refusal, State};
+use actq_link::code::{Fault, Parameter, Refusal, State};
 
 const DEADLINE: u32 = 5;
 
@@ -108,6 +108,50 @@ fn each_fault_latches_and_is_reported() {
         safety.check(check, false);
         assert_eq!((safety.state(), safety.fault()), (State::Latched, Some(fault)));
     }
+}
+
+#[test]
+fn a_break_or_an_overrun_latches_until_disarmed() {
+    for fault in Fault::ALL {
+        let mut safety = in_state(State::Armed, SafeAction::Coast);
+        safety.trip(*fault);
+        safety.check(Check::Hardware, true);
+        safety.observed();
+        let needs_a_disarm = matches!(fault, Fault::Break | Fault::Overrun);
+        let expected = if needs_a_disarm { Err(Refusal::Hardware) } else { Ok(()) };
+        assert_eq!(safety.arm(safety.token()), expected, "{fault:?}");
+        safety.disarm();
+        assert_eq!(safety.arm(safety.token()), Ok(()), "{fault:?}");
+    }
+}
+
+#[test]
+fn arming_after_lost_ticks_needs_a_new_observation() {
+    for state in [State::Disarmed, State::Latched] {
+        let mut safety = in_state(state, SafeAction::Hold);
+        safety.stalled();
+        assert_eq!(safety.arm(safety.token()), Err(Refusal::Stale));
+        safety.observed();
+        assert_eq!(safety.arm(safety.token()), Ok(()));
+        safety.stalled();
+        safety.tick();
+        assert_eq!(safety.state(), State::Armed, "nothing holds up the tick of an armed controller");
+    }
+}
+
+/// A host's smaller rate holds for the ramp, too.
+#[test]
+fn a_ramp_keeps_the_rate() {
+    let axis = Axis::new(-1.0, 1.0, 1.0, 0.0, SafeAction::Ramp { step: 1.0 }).expect("the axis is valid");
+    let mut safety = Safety::new([axis], 1..=DEADLINE, 1);
+    Check::ALL.into_iter().for_each(|check| safety.check(check, true));
+    safety.set(safety.token(), Parameter::Rate, 0, 0.25).expect("stricter");
+    safety.observed();
+    safety.arm(safety.token()).expect("armed");
+    safety.act(&[0.5]).expect("an action");
+    assert_eq!([safety.tick(), safety.tick()], [[Output::Drive(0.25)], [Output::Drive(0.5)]]);
+    safety.trip(Fault::Head);
+    assert_eq!([safety.tick(), safety.tick()], [[Output::Drive(0.25)], [Output::Drive(0.0)]]);
 }
 
 #[test]

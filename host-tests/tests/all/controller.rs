@@ -123,7 +123,7 @@ fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u
     let breadcrumb = Record::report(ResetCause::Power, None);
     let facts = Facts { image: 0, slot: BUILT_IN, timing: Timing::default(), breadcrumb };
     let guard = Guard::<OBS>::new(OBS, &[], 500_000).context("there is room")?;
-    let settings = Settings { status_period: 50, flash_while_armed: false };
+    let settings = Settings { status_period: 50, flash_while_armed: false, quiet: 1000 };
     let mut endpoint = Endpoint::<OBS, { frame::bytes(256) }>::new(guard, facts, settings);
 
     let (mut ticks, mut quiet, mut port) = (0, 0, None);

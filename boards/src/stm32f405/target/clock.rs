@@ -73,5 +73,11 @@ fn fast(rcc: &pac::RCC, flash: &pac::FLASH, power: &pac::PWR) -> bool {
     }
     // SAFETY: buses at their highest, 42 MHz (divided by 4) and 84 MHz (by 2), before the core's clock is switched.
     rcc.cfgr().modify(|_, w| unsafe { w.hpre().bits(0).ppre1().bits(0b101).ppre2().bits(0b100).sw().bits(PLL) });
-    wait(LOCK, || running(rcc) == FAST)
+    if !wait(LOCK, || running(rcc) == FAST) {
+        return false;
+    }
+    // If the crystal stops, the part goes on from the internal oscillator, the power stage's outputs go off (section
+    // 17.3.12), and a non-maskable interrupt resets.
+    rcc.cr().modify(|_, w| w.csson().set_bit());
+    true
 }

@@ -97,8 +97,11 @@ fn cause(rcc: &pac::RCC) -> Cause {
         Cause::Watchdog
     } else if flags.sftrstf().bit() {
         Cause::Software
-    } else if flags.porrstf().bit() || flags.borrstf().bit() {
+    } else if flags.porrstf().bit() {
         Cause::Power
+    } else if flags.borrstf().bit() {
+        // Power-on sets this one, too.
+        Cause::Brownout
     } else if flags.padrstf().bit() {
         Cause::Pin
     } else {

@@ -10,6 +10,7 @@ use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 use stm32f4::stm32f405 as pac;
 
 use super::adc::Currents;
+use super::wait::wait;
 use crate::seams::Stage;
 
 /// PWM frequency in Hz.
@@ -18,6 +19,9 @@ const PWM_HZ: u32 = 20_000;
 const DEAD_NS: u32 = 500;
 /// Longest dead time, in cycles, whose field equals its number of cycles.
 const MAX_DEAD: u32 = 127;
+
+/// Reads of the outputs' enable bit until it shows that it was set.
+const SET: u32 = 8;
 
 const ALTERNATE: u8 = 1;
 /// PWM mode 1: a channel is on below its compare value, which is updated at the end of a period.
@@ -104,12 +108,17 @@ impl Stage for Pwm {
     fn enable(&mut self) -> bool {
         self.timer.sr().modify(|_, w| w.bif().clear_bit());
         self.timer.bdtr().modify(|_, w| w.moe().set_bit());
-        // The break input keeps it at 0.
-        self.is_on()
+        // The bit reads as 1 some cycles after it was set (RM0090, section 17.3.12). The break input keeps it at 0.
+        wait(SET, || self.is_on())
     }
 
     fn is_on(&mut self) -> bool {
         self.timer.bdtr().read().moe().bit()
+    }
+
+    fn is_broken(&mut self) -> bool {
+        // SAFETY: reading changes nothing. The input register shows the pin's level in its alternate function, too.
+        unsafe { &*pac::GPIOB::ptr() }.idr().read().idr12().bit_is_clear()
     }
 
     fn disable(&mut self) {

@@ -123,4 +123,10 @@ fn a_broken_sensor_gives_no_duties() {
         assert_eq!(control.step(&measured, target), None, "{measured:?}");
     }
     assert!(control.step(&good, target).is_some());
+    for wrong in [f32::NAN, f32::INFINITY] {
+        for gains in [[wrong, 0.05], [0.3, wrong]] {
+            let gains = Gains { proportional: gains[0], integral: gains[1] };
+            assert_eq!(CurrentLoop::new(gains).step(&good, target), None, "{gains:?}");
+        }
+    }
 }

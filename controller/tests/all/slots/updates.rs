@@ -1,10 +1,10 @@
 //! Updates over a line that loses and repeats requests, and refused updates.
 
-use actq_controller::slots::{Anyone, Layout, LayoutError, Slot, Slots, TRIALS};
+use actq_controller::slots::{Anyone, Layout, LayoutError, Slot, Slots, TRIALS, Work};
 use actq_controller::update::{Plan, Update};
 use actq_link::code::Refusal;
 use actq_testkit::{Nor, Random};
-use embedded_storage::nor_flash::NorFlash;
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError as _, NorFlashErrorKind, ReadNorFlash};
 
 use super::device::{Device, Image};
 
@@ -48,6 +48,97 @@ fn lost_and_repeated_chunks_give_the_image() {
     }
 }
 
+/// Flash that fails one write, and works again.
+struct Failing<'f> {
+    flash: &'f mut Flash,
+    /// Writes until the one that fails.
+    left: Option<usize>,
+}
+
+impl ErrorType for Failing<'_> {
+    type Error = NorFlashErrorKind;
+}
+
+impl ReadNorFlash for Failing<'_> {
+    const READ_SIZE: usize = Flash::READ_SIZE;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        self.flash.read(offset, bytes).map_err(|error| error.kind())
+    }
+
+    fn capacity(&self) -> usize {
+        self.flash.capacity()
+    }
+}
+
+impl NorFlash for Failing<'_> {
+    const WRITE_SIZE: usize = Flash::WRITE_SIZE;
+    const ERASE_SIZE: usize = Flash::ERASE_SIZE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+        self.flash.erase(from, to).map_err(|error| error.kind())
+    }
+
+    /// The write that fails has written its bytes, as one that a sinking supply interrupts may have.
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.flash.write(offset, bytes).map_err(|error| error.kind())?;
+        let fails = self.left == Some(0);
+        self.left = self.left.and_then(|left| left.checked_sub(1));
+        if fails { Err(NorFlashErrorKind::Other) } else { Ok(()) }
+    }
+}
+
+/// An update that was refused because one write failed does not run after the next start.
+#[test]
+fn an_update_whose_flash_failed_is_not_tried_at_the_next_start() {
+    let (old, new) = (Image::new(40, 1, true), Image::new(40, 2, true));
+    let mut refused = 0;
+    for write in 0.. {
+        let (mut flash, layout) = flash();
+        assert_eq!(Device::start(&mut flash, &layout, Anyone).update(&old, 64, None), Ok(()));
+        let mut device = Device::start(Failing { flash: &mut flash, left: Some(write) }, &layout, Anyone);
+        let outcome = device.update(&new, 64, None);
+        if outcome.is_ok() {
+            break;
+        }
+        assert_eq!(outcome, Err(Refusal::Flash), "write {write}");
+        refused += 1;
+        assert_eq!(device.updater.commit(None), Err(Refusal::Flash), "asked again");
+        drop(device);
+        let mut device = Device::start(&mut flash, &layout, Anyone);
+        let confirmed = device.updater.slots().least_version() == 2;
+        // But for the last write, the confirmation, which nothing takes back.
+        assert_eq!(device.runs.as_ref() == Some(&new.bytes), confirmed, "write {write}");
+        if !confirmed {
+            assert_eq!(device.update(&new, 64, None), Ok(()), "write {write}");
+        }
+    }
+    assert!(refused > 3, "{refused} writes");
+}
+
+#[test]
+fn a_push_after_a_failed_write_begins_again() {
+    let (mut flash, layout) = flash();
+    let image = Image::new(40, 1, true);
+    let mut device = Device::start(Failing { flash: &mut flash, left: Some(0) }, &layout, Anyone);
+    assert_eq!(device.update(&image, 64, None), Err(Refusal::Flash));
+    assert_eq!(device.update(&image, 64, None), Ok(()));
+}
+
+#[test]
+fn an_abort_does_not_stop_a_test() {
+    let (mut flash, layout) = flash();
+    let image = Image::new(40, 1, true);
+    let mut device = Device::start(&mut flash, &layout, Anyone);
+    device.wait(|updater| updater.begin(image.plan())).expect("the image fits");
+    assert_eq!(device.updater.chunk(0, &image.bytes), Ok(()));
+    assert_eq!(device.updater.commit(None), Err(Refusal::Busy));
+    while device.updater.work() == Work::More {}
+    assert_eq!(device.updater.abort(), Err(Refusal::Busy));
+    assert!(device.updater.tested(Ok(())));
+    assert_eq!(device.updater.commit(None), Ok(()));
+}
+
 #[test]
 fn a_refused_update_changes_nothing() {
     let (mut flash, layout) = flash();
@@ -72,7 +163,7 @@ fn a_refused_update_changes_nothing() {
     assert_eq!(device.updater.chunk(0, &other), Ok(()));
     assert_eq!(device.wait(|updater| updater.commit(None)), Err(Refusal::Checksum));
     assert_eq!(device.wait(|updater| updater.commit(None)), Err(Refusal::Checksum), "asked again");
-    device.updater.abort();
+    assert_eq!(device.updater.abort(), Ok(()));
     assert_eq!(device.updater.commit(None), Err(Refusal::NoUpdate));
     drop(device);
     assert_eq!(Device::start(&mut flash, &layout, Anyone).runs, Some(image.bytes));

@@ -137,7 +137,7 @@ mod app {
         #[cfg(not(feature = "foc"))]
         let mut actuator = Actuator::new(stage);
         // A request may come before the first tick, which must not count as a fault of the hardware.
-        let applied = actuator.apply(&[Output::Coast; AXES], safety.axes());
+        let applied = actuator.apply(&[Output::Coast; AXES], safety.built_axes());
         safety.check(Check::Hardware, applied);
         let local = Local { wire, port, watchdog, actuator, timer, period, rates, breadcrumb };
         (Shared { safety, timing: Timing::default() }, local)
@@ -152,8 +152,7 @@ mod app {
         let (mut safety, mut timing) = (cx.shared.safety, cx.shared.timing);
         let ticks = safety.lock(|safety| {
             let outputs = safety.tick();
-            // Disarming clears a break, because coasting outputs are as intended.
-            let applied = cx.local.actuator.apply(&outputs, safety.axes());
+            let applied = cx.local.actuator.apply(&outputs, safety.built_axes());
             safety.check(Check::Hardware, applied);
             safety.ticks()
         });
@@ -192,7 +191,7 @@ mod app {
         });
         let mut bytes = running.as_ref().map_or_else(start::built_in, bytes_of);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb: *breadcrumb };
-        let settings = Settings { status_period: STATUS_PERIOD, flash_while_armed: FLASH_WHILE_ARMED };
+        let settings = Settings { status_period: STATUS_PERIOD, flash_while_armed: FLASH_WHILE_ARMED, quiet: TICK_HZ };
         let endpoint = Endpoint::<OBS, RECEIVE_BYTES>::new(Guard::full(&[], MAX_AGE), facts, settings);
         let (safety, state) = (Locked(cx.shared.safety), State::default());
         let mut work =
@@ -200,13 +199,17 @@ mod app {
         loop {
             let head = image::open(bytes, scratch, start::LENGTHS, work.watchdog);
             let refusal = head.as_ref().err().copied();
+            let image = head.as_ref().map_or(0, |head| head.image().crc());
+            // It reads the whole image, so the longer timeout still holds.
+            work.watchdog.feed();
+            let mut running = head.ok().map(|head| Running::new(head, bytes));
             let watched = work.watchdog.start(TIMEOUTS.turn);
             work.safety.with(|safety| {
                 safety.check(Check::Watchdog, watched);
                 safety.check(Check::Image, matches!(refusal, None | Some(Refusal::SelfTest)));
                 safety.check(Check::SelfTest, refusal.is_none());
             });
-            work.endpoint.facts.image = head.as_ref().map_or(0, |head| head.image().crc());
+            work.endpoint.facts.image = image;
             work.endpoint.facts.slot = work.updates.running().map_or(BUILT_IN, |slot| slot as u8);
             info!(
                 "image {=u32:08x} of slot {=u8}, refusal {=u8}",
@@ -214,7 +217,6 @@ mod app {
                 work.endpoint.facts.slot,
                 refusal.map_or(0, Refusal::code),
             );
-            let mut running = head.ok().map(|head| Running::new(head, bytes));
             let candidate = loop {
                 let times = timing.lock(|timing| *timing);
                 if let Some(candidate) = work.turn(&mut running, &times) {

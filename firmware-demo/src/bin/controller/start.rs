@@ -79,6 +79,7 @@ pub(crate) fn report(cause: Cause, found: Option<Record>) -> Breadcrumb {
         // The board's registers do not show the cause.
         (Cause::Unknown, Some(Crash::Watchdog)) if WATCHDOG_NMI => ResetCause::Watchdog,
         (Cause::Unknown, Some(_)) => ResetCause::Software,
+        (Cause::Brownout, _) => ResetCause::Brownout,
         (Cause::Unknown, None) => ResetCause::Unknown,
     };
     Record::report(reset, found)
