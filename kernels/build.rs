@@ -1,7 +1,8 @@
 //! Detects the backends of the target; `src/arch/mod.rs` chooses one. Stable rustc does not report `target_feature =
 //! "dsp"`, so the target's name decides. For Armv8-M, where the extension is optional, the processor that the build
-//! names (`-C target-cpu=cortex-m33`) decides. `actq_kernels::BACKEND` is the backend of the build. The environment
-//! variable `ACTQ_BACKEND=portable` excludes the assembler, for comparisons and for builds without assembler.
+//! names (`-C target-cpu=cortex-m33`) decides, unless it excludes the extension (`-C target-feature=-dsp`).
+//! `actq_kernels::BACKEND` is the backend of the build. The environment variable `ACTQ_BACKEND=portable` excludes the
+//! assembler, for comparisons and for builds without assembler.
 
 /// Armv8-M processors with the DSP extension, by LLVM's defaults.
 const WITH_DSP: [&str; 5] = ["cortex-m33", "cortex-m35p", "cortex-m52", "cortex-m55", "cortex-m85"];
@@ -31,10 +32,11 @@ fn main() {
     }
 }
 
-/// Returns `true` if the last processor in the compiler's flags has the DSP extension.
+/// Returns `true` if the last processor in the compiler's flags has the DSP extension, and no flag excludes it.
 fn flags_have_dsp() -> bool {
     let flags = std::env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();
     let processor =
         flags.split('\u{1f}').rev().find_map(|flag| flag.trim_start_matches("-C").strip_prefix("target-cpu="));
-    processor.is_some_and(|processor| WITH_DSP.contains(&processor))
+    let is_excluded = flags.split(['\u{1f}', '=', ',']).any(|word| word == "-dsp");
+    !is_excluded && processor.is_some_and(|processor| WITH_DSP.contains(&processor))
 }

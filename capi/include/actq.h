@@ -333,8 +333,9 @@ actq_status actq_least_budget(struct actq_head *head,
 /**
  * Runs a slice of the step that has begun, of at most `budget` instructions by the cost model, at least
  * `actq_cost.least_budget`. Returns `ACTQ_PENDING` until the action is ready and written. However a step is cut,
- * its bits are the same. After that it returns the same action until the next `actq_begin`. Instructions are those of a
- * Cortex-M4 with FPU: on other cores a slice takes another time.
+ * its bits are the same. Without a step that has begun it returns the last action again, also one of `actq_play`.
+ * Instructions are those of a Cortex-M4 with FPU: on other cores a slice takes another time. Errors are those of
+ * `actq_step`; 89 (no action is young enough) ends the step and resets the recurrent state and the chunk, too.
  */
 actq_status actq_poll(struct actq_head *head, uint32_t budget, float *action, size_t action_len);
 

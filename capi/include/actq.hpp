@@ -105,6 +105,7 @@ private:
             return ACTQ_ABI_DIFFERS;
         }
         const auto *bytes = reinterpret_cast<const uint8_t *>(image.data());
+        head_ = actq_head{};
         const actq_status opened = open(&image_, bytes, 4 * image.size());
         return opened != ACTQ_OK ? opened : actq_head_init(&head_, &image_, scratch.data(), scratch.size());
     }

@@ -219,8 +219,9 @@ pub unsafe extern "C" fn actq_least_budget(head: *mut ActqHead, budget: *mut u32
 
 /// Runs a slice of the step that has begun, of at most `budget` instructions by the cost model, at least
 /// `actq_cost.least_budget`. Returns `ACTQ_PENDING` until the action is ready and written. However a step is cut,
-/// its bits are the same. After that it returns the same action until the next `actq_begin`. Instructions are those of a
-/// Cortex-M4 with FPU: on other cores a slice takes another time.
+/// its bits are the same. Without a step that has begun it returns the last action again, also one of `actq_play`.
+/// Instructions are those of a Cortex-M4 with FPU: on other cores a slice takes another time. Errors are those of
+/// `actq_step`; 89 (no action is young enough) ends the step and resets the recurrent state and the chunk, too.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_poll(
     head: *mut ActqHead,
@@ -268,8 +269,17 @@ pub unsafe extern "C" fn actq_play(head: *mut ActqHead, action: *mut f32, action
     unsafe {
         with(head, |running| {
             let action = running.action(action, action_len)?;
-            write(action, running.head.play()?);
-            Ok(())
+            match running.head.play() {
+                Ok(played) => {
+                    write(action, played);
+                    Ok(())
+                }
+                Err(error) => {
+                    // Any other error ends a step that has begun.
+                    running.polling &= matches!(error, StepError::Stale);
+                    Err(error.into())
+                }
+            }
         })
     }
 }

@@ -1,6 +1,6 @@
 //! Images: open, check, query.
 
-use core::ffi::{CStr, c_char};
+use core::ffi::c_char;
 use core::ops::Range;
 
 use actq_kernels::{Image, ImageError, Port};
@@ -263,11 +263,10 @@ pub unsafe extern "C" fn actq_set_input(
         if name.is_null() {
             return Err(Code::Null.into());
         }
-        // SAFETY: it is not null; the caller promises a zero at its end.
-        let name = unsafe { CStr::from_ptr(name) };
         let (offset, port) = places(image)
             .take_while(|(_, port)| port.kind == actq_kernels::PortKind::Input)
-            .find(|(_, port)| port.name.as_bytes() == name.to_bytes())
+            // SAFETY: it is not null; the caller promises a zero at its end.
+            .find(|(_, port)| unsafe { is_name(name, port.name) })
             .ok_or(Code::NoSuchPort)?;
         if count != port.len || len != image.obs_len() {
             return Err(Code::Length.into());
@@ -281,6 +280,17 @@ pub unsafe extern "C" fn actq_set_input(
         Ok(())
     };
     status(set())
+}
+
+/// Returns `true` if `name`, up to its zero, is `expected`. It compares byte by byte: `CStr` would call `strlen`.
+///
+/// # Safety
+///
+/// `name` has a zero at its end.
+unsafe fn is_name(name: *const c_char, expected: &str) -> bool {
+    let mut ended = expected.bytes().chain([0]).enumerate();
+    // SAFETY: the first byte that differs ends the loop, the zero at the latest; no byte of a port's name is zero.
+    ended.all(|(i, byte)| unsafe { name.add(i).read() } as u8 == byte)
 }
 
 /// The ports with the index of each one's first value in the observation, or in the action.

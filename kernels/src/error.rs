@@ -198,7 +198,8 @@ errors! {
 
 errors! {
     /// Why a step gave no action. The recurrent state and the chunk are reset; the last action stays, so that the step
-    /// limit holds across the error. [`StepError::Budget`] and [`StepError::NotBegun`] change nothing.
+    /// limit holds across the error. [`StepError::Budget`], [`StepError::NotBegun`] and the
+    /// [`StepError::Stale`] of [`crate::Head::play`] change nothing; [`StepError::SelfTest`] resets the last action, too.
     StepError, "80 to 127" {
         /// The observation's length differs from the image's.
         ObservationLength {
@@ -228,7 +229,7 @@ errors! {
             /// Modelled instructions given.
             given: u32,
         } = 85, "a poll has {given} instructions; the image needs at least {needed}";
-        /// A poll without a step that has begun.
+        /// A poll without a step that has begun, and without an action since the start or a reset.
         NotBegun = 86, "no step has begun; call begin with an observation, then poll";
         /// The noise's length differs from the image's.
         NoiseLength {

@@ -9,7 +9,7 @@ mod draft;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use actq_kernels::image::{header as h, op};
-use actq_kernels::{Head, Image};
+use actq_kernels::{Head, Image, StepError};
 use actq_testkit::Random;
 use draft::Draft;
 
@@ -170,4 +170,15 @@ fn a_correct_checksum_and_any_content_do_not_panic() {
         outcomes[usize::from(image.is_some()) + usize::from(checked)] += 1;
     }
     assert!(outcomes.iter().all(|n| *n > CASES / 20), "{outcomes:?}: too few to show anything");
+}
+
+#[test]
+fn a_self_test_without_steps_is_no_success() {
+    let mut draft = Draft::of(VALID);
+    draft.set(h::W_SELF_TEST, draft.0.len() as u32);
+    draft.seal();
+    let image = Image::new_checksummed(draft.bytes()).expect("only its content is wrong");
+    let mut scratch = vec![0; image.scratch_words()];
+    let mut head = Head::new(image, &mut scratch).expect("enough memory");
+    assert_eq!(head.self_test(), Err(StepError::Damaged));
 }

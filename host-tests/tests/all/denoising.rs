@@ -14,7 +14,7 @@ use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::{bits, rtn};
-use actq_kernels::image::{header as h, op};
+use actq_kernels::image::{OpKind, header as h, op};
 use actq_kernels::ops::noise::normal;
 use actq_kernels::pace::cost;
 use actq_kernels::{Head, ImageError, StepError, Width};
@@ -367,7 +367,11 @@ fn impossible_images_are_refused() -> Result<()> {
     let (constants, first) = (image.offset(denoise + 3), image.offset(h::W_OPS));
     let (nan, huge) = (f32::NAN.to_bits(), 1 << 20);
     let (kind, denoising) = (image.get(h::W_KIND), image.get(h::W_DENOISING));
-    let cases: [(&str, usize, u32, ImageError); 14] = [
+    let iterate = image.check()?.ops().find(|op| op.kind == OpKind::Denoise).context("denoising")?.dst().offset as u32;
+    let cases: [(&str, usize, u32, ImageError); 17] = [
+        ("noise that is added, without noise", constants + 1, 0, ImageError::Denoising),
+        ("noise in place of the iterate", constants + 1, iterate, ImageError::Denoising),
+        ("noise in every step", h::W_DENOISING, denoising & !0xffff, ImageError::Denoising),
         ("no steps", h::W_DENOISING, image.low(h::W_DENOISING), ImageError::Denoising),
         ("more steps than tables", h::W_DENOISING, denoising | 0xffff << 16, ImageError::Section),
         ("nothing to repeat", h::W_DENOISING, denoising & !0xffff | image.high(h::W_KIND), ImageError::Denoising),

@@ -60,7 +60,6 @@ impl Playback {
             self.next = 0;
         }
         let [output, kept, ..] = regions(arena, &[image.output(), image.kept(), Region::default()], Region::default());
-        let from = self.next * len;
         if let horizon @ 1.. = image.horizon() {
             let (sums, counts) = kept.split_at_mut_checked(horizon * len).ok_or(Fault::Damaged)?;
             for (ahead, new) in
@@ -79,6 +78,7 @@ impl Playback {
         }
         let lead = image.overlap().min(chunk - self.old.min(chunk)).min(chunk - self.next.min(chunk));
         if lead > 0 {
+            let from = self.next * len;
             let old = self.old.saturating_sub(image.execute()) * len;
             let (new, old) = (part(output, &(from..from + lead * len)), part(kept, &(old..old + lead * len)));
             for (i, (new, old)) in new.iter_mut().zip(old).enumerate() {

@@ -22,7 +22,8 @@ impl Head<'_, '_> {
     /// Returns the bytes of a saved state: 40, plus the recurrent state, the output, and the words from the action to
     /// the work area.
     pub fn saved_len(&self) -> usize {
-        4 * (WORDS + self.saved_regions().iter().map(|region| region.len).sum::<usize>())
+        let words = |sum: usize, region: &Region| sum.saturating_add(region.len);
+        self.saved_regions().iter().fold(WORDS, words).saturating_mul(4)
     }
 
     /// Writes the state into `to`, of [`Self::saved_len`] bytes: recurrent state, chunks, last action, states of

@@ -10,8 +10,8 @@ impl Head<'_, '_> {
     ///
     /// # Errors
     ///
-    /// [`StepError::SelfTest`] with the first self-test step whose bits differ; [`StepError::Damaged`] and
-    /// [`StepError::NotFinite`] as for a step.
+    /// [`StepError::SelfTest`] with the first self-test step whose bits differ; [`StepError::Damaged`] if the image
+    /// has none; [`StepError::Damaged`] and [`StepError::NotFinite`] as for a step.
     pub fn self_test(&mut self) -> Result<(), StepError> {
         self.play_self_test(Self::finish)
     }
@@ -56,6 +56,7 @@ impl Head<'_, '_> {
             }
             step += 1;
         }
-        Ok(())
+        // A test without steps, or that ends before its last one, has tested nothing.
+        if step == 0 || step < self.image.self_test_steps() { Err(StepError::Damaged) } else { Ok(()) }
     }
 }

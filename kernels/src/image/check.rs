@@ -81,7 +81,7 @@ impl<'a> Image<'a> {
     /// and widths that are missing are found where their records are read.
     fn check_built(&self) -> Result<(), ImageError> {
         let is_around = self.header.kind() >> 8 != 0;
-        if !cfg!(feature = "around") && is_around || !cfg!(feature = "chunks") && self.header.chunk() > 1 {
+        if !cfg!(feature = "around") && is_around || !cfg!(feature = "chunks") && self.needs_chunks() {
             return Err(ImageError::LeftOut);
         }
         Ok(())
@@ -171,24 +171,30 @@ impl<'a> Image<'a> {
         front.take(self.ports_at(), 1)?;
         front.take(self.ports_at() + 1, self.port_words() - 1)?;
         let [inputs, outputs] = self.port_counts();
-        let (mut lens, mut list) = ([0; 2], 0);
+        let (mut lens, mut list, mut listed) = ([0usize; 2], 0, 0);
         for i in 0..inputs + outputs {
             let [name, words, names] = self.port_texts(i);
             front.take(name, words)?;
-            // A port without a list of its own may name that of an earlier port, the last that there was.
+            let port = self.port_without_names(i).ok_or(ImageError::Ports)?;
+            // A port without a list of its own may name that of an earlier port, the last that there was. A list is read
+            // once, so that the time is linear in the image's length.
             if names != 0 && names != list {
                 front.take(names, 1)?;
                 front.take(names + 1, (self.word(names) as usize).div_ceil(4))?;
-                list = names;
+                (list, listed) = (names, port.len);
+                self.names(names, listed).ok_or(ImageError::Ports)?;
             }
-            let port = self.port(i).ok_or(ImageError::Ports)?;
+            if names != 0 && port.len != listed {
+                return Err(ImageError::Ports);
+            }
             let is_output = i >= inputs;
             let [low, high] = port.range;
             if is_output == (port.kind == PortKind::Input) || low > high || low.is_nan() || high.is_nan() || words == 0
             {
                 return Err(ImageError::Ports);
             }
-            lens[usize::from(is_output)] += port.len;
+            let sum = &mut lens[usize::from(is_output)];
+            *sum = sum.saturating_add(port.len);
         }
         if lens == [self.obs_len(), self.act_len()] { Ok(()) } else { Err(ImageError::Ports) }
     }
@@ -252,8 +258,8 @@ impl<'a> Image<'a> {
         } else if op.kind.is_of_step() {
             self.check_denoising(i, op, front)?;
         } else if op.kind == OpKind::Noise {
-            // The head's caller may fill it before the first operation.
-            if i != 0 {
+            // The head's caller may fill it before the first operation, once a step.
+            if i != 0 || self.first_denoising_op() == 0 {
                 return Err(ImageError::Denoising);
             }
         } else if op.kind.is_around() {
@@ -307,7 +313,14 @@ impl<'a> Image<'a> {
         {
             return Err(ImageError::Denoising);
         }
-        front.take_finite(op.data() + h::DENOISE_WORDS, steps * h::COEFFICIENTS)
+        front.take_finite(op.data() + h::DENOISE_WORDS, steps * h::COEFFICIENTS)?;
+        // Without noise of its own no step adds any; with it, the noise is none of the values that the operation reads.
+        let sigma = |step| op.constant(h::DENOISE_WORDS + step * h::COEFFICIENTS + h::SIGMA);
+        let adds = noise.offset == 0 && (0..steps).any(|step| sigma(step) != 0.0);
+        if adds || noise.offset != 0 && op.regions.iter().any(|region| noise.overlaps(*region)) {
+            return Err(ImageError::Denoising);
+        }
+        Ok(())
     }
 }
 

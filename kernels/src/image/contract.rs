@@ -23,11 +23,16 @@ impl<'a> Image<'a> {
         }
     }
 
-    /// Returns the lower and upper limit of action value `i`, if the contract has both. (If it limits other values
-    /// only, f32's largest number stands for no limit.)
+    /// Returns the lower and upper limit of action value `i`, if the contract has one of them; the other is infinite. (If
+    /// it limits other values only, f32's largest number stands for no limit.)
     pub fn limits(&self, i: usize) -> Option<[f32; 2]> {
+        if i >= self.act_len() {
+            return None;
+        }
         let [_, _, low, high, ..] = self.contract_of(i);
-        (low > f32::MIN && high < f32::MAX).then_some([low, high])
+        let low = if low > f32::MIN { low } else { f32::NEG_INFINITY };
+        let high = if high < f32::MAX { high } else { f32::INFINITY };
+        (low.is_finite() || high.is_finite()).then_some([low, high])
     }
 
     /// Returns the contract of action value `i`, with neutral numbers for the arrays that the contract does not have.

@@ -32,8 +32,8 @@ impl Image<'_> {
     fn needs(&self, feature: &str) -> bool {
         let matrices = || self.ops().filter_map(|op| op.matrix());
         match feature {
-            "chunks" => self.chunk() > 1,
-            "around" => self.header.kind() >> 8 != 0,
+            "chunks" => self.needs_chunks(),
+            "around" => self.has_around(),
             "groups" => matrices().any(|matrix| matrix.group != 0),
             _ => {
                 self.ops().any(|op| op.kind.feature() == Some(feature))

@@ -26,6 +26,8 @@ pub const BLOCK_WORDS: usize = 4;
 pub const DENOISE_WORDS: usize = 2;
 /// Coefficients of a denoising step.
 pub const COEFFICIENTS: usize = 7;
+/// Index of the factor of a denoising step's own noise among its coefficients.
+pub const SIGMA: usize = 5;
 /// Most rows of a matrix.
 pub const MAX_ROWS: usize = 4096;
 /// Most words of an arena: offsets in it are u16.
@@ -148,7 +150,7 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, by number.
-    pub const ALL: [Self; 4] = [Self::Step, Self::Chunk, Self::Flow, Self::Diffusion];
+    pub const ALL: &[Self] = &[Self::Step, Self::Chunk, Self::Flow, Self::Diffusion];
 
     /// Returns `true` if an evaluation runs the network in several denoising steps.
     pub const fn is_iterative(self) -> bool {

@@ -431,9 +431,10 @@ impl<'a> Image<'a> {
         }
     }
 
-    /// Returns `true` if the image has operations around its network: then firmware needs the crate's feature `around`.
+    /// Returns `true` if the image has operations or ports around its network: then firmware needs the crate's feature
+    /// `around`.
     pub fn has_around(&self) -> bool {
-        (0..self.op_count()).any(|i| self.op(i).is_ok_and(|op| op.kind.is_around()))
+        self.header.kind() >> 8 != 0 || (0..self.op_count()).any(|i| self.op(i).is_ok_and(|op| op.kind.is_around()))
     }
 
     /// Returns the values of noise that an evaluation takes; 0 for a policy without noise.

@@ -12,6 +12,11 @@ impl Image<'_> {
         if cfg!(feature = "chunks") { self.header.horizon() } else { 0 }
     }
 
+    /// Returns `true` if actions come from chunks, or are averages of what chunks predict.
+    pub(super) fn needs_chunks(&self) -> bool {
+        self.header.chunk() > 1 || self.header.horizon() > 0
+    }
+
     /// Returns the number of actions that blend the rest of a chunk into the next one; 0 if the rest is dropped.
     pub fn overlap(&self) -> usize {
         if cfg!(feature = "chunks") { self.header.overlap() } else { 0 }

@@ -26,7 +26,7 @@ pub enum PortKind {
 
 impl PortKind {
     /// All kinds, by number.
-    pub const ALL: [Self; 4] = [Self::Input, Self::Position, Self::Velocity, Self::Torque];
+    pub const ALL: &[Self] = &[Self::Input, Self::Position, Self::Velocity, Self::Torque];
 }
 
 /// A raw input, or targets: values that follow each other in the observation, or in the action.
@@ -115,15 +115,22 @@ impl<'a> Image<'a> {
 
     /// Reads a port; `None` if it is impossible, which a checked image excludes.
     pub(super) fn port(&self, i: usize) -> Option<Port<'a>> {
-        let [sizes, least, most, name, names] = self.port_record(i)?;
+        let port = self.port_without_names(i)?;
+        let [.., names] = self.port_texts(i);
+        let names = if names == 0 { "" } else { self.names(names, port.len)? };
+        Some(Port { names, ..port })
+    }
+
+    /// Reads a port but for the names of its values.
+    pub(super) fn port_without_names(&self, i: usize) -> Option<Port<'a>> {
+        let [sizes, least, most, name, _] = self.port_record(i)?;
         let name = self.text(name as usize, high(sizes) >> 8).filter(|name| is_text(name.as_bytes()))?;
-        let names = if names == 0 { "" } else { self.names(names as usize, low(sizes))? };
         let kind = *PortKind::ALL.get(high(sizes) & 0xff)?;
-        Some(Port { kind, name, names, len: low(sizes), range: [least, most].map(f32::from_bits) })
+        Some(Port { kind, name, names: "", len: low(sizes), range: [least, most].map(f32::from_bits) })
     }
 
     /// Reads a list of `count` names: u32 bytes, then the names, one a line.
-    fn names(&self, at: usize, count: usize) -> Option<&'a str> {
+    pub(super) fn names(&self, at: usize, count: usize) -> Option<&'a str> {
         let names = self.text(at.wrapping_add(1), self.word(at) as usize)?;
         let mut lines = 0;
         for line in names.split('\n') {

@@ -17,9 +17,10 @@ impl Region {
         self.offset..self.end()
     }
 
-    /// Returns the index after the last word.
+    /// Returns the index after the last word. In an image whose content was not checked it may wrap; such a region
+    /// has no words.
     pub(crate) fn end(self) -> usize {
-        self.offset + self.len
+        self.offset.wrapping_add(self.len)
     }
 
     /// Returns `true` if both regions share a word.

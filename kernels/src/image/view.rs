@@ -155,7 +155,7 @@ impl<'a> Image<'a> {
             return None;
         }
         let (obs, act) = (self.obs_len(), self.act_len());
-        let offset = self.header.self_test().wrapping_add(step * (obs + act));
+        let offset = self.header.self_test().wrapping_add(step.wrapping_mul(obs + act));
         self.section(offset, obs + act).split_at_checked(obs)
     }
 }

@@ -9,6 +9,17 @@ use crate::image::{Op, OpKind, Region};
 use crate::math::clamp;
 use crate::ops::elementwise::{copy, copy_le};
 
+/// Clips a value, all as bits. A value or a limit that is not finite gives NaN, so that an overflow stays visible.
+#[inline(always)]
+fn clip(x: u32, low: u32, high: u32) -> u32 {
+    const EXPONENT: u32 = 0x7f80_0000;
+    let is_overflow = |bits: u32| bits & EXPONENT == EXPONENT;
+    if is_overflow(x) || is_overflow(low) || is_overflow(high) {
+        return f32::NAN.to_bits();
+    }
+    clamp(f32::from_bits(x), f32::from_bits(low), f32::from_bits(high)).to_bits()
+}
+
 /// Runs a range of an operation's units. Its state advances with the last of them.
 ///
 /// # Errors
@@ -30,7 +41,7 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], units: &Range<usize>) -> Resul
         }
         OpKind::Clip => {
             for (x, (low, high)) in part(dst, units).iter_mut().zip(part(src, units).iter().zip(part(third, units))) {
-                *x = clamp(f32::from_bits(*x), f32::from_bits(*low), f32::from_bits(*high)).to_bits();
+                *x = clip(*x, *low, *high);
             }
             return Ok(());
         }
@@ -151,4 +162,22 @@ impl History {
 
 fn part_of<'r>(region: &'r [u32], range: &Range<usize>) -> &'r [u32] {
     region.get(range.clone()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::clip;
+
+    #[test]
+    fn what_is_not_finite_stays_visible() {
+        let clipped = |x: f32, low: f32, high: f32| f32::from_bits(clip(x.to_bits(), low.to_bits(), high.to_bits()));
+        for (x, expected) in [(-2.0, -1.0), (-0.0, -0.0), (0.5, 0.5), (7.0, 1.0), (f32::MAX, 1.0)] {
+            assert_eq!(clipped(x, -1.0, 1.0).to_bits(), f32::to_bits(expected), "{x}");
+        }
+        for wrong in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for [x, low, high] in [[wrong, -1.0, 1.0], [0.0, wrong, 1.0], [0.0, -1.0, wrong]] {
+                assert!(clipped(x, low, high).is_nan(), "{x} within {low} and {high}");
+            }
+        }
+    }
 }
