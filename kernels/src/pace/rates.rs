@@ -70,7 +70,7 @@ pub(super) const RATES: &[(Feature, [f64; 3])] = &[
     (Feature::operation(op::SELECT), [453.048, 751.352, 453.048]),
     (Feature::value(op::SELECT), [18.990, 23.992, 18.990]),
     (Feature::operation(op::CLIP), [490.999, 808.325, 490.999]),
-    (Feature::value(op::CLIP), [13.993, 19.994, 13.993]),
+    (Feature::value(op::CLIP), [29.980, 34.986, 29.980]),
     (Feature::operation(op::CONSTANT), [514.878, 855.368, 514.878]),
     (Feature::value(op::CONSTANT), [0.987, 3.491, 0.987]),
     (Feature::operation(op::START), [452.036, 763.931, 452.036]),

@@ -61,6 +61,10 @@ impl Profile {
 pub struct Answers(BTreeMap<String, toml::Value>);
 
 impl Answers {
+    pub(crate) fn keys(&self) -> impl Iterator<Item = &str> {
+        self.0.keys().map(String::as_str)
+    }
+
     /// Parses a TOML file; tables in it are parts of the keys.
     ///
     /// # Errors

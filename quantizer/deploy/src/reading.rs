@@ -38,6 +38,9 @@ pub struct Reading {
 /// If no family recognizes it, or its reader fails.
 pub fn read(bundle: &Bundle, accepted: bool, answers: Answers) -> Result<Reading> {
     if bundle.has(DESCRIPTION) {
+        if let Some(key) = answers.keys().next() {
+            bail!("answers: nothing asks for {key}: {DESCRIPTION} describes this bundle; change it there");
+        }
         let description = bundle.text(DESCRIPTION).and_then(|text| Description::parse(&text).context(DESCRIPTION))?;
         let (sources, questions, unread) = Default::default();
         return Ok(Reading { family: DESCRIPTION.to_owned(), profile: None, description, sources, questions, unread });

@@ -238,6 +238,10 @@ impl Reader {
                         "line {line}: key {:?} occurs twice",
                         printable(&key)
                     );
+                    ensure!(
+                        key != "<<",
+                        "line {line}: it merges another map (<<), which is not supported; write its keys out"
+                    );
                     entries.push((key, node));
                 }
                 None => match node.data {

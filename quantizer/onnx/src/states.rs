@@ -181,10 +181,7 @@ pub(crate) fn refuse_lost_states(
         let port = &model.graph.inputs[i];
         let len: usize = port.shape.iter().flatten().map(|n| n.unwrap_or(1)).product();
         let same = |output: &&Output| {
-            output.name != action
-                && output.value.len() == len
-                && !stem(&port.name).is_empty()
-                && stem(&port.name) == stem(&output.name)
+            output.name != action && output.value.len() == len && are_sides(&port.name, &output.name)
         };
         if let Some(output) = outputs.iter().find(same) {
             bail!(
@@ -197,10 +194,55 @@ pub(crate) fn refuse_lost_states(
     Ok(())
 }
 
+/// Returns `true` if two names are those of one state, before a step and after it.
+fn are_sides(before: &str, after: &str) -> bool {
+    let of_state = |name: &str| {
+        let lower = name.to_lowercase();
+        let mut parts = lower.split(|c: char| !c.is_ascii_alphanumeric());
+        parts.any(|part| ["state", "states", "hidden", "memory", "history", "hist", "carry", "h", "h0"].contains(&part))
+    };
+    let (from, to) = (stem(before), stem(after));
+    // state_in and state_out have nothing else in their names; history and updated_history have more in one.
+    let is_within = from.is_empty() || to.is_empty() || from.contains(&to) || to.contains(&from);
+    from == to && !from.is_empty() || of_state(before) && is_within && (of_state(after) || from.is_empty())
+}
+
 /// Returns `true` if an output consists of states of cells.
 pub(crate) fn is_state(cells: &Cells, exprs: &Exprs, value: &Tensor) -> bool {
     cells.elements(value).iter().all(|e| match *e {
         Element::Of(id, _) => matches!(exprs.get(id), Expr::CellState(_) | Expr::Cell(_)),
         Element::Known(_) => false,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::are_sides;
+
+    #[test]
+    fn names_of_a_state_before_and_after_a_step_are_known() {
+        for (before, after) in [
+            ("h_in", "h_out"),
+            ("state_in", "state_out"),
+            ("state_in_0", "state_out_0"),
+            ("state", "next_state"),
+            ("prev_state", "new_state"),
+            ("h0", "h1"),
+            ("h_t", "h_t1"),
+            ("history", "updated_history"),
+            ("lstm.hidden", "lstm.hidden.next"),
+        ] {
+            assert!(are_sides(before, after), "{before} {after}");
+        }
+        for (before, after) in [
+            ("obs", "obs_reconstructed"),
+            ("command", "estimate"),
+            ("input", "value"),
+            ("state", "value"),
+            ("robot_state", "goal_state"),
+            ("history", "latent"),
+        ] {
+            assert!(!are_sides(before, after), "{before} {after}");
+        }
+    }
 }

@@ -34,9 +34,12 @@ pub fn summary(imported: &Imported, policy: &Policy) -> String {
         count(policy.weights, "weight"),
         count(policy.parameters, "parameter")
     );
-    for (what, names) in [("inputs", &imported.cut_inputs), ("outputs", &imported.cut_outputs)] {
+    for (what, names, why) in [
+        ("inputs", &imported.cut_inputs, "the action does not depend on them"),
+        ("outputs", &imported.cut_outputs, "only the action is kept"),
+    ] {
         if !names.is_empty() {
-            text += &format!("cut       {what} {}: the action does not depend on them\n", list(names));
+            text += &format!("cut       {what} {}: {why}\n", list(names));
         }
     }
     text

@@ -26,8 +26,11 @@ impl Family for UnitreeRlLab {
     fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
         let Some(file) = bundle.find("deploy.yaml")? else { return Ok(None) };
         let document = Document::read(bundle, file)?;
-        if !KEYS.iter().all(|key| document.look(key).is_some()) {
-            return Ok(None);
+        let missing: Vec<&str> = KEYS.into_iter().filter(|key| document.look(key).is_none()).collect();
+        match missing[..] {
+            [] => {}
+            [key] => bail!("{}: it looks like a file of unitree_rl_lab, and this key is missing", document.at(key)),
+            _ => return Ok(None),
         }
         let network =
             bundle.find("policy.onnx")?.with_context(|| format!("{file}: there is no policy.onnx with it"))?;
@@ -78,11 +81,13 @@ impl Family for UnitreeRlLab {
                     if term == "joint_pos_rel" {
                         ops.push(Op::Subtract(Operand::Name("default".to_owned())));
                     }
+                    ops.extend(chosen_joints(yaml, &path, joints)?);
                     ops
                 }
                 "joint_vel_rel" | "joint_vel" => {
                     let mut ops = parts.input_as(term, "joint_vel", joints, "rad/s");
                     ops.push(select.clone());
+                    ops.extend(chosen_joints(yaml, &path, joints)?);
                     ops
                 }
                 "last_action" => {
@@ -143,6 +148,17 @@ impl Family for UnitreeRlLab {
         facts.note("gains", format!("{}; {}", yaml.at("stiffness"), facts.source("gains.order")));
         Ok(parts.finish())
     }
+}
+
+/// The joints that a term names by `params.asset_cfg.joint_ids`, in its order. Upstream takes all where that is no list of
+/// numbers (deploy/include/isaaclab/envs/mdp/observations.h).
+fn chosen_joints(yaml: &Document, path: &str, joints: usize) -> Result<Option<Op>> {
+    let path = format!("{path}.params.asset_cfg.joint_ids");
+    let Some(ids) = yaml.get(&path).and_then(Node::numbers).filter(|ids| !ids.is_empty()) else { return Ok(None) };
+    let place = |id: f64| (id >= 0.0 && id.fract() == 0.0 && id < joints as f64).then_some(id as usize);
+    let places: Option<Vec<usize>> = ids.iter().map(|id| place(*id)).collect();
+    let places = places.with_context(|| format!("{} must be numbers of joints below {joints}", yaml.at(&path)))?;
+    Ok(Some(Op::Select(Order::Places(places))))
 }
 
 impl UnitreeRlLab {

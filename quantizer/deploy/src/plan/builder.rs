@@ -158,8 +158,19 @@ impl Builder<'_> {
 
     fn gains(&self) -> Result<()> {
         let Some(gains) = &self.description.gains else { return Ok(()) };
+        let [stiffness, damping] = [gains.stiffness.len(), gains.damping.len()];
+        ensure!(
+            stiffness == damping,
+            "gains: stiffness has {stiffness} values, damping {damping}; give one each for a joint"
+        );
+        if let [target] = &self.plan.targets[..] {
+            let len = self.plan.values[target.slot].labels.len();
+            ensure!(stiffness == len, "gains: they have {stiffness} values, and the target {len}");
+        }
         for (name, list) in [("stiffness", &gains.stiffness), ("damping", &gains.damping)] {
             numbers::finite(list).with_context(|| format!("gains: {name}"))?;
+            let negative = list.iter().position(|gain| *gain < 0.0);
+            ensure!(negative.is_none(), "gains: {name}: gain {} is below 0", negative.unwrap_or(0));
             if let Some(order) = &gains.joints {
                 let names = self.joints(order, "gains")?.len();
                 ensure!(

@@ -157,6 +157,16 @@ fn bad_files_are_refused() -> Result<()> {
             "joints of the upper body",
         ),
         ("a name twice", falcon() + "dof_names: [a, b, b]\n", policy(), "occurs twice"),
+        (
+            "another SDK",
+            falcon()
+                .replace("[dof_pos, cos_phase", "[dof_pos, projected_gravity")
+                .replace(" cos_phase: 1,", " projected_gravity: 3,")
+                + "SDK_TYPE: xyz\n",
+            policy(),
+            "\"xyz\" is unknown; use unitree or booster",
+        ),
+        ("a merge", falcon() + "<<: {a: 1}\n", policy(), "it merges another map (<<), which is not supported"),
         ("a key twice", falcon() + "GAIT_PERIOD: 1\n", policy(), "occurs twice"),
         ("a longer action", falcon(), vec![("policy.onnx", onnx::linear(14, 4, &[]))], "contradicts itself"),
     ];

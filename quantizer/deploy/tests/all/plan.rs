@@ -202,7 +202,17 @@ fn mistakes_are_refused_by_their_keys() {
             "value = \"target\"\njoints = \"policy\"",
             "add { place = \"policy\" }",
         ),
-        ("stiffness = [1.0, 2.0]", "stiffness = [1.0]", "gains: stiffness has 1 values"),
+        (
+            "stiffness = [1.0, 2.0]",
+            "stiffness = [1.0]",
+            "gains: stiffness has 1 values, damping 2; give one each for a joint",
+        ),
+        ("stiffness = [1.0, 2.0]", "stiffness = [1.0, -2.0]", "gains: stiffness: gain 1 is below 0"),
+        (
+            "joints = \"robot\"\nstiffness = [1.0, 2.0]\ndamping = [0.1, 0.2]",
+            "stiffness = [1.0]\ndamping = [0.1]",
+            "gains: they have 1 values, and the target 2",
+        ),
     ];
     for (from, to, expected) in cases {
         assert_eq!(WHOLE.matches(from).count(), 1, "{from:?} must occur once");

@@ -72,9 +72,10 @@ fn each_malformed_file_is_refused_with_its_fault() {
             "a := Add(obs, b)
              b := Tanh(a)
              actions := Tanh(b)",
-            "node 0 \"/node/0\" (Add): reads \"b\" before a node gives it; remove the cycle",
+            "node 0 \"/node/0\" (Add): reads \"b\", which no input, no initializer and no earlier node gives: the file has a cycle",
         ),
-        ("actions := Add(obs, nowhere)", "reads \"nowhere\" before a node gives it"),
+        ("actions := Add(obs, nowhere)", "reads \"nowhere\", which no input, no initializer and no earlier node gives"),
+        ("actions := Dropout(obs, 0.5, [1])", "is in training mode, and drops values at random"),
         ("actions := MaxPool(obs, obs)", "node 0 \"/node/0\" (MaxPool): its kernel does not fit the shape [1, 4]"),
         ("actions := ConvTranspose(obs, obs)", "(ConvTranspose): has no kernel here; export the part after"),
         ("actions := MatMul(obs, obs)", "multiplies two values of the network, as attention does"),

@@ -5,7 +5,7 @@ use actq_onnx::{Choice, proto};
 use anyhow::{Context as _, Result};
 use prost::Message as _;
 
-use super::file::{File, encoded};
+use super::file::{File, Value, encoded};
 use super::styles::{OBS, begun, between, ended, found, network, ops, whole};
 use super::{compare, drawn, imported, refused, same};
 
@@ -166,6 +166,66 @@ fn function_overloads_are_distinguished() -> Result<()> {
     let plain = network(false).encode_to_vec();
     let functions = vec![function("first", "Tanh"), function("second", "Elu")];
     let called = proto::Model { functions, ..network(true) }.encode_to_vec();
+    let [ours, theirs] = [called, plain].map(|bytes| imported(&bytes, &Choice::default()));
+    let (ours, theirs) = (ours?.1, theirs?.1);
+    let observations = drawn(&ours);
+    compare(&actions(&theirs, &observations), &actions(&ours, &observations))
+}
+
+/// An attribute of a function that a branch in it names, as torch's library of functions has them.
+#[test]
+fn attributes_of_a_function_reach_its_branches() -> Result<()> {
+    let node = |op: &str, inputs: &[&str], outputs: &[&str], attributes: &[proto::Attribute]| {
+        encoded(&proto::Node {
+            op_type: Some(op.to_owned()),
+            input: inputs.iter().map(|&name| name.to_owned()).collect(),
+            output: outputs.iter().map(|&name| name.to_owned()).collect(),
+            attribute: attributes.iter().map(encoded).collect(),
+            ..Default::default()
+        })
+    };
+    let named = |name: &str| proto::Attribute { name: Some(name.to_owned()), ..Default::default() };
+    let slope = proto::Attribute { ref_attr_name: Some("slope".to_owned()), ..named("alpha") };
+    let output = proto::ValueInfo { name: Some("inner".to_owned()), r#type: None };
+    let branch = |op: &str, attributes: &[proto::Attribute]| {
+        let nodes = vec![node(op, &["x"], &["inner"], attributes)];
+        Some(encoded(&proto::Graph { node: nodes, output: vec![encoded(&output)], ..Default::default() }))
+    };
+    let truth = proto::Tensor { data_type: Some(9), raw_data: Some(vec![1].into()), ..Default::default() };
+    let truth = proto::Attribute { t: Some(encoded(&truth)), ..named("value") };
+    let function = encoded(&proto::Function {
+        name: Some("Act".to_owned()),
+        domain: Some("local".to_owned()),
+        overload: Some("only".to_owned()),
+        input: vec!["x".to_owned()],
+        output: vec!["y".to_owned()],
+        attribute_proto: vec![encoded(&proto::Attribute { f: Some(0.4), ..named("slope") })],
+        node: vec![
+            node("Constant", &[], &["yes"], &[truth]),
+            node(
+                "If",
+                &["yes"],
+                &["y"],
+                &[
+                    proto::Attribute { g: branch("LeakyRelu", &[slope]), ..named("then_branch") },
+                    proto::Attribute { g: branch("Tanh", &[]), ..named("else_branch") },
+                ],
+            ),
+        ],
+        ..Default::default()
+    });
+    let network = |called: bool| {
+        let mut file = begun();
+        let x = file.gemm("obs", 16, OBS);
+        let x =
+            if called { file.call("only", &x) } else { file.node("LeakyRelu", &[&x], &[("alpha", Value::Real(0.4))]) };
+        let y = file.gemm(&x, 3, 16);
+        file.nodes("Identity", &[&y], &["actions"], &[]);
+        file.output("actions", &[1, 3]);
+        file.model()
+    };
+    let plain = network(false).encode_to_vec();
+    let called = proto::Model { functions: vec![function], ..network(true) }.encode_to_vec();
     let [ours, theirs] = [called, plain].map(|bytes| imported(&bytes, &Choice::default()));
     let (ours, theirs) = (ours?.1, theirs?.1);
     let observations = drawn(&ours);

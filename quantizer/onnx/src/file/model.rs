@@ -120,6 +120,10 @@ impl Model {
     pub(crate) fn parse(bytes: Bytes, folder: &Path) -> Result<Self> {
         ensure!(!bytes.is_empty(), "the file is empty");
         ensure!(
+            !bytes.starts_with(b"version https://git-lfs"),
+            "the file is not ONNX but a pointer of Git LFS; run git lfs pull in its repository"
+        );
+        ensure!(
             !bytes.starts_with(b"PK\x03\x04"),
             "the file is not ONNX but a zip archive, as PyTorch's checkpoints are; export the module to ONNX, or to a policy folder \
              (docs/IMPORT.md, PyTorch)"

@@ -75,8 +75,11 @@ fn sizes(outputs: &[Output], which: &[usize]) -> String {
     which.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
+/// Returns `true` if a name is an action's, and not that of something about actions.
 fn is_action(name: &str) -> bool {
-    name.to_lowercase().contains("action") && !name.to_lowercase().contains("shape")
+    const ABOUT: [&str; 10] = ["shape", "std", "var", "prob", "logp", "value", "entropy", "mask", "prev", "last"];
+    let name = name.to_lowercase();
+    name.contains("action") && !ABOUT.iter().any(|word| name.contains(word))
 }
 
 /// Returns `true` if an output was refused because it draws random numbers.
@@ -114,5 +117,22 @@ pub(super) fn actions(shape: &[usize], n: usize) -> Result<(usize, usize)> {
         _ => bail!(
             "the action has the shape {shape:?}; export it as [value] or [action, value], after any axes of length 1"
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_action;
+
+    #[test]
+    fn what_is_about_actions_is_no_action() {
+        for name in ["action", "actions", "Action_Mean", "deterministic_action", "action_dist_inputs"] {
+            assert!(is_action(name), "{name}");
+        }
+        for name in
+            ["mu", "action_log_std", "action_value", "action_log_prob", "last_action", "action_mask", "action_shape"]
+        {
+            assert!(!is_action(name), "{name}");
+        }
     }
 }

@@ -51,6 +51,12 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Vec<Tenso
         "reads the shape {:?}, several steps or a batch; export one step with a batch of 1",
         x.shape
     );
+    if let Some(lengths) = call.optional(4) {
+        ensure!(
+            lengths.integers() == Some(&[1]),
+            "takes the length of its sequence from sequence_lens; export one step, without that input or with a constant 1"
+        );
+    }
     let gated = |values: &[f64], width: usize| -> Vec<f64> {
         order.iter().flat_map(|&gate| &values[gate * hidden * width..(gate + 1) * hidden * width]).copied().collect()
     };

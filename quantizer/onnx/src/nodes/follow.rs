@@ -7,6 +7,7 @@ use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 
 use crate::file::model::{Graph, Model, Node, Port, kind_name};
+use crate::file::proto;
 use crate::nodes::call::Call;
 use crate::nodes::cells;
 use crate::nodes::conditions;
@@ -42,6 +43,22 @@ pub(crate) struct Follower<'m> {
     pub(crate) budget: usize,
     /// Indices of the graph inputs that were read.
     pub(crate) read: Vec<usize>,
+    /// Attributes of the function that is being converted.
+    given: Attributes,
+}
+
+type Attributes = HashMap<String, proto::Attribute>;
+
+/// Replaces attributes that name one of the function around them. One without a value has the operator's default.
+fn bind(graph: &mut Graph, given: &Attributes) {
+    for node in &mut graph.nodes {
+        for attribute in node.attributes.values_mut() {
+            if let Some(name) = &attribute.ref_attr_name {
+                *attribute = given.get(name).cloned().unwrap_or_default();
+            }
+        }
+        node.attributes.retain(|_, attribute| attribute.name.is_some());
+    }
 }
 
 /// Elements that the results of any file may have.
@@ -51,7 +68,7 @@ const BUDGET_PER_ELEMENT: usize = 8;
 
 impl<'m> Follower<'m> {
     pub(crate) fn new(model: &'m Model) -> Self {
-        Self { model, exprs: Exprs::default(), budget: BASE_BUDGET, read: Vec::new() }
+        Self { model, exprs: Exprs::default(), budget: BASE_BUDGET, read: Vec::new(), given: Attributes::new() }
     }
 
     /// Returns the value of this name.
@@ -104,7 +121,8 @@ impl<'m> Follower<'m> {
             name => match scope.get(name) {
                 Some(tensor) => Ok(Some(Rc::clone(tensor))),
                 None => bail!(
-                    "reads {:?} before a node gives it; remove the cycle from the graph, or sort its nodes",
+                    "reads {:?}, which no input, no initializer and no earlier node gives: the file has a cycle, unsorted nodes, a sparse \
+                     initializer, or reads an operator's second output, which is not supported",
                     printable(name)
                 ),
             },
@@ -121,17 +139,13 @@ impl<'m> Follower<'m> {
             for (name, tensor) in function.inputs.iter().zip(inputs) {
                 inner.extend(tensor.map(|tensor| (name.clone(), tensor)));
             }
+            let mut given = function.defaults.clone();
+            given.extend(node.attributes.clone());
             let mut graph = function.graph.clone();
-            for inside in &mut graph.nodes {
-                for attribute in inside.attributes.values_mut() {
-                    let Some(name) = &attribute.ref_attr_name else { continue };
-                    let given = node.attributes.get(name).or_else(|| function.defaults.get(name));
-                    *attribute = given.cloned().unwrap_or_default();
-                }
-                // An attribute without a value has the operator's default.
-                inside.attributes.retain(|_, attribute| attribute.name.is_some());
-            }
+            bind(&mut graph, &given);
+            let outer = std::mem::replace(&mut self.given, given);
             self.run(&graph, &mut inner, &function.outputs, depth - 1)?;
+            self.given = outer;
             function.outputs.iter().map(|name| inner.get(name).cloned()).collect()
         } else if node.op == "If" {
             let condition = inputs.first().cloned().flatten().context("has no condition")?;
@@ -140,7 +154,8 @@ impl<'m> Follower<'m> {
             };
             let branch = if chosen != 0 { "then_branch" } else { "else_branch" };
             let bytes = node.attributes.get(branch).and_then(|a| a.g.as_ref()).context("has no branch")?;
-            let graph = Graph::parse(bytes)?;
+            let mut graph = Graph::parse(bytes)?;
+            bind(&mut graph, &self.given);
             let mut inner = scope.clone();
             let names: Vec<String> = graph.outputs.iter().map(|port| port.name.clone()).collect();
             self.run(&graph, &mut inner, &names, depth - 1)?;

@@ -13,7 +13,12 @@ use crate::values::tensor::{Data, Tensor, count, room};
 pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
     let one = |tensor: Tensor| Ok(Some(vec![tensor]));
     match call.op() {
-        "Identity" | "Dropout" => one(call.input(0)?.clone()),
+        "Identity" => one(call.input(0)?.clone()),
+        "Dropout" => {
+            let trains = call.optional(2).is_some_and(|mode| mode.integers().is_none_or(|mode| mode != [0]));
+            ensure!(!trains, "is in training mode, and drops values at random; export for inference");
+            one(call.input(0)?.clone())
+        }
         "Cast" | "CastLike" => one(cast(call)?),
         "Constant" => one(constant(call)?),
         "Shape" => {

@@ -109,7 +109,9 @@ fn norm(
 fn batch_norm(call: &Call<'_>, exprs: &mut Exprs, eps: f64) -> Result<Tensor> {
     let x = call.input(0)?;
     ensure!(
-        x.shape.len() >= 2 && call.int("training_mode").unwrap_or(0) == 0,
+        x.shape.len() >= 2
+            && call.int("training_mode").unwrap_or(0) == 0
+            && call.node.outputs.iter().skip(1).all(String::is_empty),
         "is in training mode, or does not read [batch, channel, ..]; export for inference"
     );
     let [scale, bias, mean, variance] =

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use actq::error::Result;
+use actq::error::{Result, bail};
 
 use super::super::common::action::fed_back;
 use super::super::common::given_gravity;
@@ -91,7 +91,11 @@ impl Reader<'_> {
     }
 
     fn gravity(&mut self) -> Result<Term> {
-        let booster = self.yaml.maybe("SDK_TYPE", "a text", Node::text)? == Some("booster");
+        let booster = match self.yaml.maybe("SDK_TYPE", "a text", Node::text)? {
+            Some("booster") => true,
+            Some("unitree") | None => false,
+            Some(other) => bail!("{}: {other:?} is unknown; use unitree or booster", self.yaml.at("SDK_TYPE")),
+        };
         let rule = if booster { "gravity.booster" } else { "gravity.unitree" };
         let (name, len, ops) = given_gravity(self.facts, rule, "wxyz", "base_quat")?;
         let raw = self.raw(name, len, "");
