@@ -99,8 +99,10 @@ impl Client {
                 }
             }
             wait = wait.mul_f64(1.5).min(MAX_REPEAT);
-            // The connection gives up a lost port; after its return the request is sent again.
-            if was_open && begun.elapsed() >= self.timeout {
+            // The connection gives up a lost port; after its return the request is sent again. One that opens and closes
+            // again and again never returns.
+            let (waited, is_over) = (begun.elapsed(), if was_open { self.timeout } else { 2 * self.timeout });
+            if waited >= is_over {
                 bail!("no answer for {:.1?}: {}", self.timeout, self.connection.silence());
             }
         }

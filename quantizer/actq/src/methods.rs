@@ -13,7 +13,7 @@ pub mod scale;
 
 pub use crate::calibrate::allowance::Sampled;
 pub use learning::{Choice, Learning, Recipe, Tried};
-pub use options::{CustomMethod, CustomStatistics, Effort, Method, Options};
+pub use options::{CustomMethod, CustomStatistics, Effort, MOST_MINUTES, Method, Options};
 pub use packing::{Activations, Packing};
 pub use prepared::{PreparedMethod, least_bytes, quantize};
 pub use progress::Progress;

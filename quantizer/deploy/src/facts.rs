@@ -292,6 +292,10 @@ impl Facts {
     pub(crate) fn finish(self) -> Result<(BTreeMap<String, String>, Vec<Question>)> {
         let unasked: Vec<&str> =
             self.answers.0.keys().filter(|key| !self.used.contains(*key)).map(String::as_str).collect();
+        let is_rule = |key: &str| self.profile.rules.iter().any(|rule| rule.key == key);
+        if let Some(key) = unasked.iter().find(|key| is_rule(key)) {
+            bail!("answers: nothing asks for {key}, because the files say it; remove the answer");
+        }
         ensure!(
             unasked.is_empty(),
             "answers: nothing asks for {}; the keys of this bundle are {}",

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use actq_batch::Batch;
-use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _, TypeMustMatch};
+use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _};
 use numpy::{IntoPyArray as _, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 
@@ -29,6 +29,23 @@ impl Head {
         batch.seed(&seeds).map_err(raised)?;
         Ok(batch)
     }
+}
+
+/// Reads a mask of the states to reset: bool [heads].
+fn flags(mask: &Bound<'_, PyAny>, heads: usize) -> PyResult<Vec<bool>> {
+    let array = mask.py().import("numpy")?.call_method1("asarray", (mask,))?;
+    let Ok(array) = array.cast::<PyArrayDyn<bool>>() else {
+        return Err(error!("reset is of type {}; pass bool [{heads}]", array.getattr("dtype")?));
+    };
+    if let [flags] = array.shape()
+        && *flags != heads
+    {
+        return Err(error!("reset has {flags} values for {heads} observations; pass one for each"));
+    }
+    if array.shape().len() != 1 {
+        return Err(error!("reset has the shape {:?} for {heads} observations; pass bool [{heads}]", array.shape()));
+    }
+    Ok(array.readonly().as_array().iter().copied().collect())
 }
 
 /// Returns the exception; the text of a head's error has that of its cause.
@@ -57,7 +74,7 @@ impl Head {
         &self,
         py: Python<'py>,
         observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
-        reset: Option<PyArrayLikeDyn<'py, bool, TypeMustMatch>>,
+        reset: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let given = observations.shape().to_vec();
         let (heads, shape) = match given[..] {
@@ -70,15 +87,13 @@ impl Head {
                 ));
             }
         };
-        let reset: Option<Vec<bool>> = reset.map(|mask| mask.as_array().iter().copied().collect());
-        if let Some(mask) = reset.as_ref().filter(|mask| mask.len() != heads) {
-            return Err(error!("reset has {} values for {heads} observations; pass one for each", mask.len()));
-        }
+        let reset: Option<Vec<bool>> = reset.map(|mask| flags(mask, heads)).transpose()?;
         // Copies: another thread may change numpy's memory.
         let observations: Vec<f32> = observations.as_array().iter().copied().collect();
         let actions = py.detach(|| {
-            let mut batch = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
-            let batch = match &mut *batch {
+            let mut kept = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
+            let is_new = kept.is_none();
+            let batch = match &mut *kept {
                 Some(batch) => batch,
                 none => none.insert(self.states(self.image.get(), heads)?),
             };
@@ -86,7 +101,13 @@ impl Head {
                 return Err(error!("{heads} observations for a head of {} states; make another head", batch.heads()));
             }
             let mut actions = vec![0.0; heads * self.act_len];
-            batch.step(&observations, reset.as_deref(), &mut actions).map_err(raised)?;
+            if let Err(error) = batch.step(&observations, reset.as_deref(), &mut actions) {
+                // Observations that fail do not decide how many states there are.
+                if is_new {
+                    *kept = None;
+                }
+                return Err(raised(error));
+            }
             Ok(actions)
         })?;
         actions.into_pyarray(py).reshape(shape)

@@ -7,7 +7,7 @@ use actq::measure::time::{CLOCK, StepTime};
 use actq::runtime::ImageBuffer;
 use actq_boards::Target;
 use actq_cli::commands::export_c;
-use actq_cli::outputs::files::write;
+use actq_cli::outputs::files::{refuse_foreign, write};
 use actq_cli::report::{inspect, time};
 use actq_kernels::PortKind;
 use actq_onnx::export::{self, Attribute, Data, Tensor};
@@ -29,13 +29,30 @@ type Port = (&'static str, String, Vec<String>, usize);
 pub(crate) struct Image {
     buffer: ImageBuffer,
     name: PathBuf,
+    /// What loops ask for: each [`Self::image`] checks all bytes.
+    facts: Facts,
+}
+
+struct Facts {
+    name: String,
+    obs_len: usize,
+    act_len: usize,
+    rate_hz: f32,
+    crc32: u32,
 }
 
 impl Image {
     /// Checks an image; errors call it `name`.
     pub(crate) fn of(buffer: ImageBuffer, name: &Path) -> PyResult<Self> {
-        buffer.image(name).or_raise()?;
-        Ok(Self { buffer, name: name.to_owned() })
+        let image = buffer.image(name).or_raise()?;
+        let facts = Facts {
+            name: image.name().to_owned(),
+            obs_len: image.obs_len(),
+            act_len: image.act_len(),
+            rate_hz: image.rate_hz(),
+            crc32: image.crc(),
+        };
+        Ok(Self { buffer, name: name.to_owned(), facts })
     }
 
     pub(crate) fn image(&self) -> PyResult<actq_kernels::Image<'_>> {
@@ -60,9 +77,9 @@ impl Image {
         Self::of(ImageBuffer::read(&path).or_raise()?, &path)
     }
 
-    /// Writes the file, whole or not at all.
+    /// Writes the file, whole or not at all. Replaces only an image, or an empty file.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| write(&path, self.buffer.bytes())).or_raise()
+        py.detach(|| refuse_foreign(&path).and_then(|()| write(&path, self.buffer.bytes()))).or_raise()
     }
 
     /// The bytes of the image's file.
@@ -73,32 +90,32 @@ impl Image {
 
     /// Name of the policy.
     #[getter]
-    fn name(&self) -> PyResult<String> {
-        Ok(self.image()?.name().to_owned())
+    fn name(&self) -> &str {
+        &self.facts.name
     }
 
     /// Values of an observation.
     #[getter]
-    fn obs_len(&self) -> PyResult<usize> {
-        Ok(self.image()?.obs_len())
+    const fn obs_len(&self) -> usize {
+        self.facts.obs_len
     }
 
     /// Values of an action.
     #[getter]
-    fn act_len(&self) -> PyResult<usize> {
-        Ok(self.image()?.act_len())
+    const fn act_len(&self) -> usize {
+        self.facts.act_len
     }
 
     /// Control rate in Hz.
     #[getter]
-    fn rate_hz(&self) -> PyResult<f32> {
-        Ok(self.image()?.rate_hz())
+    const fn rate_hz(&self) -> f32 {
+        self.facts.rate_hz
     }
 
     /// CRC-32 of the image, as in its header.
     #[getter]
-    fn crc32(&self) -> PyResult<u32> {
-        Ok(self.image()?.crc())
+    const fn crc32(&self) -> u32 {
+        self.facts.crc32
     }
 
     /// SHA-256 of the policy that the image was made from, as hexadecimal digits.
@@ -177,6 +194,9 @@ impl Image {
         golden: Option<PathBuf>,
         steps: usize,
     ) -> PyResult<Vec<PathBuf>> {
+        if steps == 0 {
+            return Err(error!("steps is 0; use a whole number from 1 on"));
+        }
         let image = self.image()?;
         py.detach(|| {
             export_c::export(
@@ -191,9 +211,13 @@ impl Image {
         .or_raise()
     }
 
-    /// Writes the image's network as an ONNX file in f32, whole or not at all.
+    /// Writes the image's network as an ONNX file in f32, whole or not at all. Replaces only a file whose name ends in
+    /// .onnx.
     fn to_onnx(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let image = self.image()?;
+        if path.is_file() && path.extension().is_none_or(|ending| ending != "onnx") {
+            return Err(error!("{}: exists and is no .onnx file; choose another name, or remove it", path.display()));
+        }
         py.detach(|| {
             let network = export::network(&image).with_context(|| self.name.display().to_string())?;
             write(&path, &export::file(&network, image.name()))

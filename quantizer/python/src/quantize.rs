@@ -6,7 +6,7 @@ use std::sync::Arc;
 use actq::budget::{Budget, TimeLimit};
 use actq::data::{Recording, Recordings, Sizes, joined};
 use actq::measure::{check, eval};
-use actq::methods::{Activations, Method, Options};
+use actq::methods::{Activations, MOST_MINUTES, Method, Options};
 use actq::pipeline::{Quantizer, check_budget};
 use actq::runtime::ImageBuffer;
 use actq_cli::importers::{learned, learned_from, recorded_sizes};
@@ -78,6 +78,9 @@ impl Request {
     pub(crate) fn options(&self, method: Method) -> PyResult<Options> {
         let forced = self.widths.iter().map(|(name, bits)| Ok((name.clone(), width(name, *bits)?)));
         let minutes = self.minutes.map(|minutes| positive("minutes", minutes)).transpose()?;
+        if minutes.is_some_and(|minutes| minutes > MOST_MINUTES) {
+            return Err(error!("minutes is {}; use at most {MOST_MINUTES}, a week", minutes.unwrap_or_default()));
+        }
         let options = Options {
             group: self.group.unwrap_or(method.default_group()),
             activations: match self.activations {
@@ -188,7 +191,10 @@ pub(crate) fn evaluate<'py>(
         if image.has_around() {
             bail!("image: it takes raw inputs; compare it with a reference by `actq check`");
         }
-        let source = policy.as_deref().filter(|policy| policy.digest == image.digest());
+        let source = policy.as_deref();
+        if let Some(policy) = source.filter(|policy| policy.digest != image.digest()) {
+            bail!("the image was made from another policy than {:?}; pass that one, or none", policy.name);
+        }
         let parts: Vec<_> =
             passed.into_iter().map(|passed| passed.load(Sizes::of_image(&image))).collect::<Result<_, _>>()?;
         let mut dataset = match <[_; 1]>::try_from(parts) {

@@ -52,6 +52,16 @@ def test_arguments_are_named(mlp, observations):
         ({"group": 5}, "group is 5; it must be 0 or one of [32, 64, 128]"),
         ({"steps": -1}, "steps is -1; use a whole number from 0 on"),
         ({"seed": np.int64(-3)}, "seed is -3; use a whole number from 0 on"),
+        ({"seed": None}, "seed is None; use a whole number"),
+        ({"bits": 3.0}, "bits is 3.0; use a whole number"),
+        ({"flash": 10**30}, f"flash is {10**30}; use a smaller number"),
+        ({"activations": 2**40}, f"activations is {2**40}; use a smaller number"),
+        ({"bpw": "2"}, "bpw is '2'; use a number"),
+        ({"method": 3}, 'method is 3; use "rtn", "gptq" or "distill"'),
+        ({"relative": 1}, "relative is 1; use True or False"),
+        ({"widths": {"w": 3.5}}, "widths['w'] is 3.5; use a whole number"),
+        ({"widths": 3}, "widths is of type int; pass a mapping of matrices to bits"),
+        ({"minutes": 20_000}, "minutes is 20000; use at most 10080, a week"),
     ]
     for options, text in wrong:
         with pytest.raises(actq.Error) as raised:
@@ -75,6 +85,49 @@ def test_arguments_are_named(mlp, observations):
         actq.quantize(policy, progress=False)
     with pytest.raises(actq.Error, match="image: not an actq image"):
         actq.Image(b"no image")
+
+
+def test_sources_of_policies_are_checked(mlp, tmp_path):
+    for source, text in [
+        (None, "the policy is of type NoneType; pass a path, or a torch.nn.Module"),
+        (b"x", "the policy is of type bytes"),
+        ("", "the path of the policy is empty"),
+        (tmp_path / "none.pt", "none.pt: there is no such file"),
+    ]:
+        with pytest.raises(actq.Error, match=text):
+            actq.import_policy(source)
+    for option in ("name", "input_names", "output_names"):
+        with pytest.raises(actq.Error, match=f"only a module or a TorchScript file takes {option}"):
+            actq.import_policy(mlp, **{option: "x"})
+    with pytest.raises(actq.Error, match="states is of type list; pass a mapping"):
+        actq.import_policy(mlp, states=["a"])
+    for answers, text in [
+        (tmp_path / "none.toml", "none.toml: .*No such file"),
+        ({"rate_hz": None}, "answers: rate_hz is of type NoneType"),
+        ({"rate_hz": float("nan")}, "answers: rate_hz: .*not JSON compliant"),
+    ]:
+        with pytest.raises(actq.Error, match=text):
+            actq.import_policy(mlp, answers=answers)
+
+
+def test_only_files_of_their_kind_are_replaced(mlp, observations, tmp_path):
+    policy = actq.import_policy(mlp)
+    image = actq.quantize(policy, observations, method="rtn", progress=False)
+    recording = tmp_path / "obs.npy"
+    np.save(recording, observations)
+    before = recording.read_bytes()
+    with pytest.raises(actq.Error, match="obs.npy: exists and is not an actq image"):
+        image.save(recording)
+    with pytest.raises(actq.Error, match="obs.npy: exists and is no .onnx file"):
+        image.to_onnx(recording)
+    assert recording.read_bytes() == before
+    for _ in range(2):
+        image.save(tmp_path / "i.actq")
+        image.to_onnx(tmp_path / "i.onnx")
+    with pytest.raises(actq.Error, match="steps is 0; use a whole number from 1 on"):
+        image.export_c(tmp_path / "c", golden=recording, steps=0)
+    with pytest.raises(actq.Error, match='the image was made from another policy than "ur3_reach"; pass that one, or none'):
+        actq.evaluate(image, observations, actq.import_policy(UR3))
 
 
 def test_ctrl_c_ends_quantize(tmp_path):

@@ -82,8 +82,17 @@ def test_wrong_shapes_and_values_are_named(image, rows):
     assert head(rows[:4]).tobytes() == before(rows[:4]).tobytes()
     with pytest.raises(actq.Error, match="a batch has at least one head"):
         actq.Head(image, 0)
-    with pytest.raises(TypeError):
-        head(rows[:4], np.array([1, 0, 0, 2]))
+    for mask, of in (([1, 0, 0, 2], "int64"), (["False"] * 4, "<U5"), ([None] * 4, "object")):
+        with pytest.raises(actq.Error, match=rf"reset is of type {of}; pass bool \[4\]"):
+            head(rows[:4], mask)
+    for mask in (True, np.zeros((2, 2), dtype=bool)):
+        with pytest.raises(actq.Error, match=r"reset has the shape .* for 4 observations; pass bool \[4\]"):
+            head(rows[:4], mask)
+    # Observations that fail do not decide the number of states.
+    first = actq.Head(image)
+    with pytest.raises(actq.Error):
+        first(bad)
+    assert first.n is None and first(rows[0]).shape == (image.act_len,) and first.n == 1
 
 
 def test_other_threads_run_during_a_step(image):

@@ -90,6 +90,51 @@ def test_recordings_and_functions_of_the_caller(mlp, observations):
     assert tuned.rounds[0].rollout.success == 1.0
 
 
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_infos_may_be_nested_or_of_all_robots(mode):
+    class Logging(SyncVectorEnv):
+        def step(self, actions):
+            *rest, infos = super().step(actions)
+            return (*rest, {**infos, "reconfigure": False, "log": {"loss": np.float32(1.5)}})
+
+    make = lambda: gymnasium.wrappers.RecordEpisodeStatistics(Reach())  # noqa: E731
+    driven = actq.rollout(
+        lambda x, reset: x[:, :4], Logging([make] * 3, autoreset_mode=mode), frames=300, success=lambda e: e.total < 0
+    )
+    for episode in driven.episodes:
+        assert episode.info["episode"]["l"] == 30 and episode.info["episode"]["r"] == pytest.approx(episode.total)
+    if mode is not AutoresetMode.SAME_STEP:
+        assert all(e.info["reconfigure"] is False and e.info["log"]["loss"] == 1.5 for e in driven.episodes)
+
+
+def test_arguments_of_rollouts_are_named():
+    env = envs(AutoresetMode.NEXT_STEP)
+    act = lambda x, reset: x[:, :4]  # noqa: E731
+    for arguments, text in [
+        ({"frames": 0}, "frames is 0; use a whole number from 1 on"),
+        ({"frames": float("nan")}, "frames is nan"),
+        ({"every": 0}, "every is 0"),
+        ({"policy": 3}, "the policy is of type int; pass actq.Head"),
+        ({"env": Reach()}, "env is one environment; pass a vector environment"),
+        ({"policy": lambda x, reset: x[:, :3]}, r"the policy's actions are \(3, 3\); the environment takes \(3, 4\)"),
+        ({"policy": lambda x, reset: np.zeros((6, 2))}, r"the policy's actions are \(6, 2\)"),
+    ]:
+        with pytest.raises(actq.Error, match=text):
+            actq.rollout(**{"policy": act, "env": env, "frames": 10, **arguments})
+    dictionary = gymnasium.spaces.Dict({"x": gymnasium.spaces.Box(-1, 1, (2,))})
+
+    class Named(Reach):
+        def __init__(self):
+            super().__init__()
+            self.observation_space = dictionary
+
+        def reset(self, *, seed=None, options=None):
+            return {"x": np.zeros(2, np.float32)}, {}
+
+    with pytest.raises(actq.Error, match="the environment's observations are Dict.*; pass observe"):
+        actq.rollout(act, SyncVectorEnv([Named]), frames=10)
+
+
 def test_discrete_actions_are_the_largest(mlp):
     from actq._rollout import _actions
 

@@ -141,6 +141,9 @@ impl Effort {
     }
 }
 
+/// The most minutes that learning may be limited to: a week.
+pub const MOST_MINUTES: f64 = 10_080.0;
+
 /// Options of a quantization.
 #[derive(Clone, Debug)]
 pub struct Options {

@@ -65,7 +65,8 @@ impl Draft<'_> {
     /// same time whatever the rows.
     fn cycles(&self) -> Result<Rate> {
         let TimeLimit { milliseconds, clock_hz, image_bytes } = self.limit;
-        let allowed = milliseconds * clock_hz / 1e3;
+        // More than any step takes, and small enough for sums.
+        let allowed = (milliseconds * clock_hz / 1e3).min(1e18);
         let bytes = image_bytes.map(|bytes| flash::room(self.quantizer, self.options, bytes)).transpose()?;
         let Quantizer { method, .. } = self.quantizer;
         // The cycles of a whole step, and those of its rest.

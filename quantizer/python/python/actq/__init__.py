@@ -13,7 +13,7 @@ with the text of the command `actq`. The log `actq` has what the command calls n
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, List
 
 from ._actq import Error, Head, Image, Link, Policy, __version__
 from ._evaluate import ErrorReport, evaluate
@@ -23,13 +23,13 @@ from ._rollout import Episode, Rollout, rollout
 from ._tune import Round, Tuned, tune
 
 if TYPE_CHECKING:
-    from ._fake_quant import FakeQuant
+    from ._fake_quant import FakeQuant as FakeQuant
 
+# Without FakeQuant, because `from actq import *` must not need torch.
 __all__ = [
     "Episode",
     "Error",
     "ErrorReport",
-    "FakeQuant",
     "Head",
     "Image",
     "Link",
@@ -44,6 +44,10 @@ __all__ = [
     "rollout",
     "tune",
 ]
+
+
+def __dir__() -> List[str]:
+    return sorted([*__all__, "FakeQuant"])
 
 
 def __getattr__(name: str) -> Any:

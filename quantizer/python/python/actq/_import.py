@@ -48,19 +48,31 @@ def import_policy(
 
     Raises `actq.Error` with the node, tensor, file or key that cannot be imported.
     """
+    if states is not None and not isinstance(states, Mapping):
+        raise _actq.Error(f"states is of type {type(states).__name__}; pass a mapping of inputs to outputs")
     pairs = list((states or {}).items())
     if isinstance(source, (str, os.PathLike)):
+        if not os.fspath(source):
+            raise _actq.Error("the path of the policy is empty")
         path = Path(source)
         if path.suffix not in TORCHSCRIPT:
-            if example is not None:
-                raise _actq.Error(f"{path}: only a module or a TorchScript file takes an example")
+            given = {"example": example, "input_names": input_names, "output_names": output_names, "name": name}
+            for key, value in given.items():
+                if value is not None:
+                    raise _actq.Error(f"{path}: only a module or a TorchScript file takes {key}")
             return _actq.import_path(
                 path, output=output, states=pairs, accept_profile=accept_profile, answers=_toml(answers)
             )
-        import torch
-
+        if not path.is_file():
+            raise _actq.Error(f"{path}: there is no such file")
         name = name or path.stem
-        source = torch.jit.load(str(path), map_location="cpu")  # type: ignore[no-untyped-call]
+        try:
+            source = _torch_module().jit.load(str(path), map_location="cpu")
+        except RuntimeError as error:
+            raise _actq.Error(f"{path}: torch cannot read it as TorchScript: {error}") from error
+    elif not callable(getattr(source, "forward", None)):
+        raise _actq.Error(f"the policy is of type {type(source).__name__}; pass a path, or a torch.nn.Module")
+    _torch_module()
     from ._torch import onnx_bytes
 
     name = name or type(source).__name__
@@ -70,10 +82,32 @@ def import_policy(
     return _actq.import_onnx(content, name=name, output=output, states=pairs)
 
 
+def _torch_module() -> Any:
+    try:
+        import torch
+    except ImportError as error:
+        raise _actq.Error(f'modules and TorchScript files need torch ({error}); pip install "actq[torch]"') from error
+    return torch
+
+
 def _toml(answers: Union[None, PathLike, Mapping[str, Any]]) -> str:
     """Returns answers as TOML; JSON's numbers, texts and lists are also TOML's."""
     if answers is None:
         return ""
     if isinstance(answers, Mapping):
-        return "".join(f"{key} = {json.dumps(value)}\n" for key, value in answers.items())
-    return Path(answers).read_text()
+        return "".join(f"{key} = {_toml_value(key, value)}\n" for key, value in answers.items())
+    try:
+        return Path(answers).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise _actq.Error(f"answers: {answers}: {error}") from error
+
+
+def _toml_value(key: str, value: Any) -> str:
+    # Numbers and arrays of numpy have the method.
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if not isinstance(value, (bool, int, float, str, list, tuple)):
+        raise _actq.Error(f"answers: {key} is of type {type(value).__name__}; pass a number, a text, a bool or a list")
+    try:
+        return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise _actq.Error(f"answers: {key}: {error}") from error

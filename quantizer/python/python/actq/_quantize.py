@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import logging
+from numbers import Real
 from operator import index
 from typing import Any, Dict, Mapping, Optional
+
+import numpy as np
 
 from . import _actq
 from ._actq import Error, Image, Policy
@@ -24,13 +27,34 @@ def request(**given: Any) -> Dict[str, Any]:
         ["bits", "bpw", "flash", "ms", "max_nmse", "method", "group", "activations", "steps", "minutes"]
     )
     options: Dict[str, Any] = {**unset, "clock": CLOCK, "widths": [], "relative": False, "seed": 1, **given}
-    options["widths"] = list(dict(options["widths"] or {}).items())
-    for name in ("flash", "group", "seed", "steps"):
+    if options["widths"] is not None and not isinstance(options["widths"], (list, Mapping)):
+        raise Error(f"widths is of type {type(options['widths']).__name__}; pass a mapping of matrices to bits")
+    options["widths"] = [(name, _whole(f"widths[{name!r}]", bits)) for name, bits in dict(options["widths"] or {}).items()]
+    for name in ("bits", "flash", "group", "activations", "steps"):
         if options[name] is not None:
-            options[name] = index(options[name])
-            if options[name] < 0:
-                raise Error(f"{name} is {options[name]}; use a whole number from 0 on")
-    return options
+            options[name] = _whole(name, options[name])
+    options["seed"] = _whole("seed", options["seed"])
+    for name in ("bpw", "ms", "max_nmse", "minutes", "clock"):
+        if options[name] is not None and not isinstance(options[name], Real):
+            raise Error(f"{name} is {options[name]!r}; use a number")
+    if not isinstance(options["method"], (str, type(None))):
+        raise Error(f"method is {options['method']!r}; use \"rtn\", \"gptq\" or \"distill\"")
+    if not isinstance(options["relative"], (bool, np.bool_)):
+        raise Error(f"relative is {options['relative']!r}; use True or False")
+    return {**options, "relative": bool(options["relative"])}
+
+
+def _whole(name: str, value: Any) -> int:
+    """Returns a whole number that the extension can take."""
+    try:
+        number = index(value)
+    except TypeError:
+        raise Error(f"{name} is {value!r}; use a whole number") from None
+    if number < 0:
+        raise Error(f"{name} is {number}; use a whole number from 0 on")
+    if number >= (2**63 if name in ("flash", "steps", "seed") else 2**32):
+        raise Error(f"{name} is {number}; use a smaller number")
+    return number
 
 
 def quantize(
@@ -79,7 +103,7 @@ def quantize(
     seed: seed of all random numbers.
     progress: called as progress(work, share); or True, False, or None for a bar in a notebook or on a terminal.
 
-    Raises `actq.Error` if the policy, a recording or an option cannot be used, or a budget cannot be kept. Ctrl-C ends it
+    Raises `actq.Error` if the policy, a recording or an option cannot be used, or a budget cannot be kept. Ctrl-C returns
     at once. What the command prints as notes goes to the log `actq`.
     """
     options = request(

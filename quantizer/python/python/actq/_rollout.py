@@ -81,6 +81,13 @@ def rollout(
 
     Raises what policy and environment raise.
     """
+    for name, number in (("frames", frames), ("every", every)):
+        if not number >= 1:
+            raise Error(f"{name} is {number}; use a whole number from 1 on")
+    if not callable(policy):
+        raise Error(f"the policy is of type {type(policy).__name__}; pass actq.Head(image), or a function")
+    if not hasattr(env, "num_envs"):
+        raise Error("env is one environment; pass a vector environment, as gymnasium.make_vec(..., num_envs=1)")
     n, mode = env.num_envs, _autoreset(env)
     observe, act = observe or _flat(env), act or _actions(env)
     kept: List[Tuple[Floats, Array, Array]] = []
@@ -140,8 +147,21 @@ def _succeeded(episode: Episode) -> Optional[bool]:
 def _info(infos: Mapping[str, Any], i: int, mode: str) -> Dict[str, Any]:
     """Returns the info of robot `i` where its episode ended."""
     infos = infos.get("final_info", infos) if mode == "SameStep" else infos
-    present = (key for key in infos if not key.startswith("_"))
-    return {key: infos[key][i] for key in present if f"_{key}" not in infos or infos[f"_{key}"][i]}
+    return _of_robot(infos, i)
+
+
+def _of_robot(infos: Mapping[str, Any], i: int) -> Dict[str, Any]:
+    """Returns what infos, also nested ones, say of robot `i`. What is no array says it of all robots."""
+    info: Dict[str, Any] = {}
+    for key, value in infos.items():
+        told = infos.get(f"_{key}")
+        if key.startswith("_") or told is not None and not told[i]:
+            continue
+        if isinstance(value, Mapping):
+            info[key] = _of_robot(value, i)
+        else:
+            info[key] = value[i] if isinstance(value, (list, tuple)) or np.ndim(value) > 0 else value
+    return info
 
 
 def _autoreset(env: VectorEnv) -> str:
@@ -150,7 +170,12 @@ def _autoreset(env: VectorEnv) -> str:
 
 
 def _flat(env: VectorEnv) -> Observe:
-    return lambda observations: np.reshape(observations, (env.num_envs, -1))
+    def flat(observations: Any) -> Array:
+        if isinstance(observations, (Mapping, tuple)):
+            raise Error(f"the environment's observations are {env.single_observation_space}; pass observe")
+        return np.reshape(observations, (env.num_envs, -1))
+
+    return flat
 
 
 def _actions(env: VectorEnv) -> Act:
@@ -159,9 +184,20 @@ def _actions(env: VectorEnv) -> Act:
 
     space = env.single_action_space
     if isinstance(space, Discrete):
-        return lambda actions: np.argmax(actions, axis=1) + space.start
+        return lambda actions: np.argmax(_checked(actions, (env.num_envs, int(space.n))), axis=1) + space.start
     if isinstance(space, Box):
         shape, dtype = (env.num_envs, *space.shape), space.dtype
         low, high = space.low, space.high
-        return lambda actions: np.clip(np.reshape(actions, shape), low, high).astype(dtype)
+        values = int(np.prod(space.shape))
+        return lambda actions: np.clip(
+            np.reshape(_checked(actions, (env.num_envs, values)), shape), low, high
+        ).astype(dtype)
     raise Error(f"the environment's actions are {space}; pass act, which makes them of the policy's")
+
+
+def _checked(actions: Array, shape: Tuple[int, int]) -> Array:
+    """Returns actions [n, n_act], or raises."""
+    actions = np.asarray(actions)
+    if actions.shape[:1] != shape[:1] or actions.size != shape[0] * shape[1]:
+        raise Error(f"the policy's actions are {actions.shape}; the environment takes {shape}: pass act")
+    return actions.reshape(shape)
