@@ -5,6 +5,9 @@ use actq::import::contract::{Array, JsonContract};
 use crate::values::bounds::bounds;
 use crate::values::expr::{Expr, Exprs, Id};
 
+/// Largest relative difference that counts as rounding in f64.
+const ROUNDING: f64 = 1e-12;
+
 /// Scale, offset and limits of every value, as the contract applies them.
 struct ContractValues {
     scale: Vec<f64>,
@@ -27,8 +30,11 @@ pub(crate) fn contract(exprs: &Exprs, root: Id, act_len: usize) -> (Id, Option<J
         at = match exprs.get(at) {
             Expr::Affine(x, a, b) => {
                 for i in 0..n {
-                    ends.offset[i] += ends.scale[i] * b[i];
-                    ends.scale[i] *= a[i];
+                    let (before, scale) = (ends.offset[i], ends.scale[i] * a[i]);
+                    let offset = before + ends.scale[i] * b[i];
+                    // A factor and its inverse, an offset and its opposite: what is left is rounding.
+                    ends.scale[i] = if (scale - 1.0).abs() < ROUNDING { 1.0 } else { scale };
+                    ends.offset[i] = if offset.abs() <= ROUNDING * before.abs() { 0.0 } else { offset };
                 }
                 *x
             }

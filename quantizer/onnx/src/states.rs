@@ -199,7 +199,9 @@ fn are_sides(before: &str, after: &str) -> bool {
     let of_state = |name: &str| {
         let lower = name.to_lowercase();
         let mut parts = lower.split(|c: char| !c.is_ascii_alphanumeric());
-        parts.any(|part| ["state", "states", "hidden", "memory", "history", "hist", "carry", "h", "h0"].contains(&part))
+        parts.any(|part| {
+            ["state", "states", "hidden", "memory", "history", "hist", "carry", "h", "h0", "h1", "hn"].contains(&part)
+        })
     };
     let (from, to) = (stem(before), stem(after));
     // state_in and state_out have nothing else in their names; history and updated_history have more in one.

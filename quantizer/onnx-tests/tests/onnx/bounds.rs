@@ -91,6 +91,14 @@ fn clip_keeps_limits_and_layers_have_none() -> Result<()> {
     let row = [1, LEN as i64];
     assert_eq!(limits(&file(&row, "actions := Clip(x, -0.5, 0.25)"))?, [Some([-0.5, 0.25]); LEN]);
     assert_eq!(limits(&file(&row, "actions := Identity(x)"))?, [None; LEN]);
+    // A tensor of limits on each side, as of torch.clamp, in either order, and after a factor and an offset.
+    let (low, high) = ("[-0.5, -0.1, 0.25, -2.0]", "[0.25, 0.1, 0.375, 2.0]");
+    let each = [[-0.5, 0.25], [-0.1, 0.1], [0.25, 0.375], [-2.0, 2.0]];
+    for text in [format!("Min(Max(x, {low}), {high})"), format!("Max(Min(x, {high}), {low})")] {
+        assert_eq!(limits(&file(&row, &format!("actions := {text}")))?, each.map(Some), "{text}");
+        let scaled = limits(&file(&row, &format!("actions := {text} * 2.0 + 1.0")))?;
+        assert_eq!(scaled, each.map(|limits| Some(limits.map(|limit| 2.0 * limit + 1.0))), "{text}");
+    }
     // A constant action has limits equal to its value.
     let held = file(&[1, LEN as i64 + 1], "actions := Concat(x, full(0.7, 1, 1), axis=1)");
     let found = limits(&held)?;

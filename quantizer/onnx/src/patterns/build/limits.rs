@@ -52,6 +52,40 @@ impl Exprs {
 
     /// Returns the elements of `max(x, limits)`, or `min` if `sign` is -1, with a limit for each.
     pub(crate) fn limited_each(&mut self, x: Id, limits: &[f64], sign: f64) -> Vec<Element> {
+        if let Some(both) = self.clipped_each(x, limits, sign) {
+            return self.elements(both);
+        }
+        let all = self.one_sided_each(x, limits, sign);
+        if let Some(values) = all.iter().map(value).collect::<Option<Vec<_>>>() {
+            let limited = self.vector(&values);
+            self.limited_each.insert(limited, (x, limits.to_vec(), sign));
+        }
+        all
+    }
+
+    /// Returns `x` between limits for each element, if it has limits on the other side: a clip of shares of the ranges.
+    fn clipped_each(&mut self, x: Id, limits: &[f64], sign: f64) -> Option<Id> {
+        let (inner, others) = match (self.limited_each.get(&x), self.limited(x)) {
+            (Some((inner, others, other)), _) if *other == -sign => (*inner, others.clone()),
+            (_, Some((inner, low, high))) => (inner, vec![if sign > 0.0 { high } else { low }; limits.len()]),
+            _ => return None,
+        };
+        let [low, high] = if sign > 0.0 { [limits, &others] } else { [&others, limits] };
+        let ranges = || low.iter().zip(high);
+        let fits = |(low, high): (&f64, &f64)| low < high && (-low == *high || low.abs().max(high.abs()) <= MOST_CLIP);
+        if !ranges().all(fits) {
+            return None;
+        }
+        let half: Vec<f64> = ranges().map(|(low, high)| high / 2.0 - low / 2.0).collect();
+        let middle: Vec<f64> = ranges().map(|(low, high)| high / 2.0 + low / 2.0).collect();
+        let to_zero = half.iter().zip(&middle).map(|(half, middle)| -middle / half).collect();
+        let shares = self.affine(inner, half.iter().map(|half| 1.0 / half).collect(), to_zero);
+        let clipped = self.put(Expr::Clip(shares, 1.0), limits.len());
+        Some(self.affine(clipped, half, middle))
+    }
+
+    /// Returns the elements of [`Self::limited_each`] without limits on the other side.
+    fn one_sided_each(&mut self, x: Id, limits: &[f64], sign: f64) -> Vec<Element> {
         let mut all = self.elements(x);
         for far in [false, true] {
             let side = |i: usize| -sign * limits[i];
