@@ -206,7 +206,7 @@ fn are_sides(before: &str, after: &str) -> bool {
     let (from, to) = (stem(before), stem(after));
     // state_in and state_out have nothing else in their names; history and updated_history have more in one.
     let is_within = from.is_empty() || to.is_empty() || from.contains(&to) || to.contains(&from);
-    from == to && !from.is_empty() || of_state(before) && is_within && (of_state(after) || from.is_empty())
+    from == to && !from.is_empty() || of_state(before) && of_state(after) && is_within
 }
 
 /// Returns `true` if an output consists of states of cells.
