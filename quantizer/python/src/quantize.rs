@@ -6,7 +6,7 @@ use std::sync::Arc;
 use actq::budget::{Budget, TimeLimit};
 use actq::data::{Recording, Recordings, Sizes, joined};
 use actq::measure::{check, eval};
-use actq::methods::{Activations, MOST_MINUTES, Method, Options};
+use actq::methods::{Activations, Effort, MOST_MINUTES, Method, Options};
 use actq::pipeline::{Quantizer, check_budget};
 use actq::runtime::ImageBuffer;
 use actq_cli::importers::{learned, learned_from, recorded_sizes};
@@ -38,6 +38,7 @@ pub(crate) struct Request {
     widths: Vec<(String, u32)>,
     steps: Option<usize>,
     minutes: Option<f64>,
+    effort: Option<String>,
     relative: bool,
     seed: u64,
 }
@@ -48,17 +49,19 @@ impl Request {
         let budgets = [
             self.bits.map(|bits| Ok(Budget::Width(width("bits", bits)?))),
             self.bpw.map(|bits| Ok(Budget::BitsPerWeight(positive("bpw", bits)?))),
-            self.flash.map(|bytes| Ok(Budget::ImageBytes(bytes))),
+            self.flash.filter(|_| self.ms.is_none()).map(|bytes| Ok(Budget::ImageBytes(bytes))),
             self.ms.map(|milliseconds| {
                 let (milliseconds, clock_hz) = (positive("ms", milliseconds)?, positive("clock", self.clock)?);
-                Ok(Budget::Time(TimeLimit { milliseconds, clock_hz, image_bytes: None }))
+                Ok(Budget::Time(TimeLimit { milliseconds, clock_hz, image_bytes: self.flash }))
             }),
             self.max_nmse.map(|limit| Ok(Budget::MaxNmse(positive("max_nmse", limit)?))),
         ];
         let mut given = budgets.into_iter().flatten();
         let budget = given.next().unwrap_or(Ok(Budget::Width(Width::W3)));
         if given.next().is_some() {
-            return Err(error!("more than one budget is given; pass one of bits, bpw, flash, ms and max_nmse"));
+            return Err(error!(
+                "more than one budget is given; pass one of bits, bpw, flash, ms and max_nmse, or flash and ms"
+            ));
         }
         budget
     }
@@ -91,6 +94,13 @@ impl Request {
             },
             steps: self.steps,
             minutes,
+            effort: match self.effort.as_deref() {
+                None => Effort::Default,
+                Some(name) => Effort::ALL
+                    .into_iter()
+                    .find_map(|(known, effort)| (known == name).then_some(effort))
+                    .ok_or_else(|| error!("effort is {name:?}; use \"quick\", \"default\" or \"thorough\""))?,
+            },
             relative: self.relative,
             seed: self.seed,
             forced: forced.collect::<PyResult<_>>()?,

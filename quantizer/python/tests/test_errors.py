@@ -46,7 +46,7 @@ def test_arguments_are_named(mlp, observations):
     wrong = [
         ({"bits": 5}, "bits is 5; use 2, 3, 4 or 8 bits"),
         ({"bpw": 0}, "bpw is 0; use a number above 0"),
-        ({"bpw": 2, "flash": 90_000}, "more than one budget is given; pass one of bits, bpw, flash, ms and max_nmse"),
+        ({"bpw": 2, "flash": 90_000}, "more than one budget is given; pass one of bits, bpw, flash, ms and max_nmse, or flash and ms"),
         ({"method": "best"}, 'method is "best"; use "rtn", "gptq" or "distill"'),
         ({"activations": 4}, "activations is 4; use 8 or 16 bits"),
         ({"group": 5}, "group is 5; it must be 0 or one of [32, 64, 128]"),
@@ -60,6 +60,8 @@ def test_arguments_are_named(mlp, observations):
         ({"method": 3}, 'method is 3; use "rtn", "gptq" or "distill"'),
         ({"relative": 1}, "relative is 1; use True or False"),
         ({"widths": {"w": 3.5}}, "widths['w'] is 3.5; use a whole number"),
+        ({"effort": "much"}, 'effort is "much"; use "quick", "default" or "thorough"'),
+        ({"effort": 1}, 'effort is 1; use "quick", "default" or "thorough"'),
         ({"widths": 3}, "widths is of type int; pass a mapping of matrices to bits"),
         ({"minutes": 20_000}, "minutes is 20000; use at most 10080, a week"),
     ]

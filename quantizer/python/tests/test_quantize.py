@@ -20,6 +20,8 @@ OPTIONS = [
     ({"bits": 4}, ["--bits", "4"]),
     ({"flash": 3000}, ["--flash", "3000"]),
     ({"ms": 0.2, "clock": 100e6}, ["--ms", "0.2", "--clock", "100M"]),
+    ({"flash": 3000, "ms": 0.1}, ["--flash", "3000", "--ms", "0.1"]),
+    ({"bpw": 2, "effort": "quick"}, ["--bpw", "2", "--effort", "quick"]),
     ({"method": "gptq", "bits": 3, "group": 32}, ["--method", "gptq", "--bits", "3", "--group", "32"]),
     ({"activations": 16, "seed": 7, "relative": True}, ["--activations", "16", "--seed", "7", "--relative"]),
 ]
@@ -27,10 +29,11 @@ OPTIONS = [
 
 @pytest.mark.parametrize(("options", "arguments"), OPTIONS)
 def test_same_options_give_the_bytes_of_the_command(command, mlp, observations, tmp_path, options, arguments):
-    steps, words = ({}, []) if options.get("method") == "gptq" else ({"steps": 30}, ["--steps", "30"])
+    is_set = options.get("method") == "gptq" or "effort" in options
+    steps, words = ({}, []) if is_set else ({"steps": 30}, ["--steps", "30"])
     np.save(tmp_path / "obs.npy", observations)
     command("quantize", mlp, "--calib", tmp_path / "obs.npy", "--out", tmp_path / "c.actq", *words, *arguments)
-    image = actq.quantize(actq.import_policy(mlp), observations, progress=False, **steps, **options)
+    image = actq.quantize(actq.import_policy(mlp), observations, progress=False, **{**steps, **options})
     assert image.bytes == (tmp_path / "c.actq").read_bytes()
 
 

@@ -24,7 +24,7 @@ CLOCK = 168e6
 def request(**given: Any) -> Dict[str, Any]:
     """Completes the options of a quantization by the defaults of the command."""
     unset = dict.fromkeys(
-        ["bits", "bpw", "flash", "ms", "max_nmse", "method", "group", "activations", "steps", "minutes"]
+        ["bits", "bpw", "flash", "ms", "max_nmse", "method", "group", "activations", "steps", "minutes", "effort"]
     )
     options: Dict[str, Any] = {**unset, "clock": CLOCK, "widths": [], "relative": False, "seed": 1, **given}
     if options["widths"] is not None and not isinstance(options["widths"], (list, Mapping)):
@@ -37,8 +37,9 @@ def request(**given: Any) -> Dict[str, Any]:
     for name in ("bpw", "ms", "max_nmse", "minutes", "clock"):
         if options[name] is not None and not isinstance(options[name], Real):
             raise Error(f"{name} is {options[name]!r}; use a number")
-    if not isinstance(options["method"], (str, type(None))):
-        raise Error(f"method is {options['method']!r}; use \"rtn\", \"gptq\" or \"distill\"")
+    for name, known in (("method", '"rtn", "gptq" or "distill"'), ("effort", '"quick", "default" or "thorough"')):
+        if not isinstance(options[name], (str, type(None))):
+            raise Error(f"{name} is {options[name]!r}; use {known}")
     if not isinstance(options["relative"], (bool, np.bool_)):
         raise Error(f"relative is {options['relative']!r}; use True or False")
     return {**options, "relative": bool(options["relative"])}
@@ -74,6 +75,7 @@ def quantize(
     widths: Optional[Mapping[str, int]] = None,
     steps: Optional[int] = None,
     minutes: Optional[float] = None,
+    effort: Optional[str] = None,
     relative: bool = False,
     seed: int = 1,
     progress: Progress = None,
@@ -92,13 +94,15 @@ def quantize(
     bpw: bits per weight of all weights, with scales and padding.
     flash: most bytes of the image.
     ms, clock: most milliseconds of a step on a Cortex-M4 at a clock in Hz, as predicted.
-    max_nmse: largest error; searches the fewest bits that keep it. At most one of these budgets may be given.
+    max_nmse: largest error; searches the fewest bits that keep it. At most one of these budgets may be given, or flash and
+        ms, which are then both kept.
     heldout: recordings that nothing learns from; errors are measured on them.
     method: "distill" (the default with recordings), "gptq" or "rtn" (the default without).
     group: columns that share a scale: 0, 32, 64 or 128.
     activations: bits of the activations: 8 or 16.
     widths: bits of single matrices, by their names.
     steps, minutes: most steps or minutes of learning; steps=0 for error feedback instead.
+    effort: how long to learn: "quick", "default" or "thorough".
     relative: weigh errors relative to the action's size.
     seed: seed of all random numbers.
     progress: called as progress(work, share); or True, False, or None for a bar in a notebook or on a terminal.
@@ -108,7 +112,7 @@ def quantize(
     """
     options = request(
         bits=bits, bpw=bpw, flash=flash, ms=ms, clock=clock, max_nmse=max_nmse, method=method, group=group,
-        activations=activations, widths=widths, steps=steps, minutes=minutes, relative=relative, seed=seed,
+        activations=activations, widths=widths, steps=steps, minutes=minutes, effort=effort, relative=relative, seed=seed,
     )  # fmt: skip
     with reporter(progress) as report:
         image, warnings, notes = _actq.quantize(policy, recordings, heldout, options, report)
