@@ -30,6 +30,18 @@ fn is(expected: &str, constant: &str, initializers: &[proto::Tensor]) -> Result<
 }
 
 #[test]
+fn places_of_a_mask_are_known() -> Result<()> {
+    // x[:, mask], and the places of a matrix.
+    is("[2.0, 4.0, 5.0]", "GatherND([1.0, 2.0, 3.0, 4.0, 5.0], Transpose(NonZero([0, 7, 0, -1, 2])))", &[])?;
+    let matrix = "Reshape([0, 3, 0, 0, 5, 6], [2, 3])";
+    is(
+        "[1.0, 4.0, 5.0]",
+        &format!("GatherND(Reshape([0.0, 1.0, 2.0, 3.0, 4.0, 5.0], [2, 3]), Transpose(NonZero({matrix})))"),
+        &[],
+    )
+}
+
+#[test]
 fn casts_to_fewer_digits_round() -> Result<()> {
     // float16 has 11 digits, bfloat16 8.
     is("[0.30004883, 1000.5, -7.0]", "Cast(Cast([0.3, 1000.4, -7.0], to=10), to=1)", &[])?;

@@ -35,8 +35,21 @@ pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
     match call.op() {
         "ReduceProd" | "ReduceSum" | "ReduceMean" | "ReduceMax" | "ReduceMin" => reduce(call, given[0]).map(Some),
         "DequantizeLinear" => dequantized(call).map(Some),
+        "NonZero" => nonzero(given[0]).map(Some),
         _ => Ok(None),
     }
+}
+
+/// Returns the places that are not zero: a row for each axis, a column for each place. Masks of observations give it.
+fn nonzero(x: &Tensor) -> Result<Tensor> {
+    let places: Vec<usize> =
+        x.reals().context("is not known")?.iter().enumerate().filter(|(_, v)| **v != 0.0).map(|(i, _)| i).collect();
+    let mut rows = Vec::with_capacity(x.shape.len() * places.len());
+    for (axis, &len) in x.shape.iter().enumerate() {
+        let stride: usize = x.shape[axis + 1..].iter().product();
+        rows.extend(places.iter().map(|place| (place / stride % len) as i64));
+    }
+    Ok(Tensor::new(vec![x.shape.len(), places.len()], Data::Int(rows)))
 }
 
 /// Dequantizes weights with one scale and zero point for all, or for each index of an axis.
