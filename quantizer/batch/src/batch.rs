@@ -75,9 +75,11 @@ impl Batch {
         let heads = OwnedHeads::try_new(memory, |memory| -> Result<Heads<'_>, Error> {
             let image = checked(&memory.image)?;
             let scratch = memory.scratch.borrow_mut().chunks_exact_mut(per_head);
+            let mut all = Vec::new();
+            all.try_reserve_exact(heads).map_err(|_| Error::Memory { heads })?;
             // A chunk has the words that a head needs.
-            let heads = scratch.filter_map(|scratch| Head::new(image, scratch).ok()).collect();
-            Ok(Heads { image, heads })
+            all.extend(scratch.filter_map(|scratch| Head::new(image, scratch).ok()));
+            Ok(Heads { image, heads: all })
         })?;
         let image = &heads.borrow_dependent().image;
         let inputs = image.ports().filter(|port| port.kind == PortKind::Input);

@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 
 use crate::error::error;
 use crate::image::Image;
+use crate::work::refuse_forked;
 
 /// The executor of an image, with n independent states.
 #[pyclass(frozen, module = "actq")]
@@ -76,6 +77,7 @@ impl Head {
         observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
         reset: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        refuse_forked()?;
         let given = observations.shape().to_vec();
         let (heads, shape) = match given[..] {
             [values] if values == self.obs_len => (1, vec![self.act_len]),

@@ -1,5 +1,8 @@
 """Actions are those of `actq serve`, bit for bit."""
 
+import os
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -93,6 +96,26 @@ def test_wrong_shapes_and_values_are_named(image, rows):
     with pytest.raises(actq.Error):
         first(bad)
     assert first.n is None and first(rows[0]).shape == (image.act_len,) and first.n == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system does not fork")
+def test_a_forked_process_does_not_wait_for_threads(image):
+    script = f"""
+import actq, os, signal, sys
+image = actq.Image({image.bytes!r})
+actq.Head(image)([0.0] * image.obs_len)
+child = os.fork()
+if child == 0:
+    signal.alarm(60)
+    try:
+        actq.Head(image)([0.0] * image.obs_len)
+    except actq.Error as error:
+        os._exit(7 if "start worker processes by spawn" in str(error) else 8)
+    os._exit(9)
+actq.Head(image)([0.0] * image.obs_len)
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+    assert subprocess.run([sys.executable, "-"], input=script, text=True).returncode == 7
 
 
 def test_other_threads_run_during_a_step(image):
