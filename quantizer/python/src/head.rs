@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use crate::error::error;
 use crate::image::Image;
-use crate::work::refuse_forked;
+use crate::process::refuse_forked;
 
 /// The executor of an image, with n independent states.
 #[pyclass(frozen, module = "actq")]

@@ -7,6 +7,7 @@ mod head;
 mod image;
 mod link;
 mod policy;
+mod process;
 mod quantize;
 mod recordings;
 mod tune;

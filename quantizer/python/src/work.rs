@@ -4,7 +4,7 @@
 //! abandoned: at its next report of progress it unwinds, and everything that it holds is dropped. It writes no files.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -13,21 +13,7 @@ use std::time::Duration;
 use pyo3::prelude::*;
 
 use crate::error::{error, raise};
-
-/// The process whose threads work; 0 before the first work.
-static OWNER: AtomicU32 = AtomicU32::new(0);
-
-/// Refuses work in a process that was forked after work began: the threads that would do it are not in it, and waiting
-/// for them would never end.
-pub(crate) fn refuse_forked() -> PyResult<()> {
-    let own = std::process::id();
-    match OWNER.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
-        Err(owner) if owner != own => Err(error!(
-            "this process was forked from one that had used actq; start worker processes by spawn, or use actq in the parent only"
-        )),
-        _ => Ok(()),
-    }
-}
+use crate::process::refuse_forked;
 
 /// Time between two looks at signals and progress.
 const INTERVAL: Duration = Duration::from_millis(50);
