@@ -307,7 +307,7 @@ actq_status actq_seed(struct actq_head *head, uint32_t seed);
  * Computes the action for an observation. With action chunks it is the chunk's next action, and most steps do not run
  * the network. The call counts as one control period.
  *
- * After an error of the observation's values or of the network (81 to 83, 90) `action` is unchanged, the recurrent
+ * After an error of the observation's values or of the network (81 to 83, 89, 90) `action` is unchanged, the recurrent
  * state and the chunk are reset, and the step limit holds from the last action.
  */
 actq_status actq_step(struct actq_head *head,

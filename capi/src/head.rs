@@ -159,7 +159,7 @@ pub unsafe extern "C" fn actq_seed(head: *mut ActqHead, seed: u32) -> ActqStatus
 /// Computes the action for an observation. With action chunks it is the chunk's next action, and most steps do not run
 /// the network. The call counts as one control period.
 ///
-/// After an error of the observation's values or of the network (81 to 83, 90) `action` is unchanged, the recurrent
+/// After an error of the observation's values or of the network (81 to 83, 89, 90) `action` is unchanged, the recurrent
 /// state and the chunk are reset, and the step limit holds from the last action.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_step(

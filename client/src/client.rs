@@ -103,7 +103,7 @@ impl Client {
             // again and again never returns.
             let (waited, is_over) = (begun.elapsed(), if was_open { self.timeout } else { 2 * self.timeout });
             if waited >= is_over {
-                bail!("no answer for {:.1?}: {}", self.timeout, self.connection.silence());
+                bail!("no answer for {waited:.1?}: {}", self.connection.silence());
             }
         }
     }
@@ -207,7 +207,8 @@ impl Client {
                 break;
             }
             if sent > 1 {
-                require_armed(&status).context("not armed, or not any more; arm it again if nothing is wrong")?;
+                require_armed(&status)
+                    .context("not armed, or not any more; find out why it stopped, then arm it again")?;
             }
             if attempt >= ATTEMPTS && begun.elapsed() >= self.timeout {
                 outcome.context("not armed")?;

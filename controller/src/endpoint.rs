@@ -84,6 +84,11 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         }
     }
 
+    /// Returns `true` if writing flash stops the tick.
+    pub const fn stalls(&self) -> bool {
+        !self.settings.flash_while_armed
+    }
+
     /// Takes a byte that arrived at `micros`; returns the frame to send for it, in `out`.
     ///
     /// `out` must hold [`actq_link::frame::wire_bytes`] of 46 bytes and of an action; a frame that does not fit is not

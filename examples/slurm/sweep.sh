@@ -4,19 +4,24 @@
 set -eu
 if [ -n "${SLURM_ARRAY_TASK_ID:-}" ]; then
     # Task i of n runs lines i + 1, i + 1 + n, ...
-    status=0
+    status=0 again=
     while IFS= read -r job; do
-        printf '%s\n' "$job" | actq job - --store "$2" || status=$?
+        [ -n "$job" ] || continue
+        one=0
+        printf '%s\n' "$job" | actq job - --store "$2" || one=$?
+        # 75, or a signal: another try may succeed.
+        if [ "$one" = 75 ] || [ "$one" -gt 127 ]; then again=yes; elif [ "$one" != 0 ]; then status=$one; fi
     done <<JOBS
 $(awk -v task="$SLURM_ARRAY_TASK_ID" -v tasks="$SLURM_ARRAY_TASK_COUNT" '(NR - 1) % tasks == task' "$1")
 JOBS
-    # 75: another try may succeed. Jobs that have a result do nothing then.
-    if [ "$status" = 75 ] && [ "${SLURM_RESTART_COUNT:-0}" -lt 3 ]; then
+    # Jobs that have a result do nothing then.
+    if [ -n "$again" ] && [ "${SLURM_RESTART_COUNT:-0}" -lt 3 ]; then
         scontrol requeue "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"
     fi
+    if [ -n "$again" ] && [ "$status" = 0 ]; then status=75; fi
     exit "$status"
 fi
-spec=$1 store=$2
+spec=$1 store=${2%/}
 shift 2
 mkdir -p "$store"
 actq plan "$spec" > "$store.jsonl"

@@ -58,8 +58,9 @@ impl<S: Stage> Motor<S> {
         let measured = self.measure();
         let duties = match (outputs.first(), axes.first(), measured) {
             (Some(Output::Drive(value)), Some(axis), Some(measured)) => {
-                let largest = largest(axis);
-                let q = if largest > 0.0 { value / largest * CURRENT } else { 0.0 };
+                // An axis with a single value commands no current.
+                let moves = axis.low() < axis.high();
+                let q = if moves { value / largest(axis) * CURRENT } else { 0.0 };
                 self.control.step(&measured, Rotor { d: 0.0, q }).map(|tick| tick.duties)
             }
             (Some(Output::Brake), ..) => {
@@ -79,7 +80,7 @@ impl<S: Stage> Motor<S> {
     }
 }
 
-/// Returns the largest magnitude within the limits. It compares, as [`Axis`] does.
+/// Returns the largest magnitude within the limits. It compares, because `f32::max` would be a call on a Cortex-M4.
 fn largest(axis: &Axis) -> f32 {
     if axis.high() > -axis.low() { axis.high() } else { -axis.low() }
 }
@@ -192,6 +193,9 @@ mod tests {
         assert!(motor.apply(&[Output::Coast], &axes) && !motor.bridges.stage().on);
         // An axis with a single value.
         assert!(motor.apply(&[Output::Drive(0.0)], &axes) && motor.bridges.stage().on);
+        assert_eq!((torque_current(&motor), motor.bridges.stage().duties()), (0.0, [500; 3]));
+        let single = [Axis::new(3.0, 3.0, 1.0, 3.0, SafeAction::Coast).expect("the axis is valid")];
+        assert!(motor.apply(&[Output::Drive(3.0)], &single));
         assert_eq!((torque_current(&motor), motor.bridges.stage().duties()), (0.0, [500; 3]));
         // A lost sensor.
         motor.motor.flux = Stator::default();

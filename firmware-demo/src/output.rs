@@ -61,7 +61,7 @@ impl<S: Stage> Bridges<S> {
 }
 
 /// Returns a value's position between its axis' limits, 0 to 1; NaN for an axis with a single value.
-pub(crate) fn share(value: f32, axis: &Axis) -> f32 {
+fn share(value: f32, axis: &Axis) -> f32 {
     (value - axis.low()) / (axis.high() - axis.low())
 }
 

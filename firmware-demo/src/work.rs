@@ -114,11 +114,21 @@ where
         let _ = self.watchdog.start(TIMEOUTS.long);
         let candidate = self.updates.work();
         let watched = self.watchdog.start(TIMEOUTS.turn);
-        self.safety.with(|safety| {
-            safety.check(Check::Watchdog, watched);
-            safety.stalled();
-        });
+        self.safety.with(|safety| safety.check(Check::Watchdog, watched));
+        if self.endpoint.stalls() {
+            // Nobody knows how long the bytes that wait have waited. The host repeats what it still wants.
+            self.drop_input();
+            self.safety.with(|safety| safety.stalled());
+        }
         candidate
+    }
+
+    fn drop_input(&mut self) {
+        self.port.pump();
+        let mut bytes = [0; TURN_BYTES];
+        while self.port.read_ready() == Ok(true) {
+            let Ok(_) = self.port.read(&mut bytes);
+        }
     }
 
     fn take(&mut self, byte: u8, micros: u32) {

@@ -103,7 +103,7 @@ codes! {
         /// No valid observation arrived within the deadline.
         Stale = 6, "no valid observation arrived within the deadline; send observations before arming";
         /// The controller is armed, or, for a request that needs the disarmed state, latched.
-        Armed = 7, "the controller is armed; disarm it first";
+        Armed = 7, "the controller is armed or latched; disarm it first";
         /// Unknown parameter or axis.
         Parameter = 8, "unknown parameter or axis";
         /// The value is not finite or is outside the parameter's range.
@@ -130,7 +130,7 @@ codes! {
         /// The kernels refuse the image, or its input and output lengths do not match the controller.
         Unfit = 19, "this controller cannot run the image";
         /// The break input is active, or a break or an overrun latched and the controller was not disarmed since.
-        Hardware = 20, "the hardware reports a fault";
+        Hardware = 20, "the break input is active, or a break or an overrun latched; remove the cause, disarm, and then arm";
         /// An axis has no finite limits, neither from the built-in image nor from the build.
         Limits = 21, "an axis has no limits, so no output may move; build the firmware with --limits LOW:HIGH, or with an image \
             whose actions have low and high";

@@ -177,7 +177,7 @@ fn a_controller_that_stopped_meanwhile_is_not_armed_again() {
     });
     let error = client.arm().expect_err("it stopped");
     let text = format!("{error:#}");
-    assert!(text.contains("arm it again") && text.contains(&Fault::Overrun.to_string()), "{text}");
+    assert!(text.contains("then arm it again") && text.contains(&Fault::Overrun.to_string()), "{text}");
     drop(client);
     assert_eq!(controller.join().expect("the controller ends"), 2);
 }

@@ -294,7 +294,9 @@ impl Facts {
             self.answers.0.keys().filter(|key| !self.used.contains(*key)).map(String::as_str).collect();
         let is_rule = |key: &str| self.profile.rules.iter().any(|rule| rule.key == key);
         if let Some(key) = unasked.iter().find(|key| is_rule(key)) {
-            bail!("answers: nothing asks for {key}, because the files say it; remove the answer");
+            bail!(
+                "answers: nothing asks for {key} in this bundle: its files say it, or do not need it; remove the answer"
+            );
         }
         ensure!(
             unasked.is_empty(),

@@ -10,6 +10,8 @@ use actq::policy::Policy;
 use ndarray::Array3;
 use sha2::{Digest as _, Sha256};
 
+use actq_onnx::Onnx;
+
 use crate::bundle::Bundle;
 use crate::compile::Deployment;
 use crate::description::Description;
@@ -30,6 +32,8 @@ impl Importer for DeployFolder {
         let text = fs::read_to_string(path.join(DESCRIPTION)).unwrap_or_default();
         let description = Description::parse(&text).ok();
         let named = description.iter().flat_map(Description::files).map(|file| path.join(file));
+        // A network's file may name others, with its weights.
+        let named = named.flat_map(|file| if Onnx.accepts(&file) { Onnx.files(&file) } else { vec![file] });
         [path.join(DESCRIPTION)].into_iter().chain(named).collect()
     }
 

@@ -188,8 +188,14 @@ impl Store {
     /// If it is missing or does not have the digest.
     pub fn read_blob(&self, path: &Path, sha256: &str) -> Result<Vec<u8>, JobError> {
         let name = path.display();
-        let bytes =
-            fs::read(path).map_err(|error| JobError::again(error).context(format!("{name}: cannot read the file")))?;
+        let bytes = fs::read(path).map_err(|error| {
+            if error.kind() == ErrorKind::NotFound {
+                let record = path.with_extension("json");
+                let text = format!("{name}: is missing; remove {}, and run its job again", record.display());
+                return JobError::never(Error::input(text));
+            }
+            JobError::again(error).context(format!("{name}: cannot read the file"))
+        })?;
         if of_bytes(&bytes) != sha256 {
             let text = format!("{name}: is damaged; remove it and its .json, and run its job again");
             return Err(JobError::never(Error::input(text)));

@@ -97,7 +97,8 @@ impl Importer for Onnx {
     }
 
     fn files(&self, path: &Path) -> Vec<PathBuf> {
-        vec![path.to_owned()]
+        let external = Model::read(path).map(|model| model.external_files()).unwrap_or_default();
+        [path.to_owned()].into_iter().chain(external).collect()
     }
 
     fn load(&self, path: &Path) -> Result<Policy> {

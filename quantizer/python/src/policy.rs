@@ -118,7 +118,12 @@ pub(crate) fn import_path(
 ) -> PyResult<Policy> {
     py.detach(|| {
         let choice = Choice { output, states, is_fed: false };
+        let is_answered = accept_profile || !answers.is_empty();
+        let refuse_answers = || error!("{}: only a deploy bundle takes accept_profile and answers", path.display());
         if Onnx.accepts(&path) {
+            if is_answered {
+                return Err(refuse_answers());
+            }
             let imported = import(&path, &choice).or_raise()?;
             let policy =
                 actq::policy::Policy::of_files(&path, [&path, &path], &imported.json, &imported.weights).or_raise()?;
@@ -131,6 +136,9 @@ pub(crate) fn import_path(
         let is_bundle = path.is_dir() || path.extension().is_some_and(|ending| ending == "kinfer");
         if is_bundle && !is_policy {
             return import_bundle(&path, accept_profile, answers);
+        }
+        if is_answered {
+            return Err(refuse_answers());
         }
         Ok(Policy::new(load(&path).or_raise()?))
     })

@@ -95,7 +95,7 @@ def test_infos_may_be_nested_or_of_all_robots(mode):
     class Logging(SyncVectorEnv):
         def step(self, actions):
             *rest, infos = super().step(actions)
-            return (*rest, {**infos, "reconfigure": False, "log": {"loss": np.float32(1.5)}})
+            return (*rest, {**infos, "reconfigure": False, "log": {"loss": np.float32(1.5)}, "weights": np.zeros(7)})
 
     make = lambda: gymnasium.wrappers.RecordEpisodeStatistics(Reach())  # noqa: E731
     driven = actq.rollout(
@@ -104,7 +104,7 @@ def test_infos_may_be_nested_or_of_all_robots(mode):
     for episode in driven.episodes:
         assert episode.info["episode"]["l"] == 30 and episode.info["episode"]["r"] == pytest.approx(episode.total)
     if mode is not AutoresetMode.SAME_STEP:
-        assert all(e.info["reconfigure"] is False and e.info["log"]["loss"] == 1.5 for e in driven.episodes)
+        assert all(e.info["reconfigure"] is False and e.info["log"]["loss"] == 1.5 and len(e.info["weights"]) == 7 for e in driven.episodes)
 
 
 def test_arguments_of_rollouts_are_named():
@@ -112,7 +112,8 @@ def test_arguments_of_rollouts_are_named():
     act = lambda x, reset: x[:, :4]  # noqa: E731
     for arguments, text in [
         ({"frames": 0}, "frames is 0; use a whole number from 1 on"),
-        ({"frames": float("nan")}, "frames is nan"),
+        ({"frames": float("nan")}, "frames is nan; use a whole number"),
+        ({"every": 1.5}, "every is 1.5; use a whole number"),
         ({"every": 0}, "every is 0"),
         ({"policy": 3}, "the policy is of type int; pass actq.Head"),
         ({"env": Reach()}, "env is one environment; pass a vector environment"),

@@ -70,6 +70,7 @@ pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> 
         quiet: args.run.quiet,
         is_kept: temporary.is_none(),
     };
+    merge::merge_of(&jobs)?;
     complete(&jobs, &store, &pool)?;
     merge::report(&jobs, &store, host, outputs, args.svg.is_some(), args.json.is_some())
 }

@@ -46,8 +46,10 @@ pub fn how_to_record(policy: &Policy) -> String {
 
 /// Returns a note that lists the actions without limits, for which a motor controller refuses to arm.
 pub fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Option<String> {
+    let is_limited =
+        |limits: Option<[f32; 2]>| limits.is_some_and(|limits| limits.iter().all(|limit| limit.is_finite()));
     let limits = limits.into_iter().enumerate();
-    let without: Vec<usize> = limits.filter(|(_, limits)| limits.is_none()).map(|(i, _)| i).collect();
+    let without: Vec<usize> = limits.filter(|(_, limits)| !is_limited(*limits)).map(|(i, _)| i).collect();
     (!without.is_empty()).then(|| {
         format!(
             "no finite limits for {} {}: a motor controller refuses to arm without limits; set low and high of action in \

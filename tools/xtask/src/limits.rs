@@ -32,10 +32,11 @@ pub(crate) fn without_limits(limits: &[Limits], image: &Image<'_>) -> Result<Vec
     for i in 0..actions {
         match (Limits::of_axis(i, image.limits(i), limits), image.limits(i)) {
             (Some(_), _) => {}
-            (None, None) => still.push(format!("action {i}")),
-            (None, Some([low, high])) => {
+            (None, Some([low, high])) if !limits.is_empty() => {
                 bail!("--limits leaves no value for action {i}, which the image limits to {low}:{high}")
             }
+            // It has at most one limit.
+            (None, _) => still.push(format!("action {i}")),
         }
     }
     Ok(still)

@@ -12,6 +12,7 @@ use actq_bench::command::{actq, binary, failed, run, succeeded};
 use actq_bench::root;
 use anyhow::{Context as _, Result, ensure};
 use serde_json::Value;
+use tempfile::TempDir;
 
 use super::fixture::Fixture;
 use crate::folder::snapshot;
@@ -211,11 +212,65 @@ fn slurm_arrays_give_the_same_store() -> Result<()> {
     std::os::unix::fs::symlink(binary()?, bin.join("actq"))?;
     let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap_or_default());
     let mut script = Command::new("sh");
-    script.arg(root().join("examples/slurm/sweep.sh")).args(["sweep.toml", "array", "--partition=any"]);
+    script.arg(root().join("examples/slurm/sweep.sh")).args(["sweep.toml", "array/", "--partition=any"]);
     script.current_dir(sweep.folder()?).env("PATH", path);
     succeeded(&run(script, b"")?)?;
     ensure!(sweep.store("array")? == sweep.store("whole")?, "the stores differ");
     succeeded(&sweep.run("merge sweep.toml --store array", "")?)?;
+    Ok(())
+}
+
+/// A task of an array whose jobs end with these statuses, in this order: whether it is queued again, and its status.
+fn task_of(statuses: &[i32]) -> Result<(bool, Option<i32>)> {
+    let dir = TempDir::new()?;
+    let program = |name: &str, text: &str| -> Result<()> {
+        fs::write(dir.path().join(name), format!("#!/bin/sh\n{text}\n"))?;
+        Ok(fs::set_permissions(dir.path().join(name), fs::Permissions::from_mode(0o755))?)
+    };
+    program("actq", "read -r status; exit \"$status\"")?;
+    program("scontrol", &format!("echo \"$@\" > {}", dir.path().join("queued").display()))?;
+    let jobs = dir.path().join("jobs.jsonl");
+    fs::write(&jobs, statuses.iter().map(|status| format!("{status}\n")).collect::<String>())?;
+    let mut script = Command::new("sh");
+    script.arg(root().join("examples/slurm/sweep.sh")).arg(&jobs).arg("store");
+    script.env("PATH", format!("{}:{}", dir.path().display(), std::env::var("PATH").unwrap_or_default()));
+    script.envs([("SLURM_ARRAY_JOB_ID", "1"), ("SLURM_ARRAY_TASK_ID", "0"), ("SLURM_ARRAY_TASK_COUNT", "1")]);
+    let status = run(script, b"")?.status.code();
+    Ok((dir.path().join("queued").exists(), status))
+}
+
+#[test]
+fn a_slurm_task_is_queued_again_if_one_of_its_jobs_may_succeed() -> Result<()> {
+    for (statuses, expected) in [
+        (&[0, 0][..], (false, Some(0))),
+        (&[0, 1], (false, Some(1))),
+        (&[75, 0], (true, Some(75))),
+        (&[137], (true, Some(75))),
+        (&[1, 75], (true, Some(1))),
+        (&[75, 1], (true, Some(1))),
+        (&[], (false, Some(0))),
+    ] {
+        ensure!(task_of(statuses)? == expected, "{statuses:?}: {:?}", task_of(statuses)?);
+    }
+    Ok(())
+}
+
+#[test]
+fn a_plan_without_its_merge_is_refused_before_it_runs() -> Result<()> {
+    let sweep = Sweep::new()?;
+    let plan = succeeded(&sweep.run("plan sweep.toml", "")?)?;
+    let (jobs, merge): (Vec<&str>, Vec<&str>) = plan.lines().partition(|line| !line.contains("\"kind\":\"merge\""));
+    for (name, lines, why) in [
+        ("none", jobs.clone(), "the plan has no job of kind merge"),
+        ("several", [&jobs[..], &merge, &merge].concat(), "several jobs of kind merge"),
+    ] {
+        fs::write(sweep.folder()?.join("plan.jsonl"), lines.join("\n"))?;
+        let output = sweep.run("sweep plan.jsonl --store unused", "")?;
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        ensure!(output.status.code() == Some(1), "{name}: {output:?}");
+        ensure!(stderr.contains(why) || stderr.contains("twice") || stderr.contains("same"), "{name}: {stderr}");
+        ensure!(results(&sweep.folder()?.join("unused")) == 0, "{name}: it has run jobs");
+    }
     Ok(())
 }
 

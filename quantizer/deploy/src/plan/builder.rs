@@ -163,7 +163,8 @@ impl Builder<'_> {
             stiffness == damping,
             "gains: stiffness has {stiffness} values, damping {damping}; give one each for a joint"
         );
-        if let [target] = &self.plan.targets[..] {
+        // With names of joints they may be those of the whole robot.
+        if let (None, [target]) = (&gains.joints, &self.plan.targets[..]) {
             let len = self.plan.values[target.slot].labels.len();
             ensure!(stiffness == len, "gains: they have {stiffness} values, and the target {len}");
         }

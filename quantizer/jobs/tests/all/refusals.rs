@@ -133,6 +133,10 @@ fn damaged_results_are_not_used() {
     fs::write(store.image(&quantize.address), "other").expect("written");
     let error = run(evaluate).expect_err("a damaged image");
     assert!(!error.again && format!("{:#}", error.error).contains("is damaged; remove it"), "{:#}", error.error);
+    fs::remove_file(store.image(&quantize.address)).expect("removed");
+    let error = run(evaluate).expect_err("a missing image");
+    let expected = format!("is missing; remove {}", store.file(&quantize.address, "json").display());
+    assert!(!error.again && format!("{:#}", error.error).contains(&expected), "{:#}", error.error);
     fs::write(store.folder().join(format!("{}.json", quantize.address)), "{\"format\":1").expect("written");
     let error = run(quantize).expect_err("a damaged result");
     assert!(format!("{:#}", error.error).contains("is damaged"), "{:#}", error.error);

@@ -7,6 +7,9 @@ use proptest::prelude::*;
 use tempfile::TempDir;
 
 use super::file::{File, encoded, tensor};
+use actq::import::Importer as _;
+use actq_onnx::Onnx;
+
 use super::refused;
 
 /// Writes a file of an observation and an action of four values.
@@ -36,6 +39,20 @@ fn external(location: &str) -> Vec<u8> {
         ..tensor("w", &[4, 4], &[0.0; 16])
     };
     with_initializers(&[outside], "actions := MatMul(obs, w)")
+}
+
+/// What a store's addresses depend on, and no output may replace.
+#[test]
+fn files_of_weights_are_files_of_the_policy() -> std::io::Result<()> {
+    let dir = tempfile::TempDir::new()?;
+    let [policy, weights] = ["policy.onnx", "weights.bin"].map(|name| dir.path().join(name));
+    std::fs::write(&policy, external("weights.bin"))?;
+    assert_eq!(Onnx.files(&policy), [policy.clone(), weights]);
+    std::fs::write(&policy, whole())?;
+    assert_eq!(Onnx.files(&policy), [policy.clone()]);
+    std::fs::write(&policy, "no model")?;
+    assert_eq!(Onnx.files(&policy), [policy]);
+    Ok(())
 }
 
 #[test]

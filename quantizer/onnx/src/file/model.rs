@@ -1,6 +1,6 @@
 //! A parser of untrusted ONNX files: declared sizes are checked against the bytes of the file.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fs::{self, File};
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::{Component, Path, PathBuf};
@@ -163,6 +163,22 @@ impl Model {
         let name = printable(tensor.name.as_deref().unwrap_or_default()).into_owned();
         let read = self.elements(&tensor).with_context(|| format!("tensor {name:?}"))?;
         Ok(Tensor { name: (!name.is_empty()).then_some(name), ..read })
+    }
+
+    /// Returns the files in the model's folder that hold elements of its tensors, each one time.
+    pub(crate) fn external_files(&self) -> Vec<PathBuf> {
+        let constants = self.graph.nodes.iter().flat_map(|node| node.attributes.values()).filter_map(|a| a.t.as_ref());
+        let mut files = BTreeSet::new();
+        for bytes in self.graph.initializers.values().chain(constants) {
+            let tensor: proto::Tensor = decode(bytes, "a tensor").unwrap_or_default();
+            if tensor.data_location == Some(1)
+                && let Ok(entries) = all::<proto::Entry>(&tensor.external_data, "the places of a tensor")
+            {
+                let location = entries.into_iter().find(|entry| entry.key.as_deref() == Some("location"));
+                files.extend(location.and_then(|entry| entry.value).map(|location| self.folder.join(location)));
+            }
+        }
+        files.into_iter().collect()
     }
 
     fn elements(&self, tensor: &proto::Tensor) -> Result<Tensor> {

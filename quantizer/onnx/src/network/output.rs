@@ -77,9 +77,13 @@ fn sizes(outputs: &[Output], which: &[usize]) -> String {
 
 /// Returns `true` if a name is an action's, and not that of something about actions.
 fn is_action(name: &str) -> bool {
-    const ABOUT: [&str; 10] = ["shape", "std", "var", "prob", "logp", "value", "entropy", "mask", "prev", "last"];
+    const ABOUT: [&str; 15] = [
+        "shape", "std", "logstd", "var", "variance", "prob", "probs", "logp", "value", "values", "entropy", "mask",
+        "prev", "previous", "last",
+    ];
     let name = name.to_lowercase();
-    name.contains("action") && !ABOUT.iter().any(|word| name.contains(word))
+    let mut parts = name.split(|c: char| !c.is_ascii_alphanumeric());
+    name.contains("action") && !parts.any(|part| ABOUT.contains(&part))
 }
 
 /// Returns `true` if an output was refused because it draws random numbers.
@@ -126,7 +130,7 @@ mod tests {
 
     #[test]
     fn what_is_about_actions_is_no_action() {
-        for name in ["action", "actions", "Action_Mean", "deterministic_action", "action_dist_inputs"] {
+        for name in ["action", "actions", "Action_Mean", "deterministic_action", "masked_actions", "elastic_action"] {
             assert!(is_action(name), "{name}");
         }
         for name in

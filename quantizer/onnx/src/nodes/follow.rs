@@ -144,8 +144,9 @@ impl<'m> Follower<'m> {
             let mut graph = function.graph.clone();
             bind(&mut graph, &given);
             let outer = std::mem::replace(&mut self.given, given);
-            self.run(&graph, &mut inner, &function.outputs, depth - 1)?;
+            let done = self.run(&graph, &mut inner, &function.outputs, depth - 1);
             self.given = outer;
+            done?;
             function.outputs.iter().map(|name| inner.get(name).cloned()).collect()
         } else if node.op == "If" {
             let condition = inputs.first().cloned().flatten().context("has no condition")?;

@@ -72,6 +72,8 @@ def import_policy(
             raise _actq.Error(f"{path}: torch cannot read it as TorchScript: {error}") from error
     elif not callable(getattr(source, "forward", None)):
         raise _actq.Error(f"the policy is of type {type(source).__name__}; pass a path, or a torch.nn.Module")
+    if accept_profile or answers is not None:
+        raise _actq.Error("only a deploy bundle takes accept_profile and answers")
     _torch_module()
     from ._torch import onnx_bytes
 

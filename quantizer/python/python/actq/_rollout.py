@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, 
 import numpy as np
 
 from ._actq import Error
+from ._quantize import _whole
 from ._typing import Array, Floats
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def rollout(
     Raises what policy and environment raise.
     """
     for name, number in (("frames", frames), ("every", every)):
-        if not number >= 1:
+        if _whole(name, number) < 1:
             raise Error(f"{name} is {number}; use a whole number from 1 on")
     if not callable(policy):
         raise Error(f"the policy is of type {type(policy).__name__}; pass actq.Head(image), or a function")
@@ -113,7 +114,7 @@ def rollout(
         totals += np.where(ignored, 0.0, rewards)
         lengths += ~ignored
         for i in np.flatnonzero(done):
-            info = _info(infos, int(i), mode)
+            info = _info(infos, int(i), n, mode)
             episodes.append(Episode(float(totals[i]), int(lengths[i]), bool(terminated[i]), info))
         totals[done] = 0.0
         if mode == "NextStep":
@@ -144,23 +145,24 @@ def _succeeded(episode: Episode) -> Optional[bool]:
     return bool(told[0]) if told else None
 
 
-def _info(infos: Mapping[str, Any], i: int, mode: str) -> Dict[str, Any]:
+def _info(infos: Mapping[str, Any], i: int, n: int, mode: str) -> Dict[str, Any]:
     """Returns the info of robot `i` where its episode ended."""
     infos = infos.get("final_info", infos) if mode == "SameStep" else infos
-    return _of_robot(infos, i)
+    return _of_robot(infos, i, n)
 
 
-def _of_robot(infos: Mapping[str, Any], i: int) -> Dict[str, Any]:
-    """Returns what infos, also nested ones, say of robot `i`. What is no array says it of all robots."""
+def _of_robot(infos: Mapping[str, Any], i: int, n: int) -> Dict[str, Any]:
+    """Returns what infos, also nested ones, say of robot `i` of `n`. What has no value for each says it of all."""
     info: Dict[str, Any] = {}
     for key, value in infos.items():
         told = infos.get(f"_{key}")
         if key.startswith("_") or told is not None and not told[i]:
             continue
         if isinstance(value, Mapping):
-            info[key] = _of_robot(value, i)
+            info[key] = _of_robot(value, i, n)
         else:
-            info[key] = value[i] if isinstance(value, (list, tuple)) or np.ndim(value) > 0 else value
+            is_each = isinstance(value, (list, tuple, np.ndarray)) and np.shape(value)[:1] == (n,)
+            info[key] = value[i] if is_each else value
     return info
 
 

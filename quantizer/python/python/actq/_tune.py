@@ -87,7 +87,7 @@ def tune(
     heldout, steps, minutes, relative, seed, progress: as for `quantize`.
 
     The same seed gives the same images if the environment does the same. Raises `actq.Error` as `quantize` does, and what
-    the environment raises. Ctrl-C ends it at once.
+    the environment raises. Ctrl-C returns at once.
     """
     options = request(bits=bits, bpw=bpw, steps=steps, minutes=minutes, relative=relative, seed=seed)
     rollouts: List[Rollout] = []

@@ -38,7 +38,11 @@ class Remote:
 
     def names(self) -> set[str]:
         self.fs.invalidate_cache()
-        return {path.rsplit("/", 1)[-1] for path in self.fs.ls(self.root, detail=False)}
+        try:
+            return {path.rsplit("/", 1)[-1] for path in self.fs.ls(self.root, detail=False)}
+        except FileNotFoundError:
+            # Object stores have no empty folders.
+            return set()
 
     def fetch(self, job: Job, folder: str) -> None:
         endings = [".json"] if job["kind"] == "merge" else [".json", ".actq", ".npz"]

@@ -66,9 +66,23 @@ pub(crate) fn report(
     outputs.write(&svg.into_iter().chain(json).collect::<Vec<_>>())
 }
 
+/// Returns the plan's job of kind merge.
+///
+/// # Errors
+///
+/// If there is none, or several.
+pub(crate) fn merge_of(jobs: &[Job]) -> Result<&Job> {
+    let mut found = jobs.iter().filter(|job| job.work.kind() == "merge");
+    let merge = found.next().context("the plan has no job of kind merge; plan the whole spec")?;
+    anyhow::ensure!(
+        found.next().is_none(),
+        "the plan has several jobs of kind merge, as of several specs; run each plan alone"
+    );
+    Ok(merge)
+}
+
 fn merged(jobs: &[Job], store: &Store, host: &dyn Host) -> Result<Merged> {
-    let merge = jobs.iter().find(|job| job.work.kind() == "merge");
-    let merge = merge.context("the plan has no job of kind merge; plan the whole spec")?;
+    let merge = merge_of(jobs)?;
     run::run(merge, store, host, &mut |_, _| ())?;
     match store.read(&merge.address)? {
         Outcome::Merged(merged) => Ok(merged),

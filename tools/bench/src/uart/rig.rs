@@ -272,6 +272,10 @@ impl Rig {
             set_up(&mut self.client)?;
         }
         self.read_ticks = status.ticks;
+        if status.state == State::Latched && matches!(status.fault, Some(Fault::Overrun | Fault::Break)) {
+            // Only this clears them.
+            self.client.disarm()?;
+        }
         if status.state != State::Armed && status.refusal.is_none() {
             // Refused if it has become stale meanwhile: the next status tells.
             let _ = self.client.arm();
