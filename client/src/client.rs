@@ -194,26 +194,19 @@ impl Client {
     ///
     /// Fails if the controller refuses, does not answer, or may have stopped since.
     pub fn arm(&mut self) -> Result<()> {
-        let begun = Instant::now();
-        for attempt in 1.. {
-            let (outcome, sent) = self.with_token(|token| Message::Arm { token })?;
-            if outcome != Err(Refusal::Token) {
-                outcome.context("not armed")?;
-                break;
-            }
-            // A repetition whose first answer was lost has an old token, too.
-            let status = self.status()?;
-            if status.state == State::Armed {
-                break;
-            }
-            if sent > 1 {
-                require_armed(&status)
-                    .context("not armed, or not any more; find out why it stopped, then arm it again")?;
-            }
-            if attempt >= ATTEMPTS && begun.elapsed() >= self.timeout {
-                outcome.context("not armed")?;
-            }
-        }
+        let outcome = self.change_unless(
+            |token| Message::Arm { token },
+            |client, sent| {
+                // A repetition whose first answer was lost has an old token, too.
+                let status = client.status()?;
+                if sent > 1 {
+                    require_armed(&status)
+                        .context("not armed, or not any more; find out why it stopped, then arm it again")?;
+                }
+                Ok(status.state == State::Armed)
+            },
+        )?;
+        outcome.context("not armed")?;
         // Earlier statuses describe the earlier state.
         self.events.retain(|event| !matches!(event, Event::Status(_)));
         Ok(())
@@ -228,14 +221,30 @@ impl Client {
         self.request(&Message::Disarm)?.1.context("not disarmed")
     }
 
-    /// Sends a request that may be repeated with the current token, until the token is accepted or time is over: a
-    /// repetition of an earlier request, or a silent line, may have changed the token again.
+    /// Sends a request that is valid in any state with the current token.
     pub(crate) fn change<'m>(&mut self, message: impl Fn(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
+        self.change_unless(message, |_, _| Ok(false))
+    }
+
+    /// As [`Self::with_token`], until the token is accepted, `is_done` is true, or time is over: a repetition of an
+    /// earlier request, or a silent line, may have changed the token again. `is_done` also takes how often the refused
+    /// request was sent.
+    fn change_unless<'m>(
+        &mut self,
+        message: impl Fn(u32) -> Message<'m>,
+        is_done: impl Fn(&mut Self, usize) -> Result<bool>,
+    ) -> Result<Result<(), Refusal>> {
         let (begun, mut attempts) = (Instant::now(), 0);
         loop {
-            let (outcome, _) = self.with_token(&message)?;
+            let (outcome, sent) = self.with_token(&message)?;
+            if outcome != Err(Refusal::Token) {
+                return Ok(outcome);
+            }
+            if is_done(self, sent)? {
+                return Ok(Ok(()));
+            }
             attempts += 1;
-            if outcome != Err(Refusal::Token) || attempts >= ATTEMPTS && begun.elapsed() >= self.timeout {
+            if attempts >= ATTEMPTS && begun.elapsed() >= self.timeout {
                 return Ok(outcome);
             }
         }

@@ -116,7 +116,7 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
                 let record = Record { plan, generation, signature };
                 let written = self.slots.write_record(slot, record) && self.slots.begin_trial(slot);
                 if !written {
-                    // What was written may be a complete record, which the next start would try.
+                    // The record may be complete all the same, and the next start would try it.
                     self.slots.reject(slot);
                 }
                 (!written).then_some(Refusal::Flash)

@@ -24,7 +24,7 @@ impl<'a> Image<'a> {
     }
 
     /// Returns the lower and upper limit of action value `i`, if the contract has one of them; the other is infinite. (If
-    /// it limits other values only, f32's largest number stands for no limit.)
+    /// it limits only other values, f32's largest number means no limit.)
     pub fn limits(&self, i: usize) -> Option<[f32; 2]> {
         if i >= self.act_len() {
             return None;

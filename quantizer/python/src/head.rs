@@ -59,8 +59,7 @@ impl Head {
     #[new]
     #[pyo3(signature = (image, n = None, *, seed = 0))]
     fn new(py: Python<'_>, image: Py<Image>, n: Option<usize>, seed: u32) -> PyResult<Self> {
-        let view = image.get().image()?;
-        let (obs_len, act_len) = (view.obs_len(), view.act_len());
+        let (obs_len, act_len) = (image.get().obs_len(), image.get().act_len());
         let head = Self { image: image.clone_ref(py), obs_len, act_len, seed, batch: Mutex::new(None) };
         if let Some(n) = n {
             let batch = py.detach(|| head.states(image.get(), n))?;

@@ -29,7 +29,7 @@ type Port = (&'static str, String, Vec<String>, usize);
 pub(crate) struct Image {
     buffer: ImageBuffer,
     name: PathBuf,
-    /// What loops ask for: each [`Self::image`] checks all bytes.
+    /// Values that loops ask for: each [`Self::image`] checks all bytes.
     facts: Facts,
 }
 
@@ -96,13 +96,13 @@ impl Image {
 
     /// Values of an observation.
     #[getter]
-    const fn obs_len(&self) -> usize {
+    pub(crate) const fn obs_len(&self) -> usize {
         self.facts.obs_len
     }
 
     /// Values of an action.
     #[getter]
-    const fn act_len(&self) -> usize {
+    pub(crate) const fn act_len(&self) -> usize {
         self.facts.act_len
     }
 
@@ -269,8 +269,8 @@ impl Image {
         self.buffer.bytes() == other.buffer.bytes()
     }
 
-    fn __hash__(&self) -> PyResult<u64> {
-        Ok(self.image()?.crc().into())
+    fn __hash__(&self) -> u64 {
+        self.facts.crc32.into()
     }
 
     fn __repr__(&self) -> PyResult<String> {

@@ -96,9 +96,7 @@ impl Request {
             minutes,
             effort: match self.effort.as_deref() {
                 None => Effort::Default,
-                Some(name) => Effort::ALL
-                    .into_iter()
-                    .find_map(|(known, effort)| (known == name).then_some(effort))
+                Some(name) => Effort::of_name(name)
                     .ok_or_else(|| error!("effort is {name:?}; use \"quick\", \"default\" or \"thorough\""))?,
             },
             relative: self.relative,

@@ -83,8 +83,7 @@ pub(super) fn finite(text: &str) -> Result<f32, String> {
 
 /// Reads an effort by its name.
 pub(super) fn effort(text: &str) -> Result<Effort, String> {
-    let found = Effort::ALL.into_iter().find(|(name, _)| *name == text);
-    found.map(|(_, effort)| effort).ok_or_else(|| "use quick, default or thorough".to_owned())
+    Effort::of_name(text).ok_or_else(|| "use quick, default or thorough".to_owned())
 }
 
 pub(super) fn minutes(text: &str) -> Result<f64, String> {

@@ -131,6 +131,11 @@ impl Effort {
     pub const ALL: [(&str, Self); 3] =
         [("quick", Self::Quick), ("default", Self::Default), ("thorough", Self::Thorough)];
 
+    /// Returns the effort of this name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find_map(|(known, effort)| (known == name).then_some(effort))
+    }
+
     /// Returns the factor of the steps.
     pub fn factor(self) -> f64 {
         match self {

@@ -44,7 +44,7 @@ impl Family for UnitreeRlLab {
         facts.note("rate_hz", yaml.at("step_dt"));
 
         let map: Vec<usize> = yaml.need("joint_ids_map", "a list of motor numbers", |node| {
-            node.numbers()?.iter().map(|n| (*n >= 0.0 && n.fract() == 0.0).then_some(*n as usize)).collect()
+            node.numbers()?.iter().map(|n| place(*n)).collect()
         })?;
         let joints = map.len();
         let motors = map.iter().max().map_or(0, |most| most + 1);
@@ -150,13 +150,17 @@ impl Family for UnitreeRlLab {
     }
 }
 
+/// Returns a number of a list of joints or motors as a place.
+fn place(number: f64) -> Option<usize> {
+    (number >= 0.0 && number.fract() == 0.0).then_some(number as usize)
+}
+
 /// The joints that a term names by `params.asset_cfg.joint_ids`, in its order. Upstream takes all where that is no list of
 /// numbers (deploy/include/isaaclab/envs/mdp/observations.h).
 fn chosen_joints(yaml: &Document, path: &str, joints: usize) -> Result<Option<Op>> {
     let path = format!("{path}.params.asset_cfg.joint_ids");
     let Some(ids) = yaml.get(&path).and_then(Node::numbers).filter(|ids| !ids.is_empty()) else { return Ok(None) };
-    let place = |id: f64| (id >= 0.0 && id.fract() == 0.0 && id < joints as f64).then_some(id as usize);
-    let places: Option<Vec<usize>> = ids.iter().map(|id| place(*id)).collect();
+    let places: Option<Vec<usize>> = ids.iter().map(|id| place(*id).filter(|id| *id < joints)).collect();
     let places = places.with_context(|| format!("{} must be numbers of joints below {joints}", yaml.at(&path)))?;
     Ok(Some(Op::Select(Order::Places(places))))
 }

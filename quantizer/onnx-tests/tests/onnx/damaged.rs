@@ -41,7 +41,7 @@ fn external(location: &str) -> Vec<u8> {
     with_initializers(&[outside], "actions := MatMul(obs, w)")
 }
 
-/// What a store's addresses depend on, and no output may replace.
+/// The addresses in a store depend on these files, and no output may replace them.
 #[test]
 fn files_of_weights_are_files_of_the_policy() -> std::io::Result<()> {
     let dir = tempfile::TempDir::new()?;
