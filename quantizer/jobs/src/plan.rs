@@ -1,5 +1,7 @@
 //! The jobs of a spec.
 
+use std::collections::BTreeMap;
+
 use actq::budget::Budget;
 use actq::data::Recording;
 use actq::error::{Context as _, Result, bail, ensure};
@@ -21,7 +23,9 @@ use crate::work::{Drive, Episodes, Evaluate, Learn, Make, Merge, Row, Work};
 /// address.
 pub fn jobs(spec: &Spec, host: &dyn Host) -> Result<Vec<Job>> {
     spec.check()?;
-    let mut plan = Plan { spec, jobs: Vec::new(), rows: Vec::new() };
+    let files = spec.drive.iter().flat_map(|drive| &drive.files);
+    let files = files.map(|file| Input::of(Role::Command, file.clone())).collect::<Result<_>>()?;
+    let mut plan = Plan { spec, files, jobs: Jobs::default(), rows: Vec::new() };
     // Policies by their names, and their numbers among those of one name.
     let mut names: Vec<(String, usize)> = Vec::new();
     for path in &spec.policies {
@@ -35,17 +39,15 @@ pub fn jobs(spec: &Spec, host: &dyn Host) -> Result<Vec<Job>> {
                     plan.image(names.len() - 1, &source, make(spec, &source, method, budget, seed)?, host)?;
                 }
             }
-            ensure!(plan.jobs.len() < MOST_JOBS, "the spec has more than {MOST_JOBS} jobs; divide it");
         }
     }
-    let deps = plan.jobs.len();
-    let rows = std::mem::take(&mut plan.rows);
+    let Plan { mut jobs, rows, .. } = plan;
     let named = |(name, number)| if number == 1 { name } else { format!("{name} ({number})") };
     let policies = names.into_iter().map(named).collect();
     let merge = Work::Merge(Merge { clock_hz: spec.clock, policies, rows });
-    plan.add("merge".to_owned(), merge, Vec::new(), (1, 64, estimate::merging(deps)))?;
-    order::check(&plan.jobs)?;
-    Ok(plan.jobs)
+    let seconds = estimate::merging(jobs.list.len());
+    jobs.add("merge".to_owned(), merge, Vec::new(), (1, 64, seconds))?;
+    jobs.finish()
 }
 
 /// Returns the first image of a combination.
@@ -74,38 +76,56 @@ fn make(spec: &Spec, source: &Source, name: &str, budget: Budget, seed: u64) -> 
 /// Estimates for a job: cores, memory in MiB, seconds.
 pub type Size = (usize, u64, f64);
 
-/// Adds a job after those that it depends on, and returns its address.
-///
-/// # Errors
-///
-/// If the job cannot be formatted.
-pub fn add(jobs: &mut Vec<Job>, title: String, work: Work, inputs: Vec<Input>, size: Size) -> Result<String> {
-    let address = address(&work, &inputs)?;
-    let deps = work.deps();
-    // Look from the last one backwards: dependencies are near.
-    let of = |dep: &String| jobs.iter().rev().find(|job| job.address == *dep).map_or(0, |job| job.stage + 1);
-    let stage = match work {
-        // The merge depends on all.
-        Work::Merge(_) => jobs.iter().map(|job| job.stage + 1).max().unwrap_or(0),
-        _ => deps.iter().map(of).max().unwrap_or(0),
-    };
-    let (cpus, memory_mib, seconds) = size;
-    jobs.push(Job { address: address.clone(), title, work, inputs, deps, stage, cpus, memory_mib, seconds });
-    Ok(address)
+/// Jobs of a plan in the making, each after those that it depends on.
+#[derive(Debug, Default)]
+pub struct Jobs {
+    list: Vec<Job>,
+    /// Stages of the jobs, by their addresses.
+    stages: BTreeMap<String, usize>,
+}
+
+impl Jobs {
+    /// Adds a job after those that it depends on, and returns its address.
+    ///
+    /// # Errors
+    ///
+    /// If the job cannot be formatted, or the plan has [`MOST_JOBS`].
+    pub fn add(&mut self, title: String, work: Work, inputs: Vec<Input>, size: Size) -> Result<String> {
+        ensure!(self.list.len() < MOST_JOBS, "the plan has more than {MOST_JOBS} jobs; divide the spec");
+        let address = address(&work, &inputs)?;
+        let deps = work.deps();
+        let stage = match work {
+            // The merge depends on all.
+            Work::Merge(_) => self.stages.values().max().map_or(0, |stage| stage + 1),
+            _ => deps.iter().filter_map(|dep| self.stages.get(dep)).max().map_or(0, |stage| stage + 1),
+        };
+        let (cpus, memory_mib, seconds) = size;
+        self.stages.insert(address.clone(), stage);
+        self.list.push(Job { address: address.clone(), title, work, inputs, deps, stage, cpus, memory_mib, seconds });
+        Ok(address)
+    }
+
+    /// Returns the jobs.
+    ///
+    /// # Errors
+    ///
+    /// If two of them have one address.
+    pub fn finish(self) -> Result<Vec<Job>> {
+        order::check(&self.list)?;
+        Ok(self.list)
+    }
 }
 
 /// A plan in the making.
 struct Plan<'a> {
     spec: &'a Spec,
-    jobs: Vec<Job>,
+    /// Files that the drive command depends on.
+    files: Vec<Input>,
+    jobs: Jobs,
     rows: Vec<Row>,
 }
 
 impl Plan<'_> {
-    fn add(&mut self, title: String, work: Work, inputs: Vec<Input>, size: Size) -> Result<String> {
-        add(&mut self.jobs, title, work, inputs, size)
-    }
-
     /// Adds an image with its measurements, and those of its on-policy rounds.
     fn image(&mut self, policy: usize, source: &Source, make: Make, host: &dyn Host) -> Result<()> {
         let (spec, graph) = (self.spec, &source.policy.graph);
@@ -122,7 +142,7 @@ impl Plan<'_> {
         // A search for an error measures it.
         let measured = Some(&source.heldout).filter(|_| matches!(make.budget, Budget::MaxNmse(_)));
         let inputs = source.with(calib.iter().chain(measured));
-        let first = self.add(format!("{title}: quantize"), Work::Quantize(make.clone()), inputs.clone(), size)?;
+        let first = self.jobs.add(format!("{title}: quantize"), Work::Quantize(make.clone()), inputs.clone(), size)?;
         let row = |image: String, round| Row {
             policy,
             method: name.clone(),
@@ -147,7 +167,7 @@ impl Plan<'_> {
             }
             let title = format!("{title}, round {round}");
             let work = Work::Learn(Learn { make: make.clone(), round, recordings: recordings.clone() });
-            image = self.add(format!("{title}: learn again"), work, inputs.clone(), size)?;
+            image = self.jobs.add(format!("{title}: learn again"), work, inputs.clone(), size)?;
             self.measure(source, &title, row(image.clone(), round))?;
         }
         Ok(())
@@ -163,7 +183,7 @@ impl Plan<'_> {
             let seconds = estimate::evaluating(&source.policy.graph, part.iter().sum());
             let memory = estimate::memory_mib(&source.policy.graph, 0);
             let inputs = source.with([&source.heldout]);
-            row.evaluations.push(self.add(title, Work::Evaluate(evaluate), inputs, (1, memory, seconds))?);
+            row.evaluations.push(self.jobs.add(title, Work::Evaluate(evaluate), inputs, (1, memory, seconds))?);
         }
         if let Some(drive) = &self.spec.drive {
             for seeds in ranges(drive.first_seed, drive.episodes, drive.per_job) {
@@ -196,9 +216,8 @@ impl Plan<'_> {
             seeds,
             record,
         });
-        let files = drive.files.iter().map(|file| Input::of(Role::Command, file.clone()));
-        let inputs = source.with(&files.collect::<Result<Vec<_>>>()?);
-        self.add(title, work, inputs, (drive.cpus, drive.memory_mib, drive.seconds * seeds.count as f64))
+        let inputs = source.with(&self.files);
+        self.jobs.add(title, work, inputs, (drive.cpus, drive.memory_mib, drive.seconds * seeds.count as f64))
     }
 }
 

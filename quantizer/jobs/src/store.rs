@@ -38,9 +38,14 @@ impl Store {
     /// If the folder holds other files, or a store of another version; if it cannot be made or read.
     pub fn open(folder: &Path, host: &dyn Host) -> Result<Self, JobError> {
         let (store, has_header) = Self::at(folder)?;
-        if !has_header {
-            store.make(host)?;
+        if has_header {
+            return Ok(store);
         }
+        store.make(host).or_else(|error| match Self::at(folder)? {
+            // Another worker has made it since, and may have written results.
+            (_, true) => Ok(()),
+            (_, false) => Err(error),
+        })?;
         Ok(store)
     }
 

@@ -8,7 +8,7 @@ use actq::methods::Effort;
 use actq::policy::Policy;
 use actq_jobs::estimate;
 use actq_jobs::job::{Input, Job, Role};
-use actq_jobs::plan::add;
+use actq_jobs::plan::Jobs;
 use actq_jobs::work::{Custom, Work};
 use anyhow::{Context as _, Result};
 use serde::{Deserialize, Serialize};
@@ -64,7 +64,7 @@ pub(super) struct CellJobs {
 
 /// Returns the jobs of a comparison: of each policy itself, then of every method at every budget.
 pub(super) fn jobs(plan: &Plan, entrants: &[Entrant]) -> Result<Vec<Job>> {
-    let mut jobs = Vec::new();
+    let mut jobs = Jobs::default();
     for entrant in entrants {
         let folder = &entrant.folder;
         let policy = Policy::load(folder)?;
@@ -75,14 +75,14 @@ pub(super) fn jobs(plan: &Plan, entrants: &[Entrant]) -> Result<Vec<Job>> {
             recordings.extend(recording.find(folder)?.map(|file| Input::of(role, file)).transpose()?);
         }
         let memory = estimate::memory_mib(&policy.graph, 0);
-        let drive = |jobs: &mut Vec<Job>, key: &CellKey, needs: Vec<String>| -> Result<()> {
+        let drive = |jobs: &mut Jobs, key: &CellKey, needs: Vec<String>| -> Result<()> {
             if matches!(entrant.simulator, Simulator::Missing(_)) {
                 return Ok(());
             }
             let driving = Driving { policy: entrant.name.clone(), first: plan.seed0, count: plan.episodes };
             let work = Custom { name: DRIVE.to_owned(), options: serde_json::to_value(driving)?, needs };
             let size = (1, memory, EPISODE * plan.episodes as f64);
-            add(jobs, format!("{}: drive", key.title()), Work::Custom(work), files.clone(), size)?;
+            jobs.add(format!("{}: drive", key.title()), Work::Custom(work), files.clone(), size)?;
             Ok(())
         };
         drive(&mut jobs, &CellKey { policy: entrant.name.clone(), method: None, budget: None }, Vec::new())?;
@@ -102,14 +102,14 @@ pub(super) fn jobs(plan: &Plan, entrants: &[Entrant]) -> Result<Vec<Job>> {
                 let seconds = estimate::making(&policy.graph, &method.method(), steps, Effort::Default);
                 let inputs = files.iter().chain(&recordings).cloned().collect();
                 let title = format!("{}: make", key.title());
-                let made = add(&mut jobs, title, Work::Custom(work), inputs, (1, memory, seconds))?;
+                let made = jobs.add(title, Work::Custom(work), inputs, (1, memory, seconds))?;
                 if method.is_driven() {
                     drive(&mut jobs, &key, vec![made])?;
                 }
             }
         }
     }
-    Ok(jobs)
+    Ok(jobs.finish()?)
 }
 
 /// Returns the cells of a plan's jobs, in their order.

@@ -29,6 +29,23 @@ fn sweep_accepts_named_recordings() -> Result<()> {
     Ok(())
 }
 
+/// After an error of the sweep itself no job starts, and it ends after the workers that run.
+#[test]
+#[cfg(target_os = "linux")]
+fn no_worker_outlives_a_sweep_that_cannot_write_its_log() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let (policy, store) = (text(&fixture.policy()), fixture.out("store"));
+    let line = "--methods rtn --bpw 2,3,4 --threads 2 --log /dev/full --store";
+    let arguments: Vec<&str> = ["sweep", &policy].into_iter().chain(line.split_whitespace()).collect();
+    let output = run(actq(&[&arguments[..], &[&text(&store)]].concat()), b"")?;
+    failed(&output, 1, &["/dev/full: cannot write the file"])?;
+    let names = fs::read_dir(&store)?.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+    let names = names.collect::<Result<Vec<_>>>()?;
+    let results = names.iter().filter(|name| name.ends_with(".json") && *name != "store.json").count();
+    ensure!(results == 2, "two workers started: {names:?}");
+    Ok(())
+}
+
 /// With distill in the list, the options of learning apply to it alone.
 #[test]
 fn sweeps_without_learning_refuse_its_options() -> Result<()> {

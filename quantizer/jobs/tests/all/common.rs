@@ -113,7 +113,11 @@ impl Host for Fake {
             }
             self.writes_left.set(Some(left - 1));
         }
-        Ok(fs::write(path, bytes)?)
+        // Whole or absent, as a host must.
+        let name = path.file_name().expect("a name").to_string_lossy();
+        let part = path.with_file_name(format!(".{name}-{:?}.part", std::thread::current().id()));
+        fs::write(&part, bytes)?;
+        Ok(fs::rename(part, path)?)
     }
 
     fn drive(&self, rollout: &Rollout<'_>) -> Result<Rolled, JobError> {

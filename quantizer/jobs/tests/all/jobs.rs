@@ -6,7 +6,7 @@ use crate::common::{Fake, SPEC, files, folder, jobs, run_all};
 use actq::budget::{Budget, TimeLimit};
 use actq_jobs::merged::{Merged, MergedImage};
 use actq_jobs::order;
-use actq_jobs::plan::add;
+use actq_jobs::plan::Jobs;
 use actq_jobs::record::Outcome;
 use actq_jobs::run::run;
 use actq_jobs::store::Store;
@@ -234,14 +234,15 @@ fn named_recordings_replace_those_of_the_policy() {
 #[test]
 fn work_of_the_program_reads_the_results_that_it_needs() {
     let dir = folder(SPEC);
-    let mut plan = Vec::new();
+    let mut plan = Jobs::default();
     let work = |name: &str, needs: Vec<String>| {
         Work::Custom(Custom { name: name.to_owned(), options: serde_json::json!({"n": 2}), needs })
     };
     let size = (1, 1, 1.0);
-    let first = add(&mut plan, "first".into(), work("double", Vec::new()), Vec::new(), size).expect("added");
-    let last = add(&mut plan, "last".into(), work("double", vec![first]), Vec::new(), size).expect("added");
-    let other = add(&mut plan, "other".into(), work("unknown", Vec::new()), Vec::new(), size).expect("added");
+    let first = plan.add("first".into(), work("double", Vec::new()), Vec::new(), size).expect("added");
+    let last = plan.add("last".into(), work("double", vec![first]), Vec::new(), size).expect("added");
+    let other = plan.add("other".into(), work("unknown", Vec::new()), Vec::new(), size).expect("added");
+    let plan = plan.finish().expect("a plan");
     assert_eq!(order::read(&order::text(&plan).expect("text")).expect("a plan"), plan);
     let (path, host) = (dir.path().join("store"), Fake::default());
     assert_eq!(run_all(&plan[..2], &path, &host).expect("both run"), 2);

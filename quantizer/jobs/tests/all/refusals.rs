@@ -105,6 +105,23 @@ fn other_folders_are_no_stores() {
 }
 
 #[test]
+fn workers_that_open_one_new_store_all_get_it() {
+    let dir = tempfile::tempdir().expect("a folder");
+    for round in 0..50 {
+        let path = dir.path().join(round.to_string());
+        std::thread::scope(|scope| {
+            for worker in 0..4 {
+                let path = &path;
+                scope.spawn(move || {
+                    Store::open(path, &Fake::default()).expect("a store");
+                    fs::write(path.join(format!("{worker}.json")), "{}").expect("a result");
+                });
+            }
+        });
+    }
+}
+
+#[test]
 fn reading_makes_no_store() {
     let dir = folder(SPEC);
     let (typo, empty) = (dir.path().join("typo"), dir.path().join("empty"));

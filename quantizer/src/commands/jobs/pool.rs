@@ -97,14 +97,20 @@ impl Working<'_> {
         let (sender, receiver) = channel();
         let (begun, left_at_begin) = (Instant::now(), self.schedule.work().0);
         let mut free = self.pool.cores;
+        // After an error of this process, no job starts, and those that run end.
+        let mut so_far = Ok(());
         loop {
-            while let Some(job) = self.schedule.start(free) {
-                free = free.saturating_sub(self.jobs[job].cpus);
-                self.shares.insert(job, 0.0);
-                self.start(job, sender.clone())?;
+            while so_far.is_ok()
+                && let Some(job) = self.schedule.start(free)
+            {
+                so_far = self.start(job, sender.clone());
+                if so_far.is_ok() {
+                    free = free.saturating_sub(self.jobs[job].cpus);
+                    self.shares.insert(job, 0.0);
+                }
             }
             if self.shares.is_empty() {
-                return Ok(());
+                return so_far;
             }
             let (left, all) = self.left();
             let Counts { done, running, all: jobs, .. } = self.schedule.counts();
@@ -119,7 +125,8 @@ impl Working<'_> {
                 Message::Ended(job, of) => {
                     self.shares.remove(&job);
                     free = (free + self.jobs[job].cpus).min(self.pool.cores);
-                    self.end(job, &of)?;
+                    let ended = self.end(job, &of);
+                    so_far = so_far.and(ended);
                 }
             }
         }
