@@ -19,6 +19,8 @@ use crate::job::{Job, version};
 use crate::record::{FORMAT, Outcome, Record};
 use crate::store::Store;
 use crate::work::{self, Work};
+pub use merge::merge;
+
 use inputs::{Kept, check_inputs, heldout, image, path_of};
 
 /// Runs a job and writes its result into the store. Returns `false` if the store has the result already. `watch`
@@ -40,7 +42,7 @@ pub fn run(job: &Job, store: &Store, host: &dyn Host, watch: &mut dyn FnMut(&str
             Work::Learn(learn) => images::learn(job, learn, store, host, watch)?,
             Work::Evaluate(evaluate) => (self::evaluate(job, evaluate, store, host)?, None),
             Work::Drive(drive) => drive::drive(job, drive, store, host)?,
-            Work::Merge(merge) => (Outcome::Merged(merge::merge(merge, store)?), None),
+            Work::Merge(merge) => (Outcome::Merged(self::merge(merge, store)?), None),
             Work::Custom(work) => custom::custom(job, work, store, host, watch)?,
         };
         let record = Record { format: FORMAT, address: job.address.clone(), version: version(), result };

@@ -72,7 +72,7 @@ pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> 
     };
     merge::merge_of(&jobs)?;
     complete(&jobs, &store, &pool)?;
-    merge::report(&jobs, &store, host, outputs, args.svg.is_some(), args.json.is_some())
+    merge::report(&jobs, &store, outputs, args.svg.is_some(), args.json.is_some())
 }
 
 /// Returns the spec or plan that is given instead of policies.

@@ -104,6 +104,13 @@ fn interrupted_sweeps_resume_to_the_same_store() -> Result<()> {
     let read = |name: &str| -> Result<Vec<u8>> { Ok(fs::read(sweep.folder()?.join(name))?) };
     ensure!(read("merged.json")? == read("whole.json")?);
     ensure!(String::from_utf8(read("merged.svg")?)?.contains(">frontier of all methods<"));
+    // `merge` only reads, also where the plan's last job has no result.
+    let last: Value = serde_json::from_str(plan.lines().last().context("an empty plan")?)?;
+    let address = last["address"].as_str().context("no address")?;
+    fs::remove_file(sweep.folder()?.join("whole").join(format!("{address}.json")))?;
+    ensure!(succeeded(&sweep.run("merge sweep.toml --store whole", "")?)? == table, "without the merge's result");
+    ensure!(results(&sweep.folder()?.join("whole")) == jobs - 1, "merge wrote a result");
+    succeeded(&sweep.run("sweep sweep.toml --store whole --quiet", "")?)?;
 
     // Killed several times, each after one result more, by signals that it can and cannot catch.
     let store = sweep.folder()?.join("killed");

@@ -17,7 +17,7 @@ use crate::work::{Merge, Row};
 /// # Errors
 ///
 /// "Again" if a result is missing.
-pub(super) fn merge(plan: &Merge, store: &Store) -> Result<Merged, JobError> {
+pub fn merge(plan: &Merge, store: &Store) -> Result<Merged, JobError> {
     let mut images: Vec<Vec<MergedImage>> = vec![Vec::new(); plan.policies.len()];
     for row in &plan.rows {
         let Some(of_policy) = images.get_mut(row.policy) else {

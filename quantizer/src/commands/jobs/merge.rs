@@ -3,12 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use actq_jobs::host::Host;
 use actq_jobs::job::Job;
 use actq_jobs::merged::Merged;
 use actq_jobs::record::Outcome;
 use actq_jobs::run;
 use actq_jobs::store::Store;
+use actq_jobs::work::Work;
 use anyhow::{Context as _, Result, ensure};
 
 use super::host::Command;
@@ -33,7 +33,7 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
         args.spec.display(),
         args.store.display()
     );
-    report(&jobs, &store, &Command, outputs, args.svg.is_some(), args.json.is_some())
+    report(&jobs, &store, outputs, args.svg.is_some(), args.json.is_some())
 }
 
 /// Refuses outputs among the files of a store.
@@ -54,12 +54,11 @@ pub(crate) fn refuse_inside<'a>(store: &Path, outputs: impl IntoIterator<Item = 
 pub(crate) fn report(
     jobs: &[Job],
     store: &Store,
-    host: &dyn Host,
     outputs: Outputs,
     svg: bool,
     json: bool,
 ) -> Result<()> {
-    let merged = merged(jobs, store, host)?;
+    let merged = merged(jobs, store)?;
     print(&merged::report(&merged))?;
     let svg = svg.then(|| frontiers::svg(&merged));
     let json = if json { Some(serde_json::to_string_pretty(&merged)? + "\n") } else { None };
@@ -81,11 +80,15 @@ pub(crate) fn merge_of(jobs: &[Job]) -> Result<&Job> {
     Ok(merge)
 }
 
-fn merged(jobs: &[Job], store: &Store, host: &dyn Host) -> Result<Merged> {
-    let merge = merge_of(jobs)?;
-    run::run(merge, store, host, &mut |_, _| ())?;
-    match store.read(&merge.address)? {
+/// Returns the results of a plan: those of its merge if that has run, or else of its other jobs. It writes nothing.
+fn merged(jobs: &[Job], store: &Store) -> Result<Merged> {
+    let job = merge_of(jobs)?;
+    let Work::Merge(merge) = &job.work else { anyhow::bail!("{}: is not of kind merge", job.title) };
+    if !store.has(&job.address) {
+        return Ok(run::merge(merge, store)?);
+    }
+    match store.read(&job.address)? {
         Outcome::Merged(merged) => Ok(merged),
-        _ => anyhow::bail!("{}: the result is not of kind merge", merge.address),
+        _ => anyhow::bail!("{}: the result is not of kind merge", job.address),
     }
 }
