@@ -9,12 +9,13 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread;
 use std::time::Instant;
 
+use actq::error::Error;
 use actq::text::count;
-use actq_jobs::error::AGAIN;
+use actq_jobs::error::{AGAIN, JobError};
 use actq_jobs::job::Job;
 use actq_jobs::schedule::{Counts, Ended, Schedule};
 use actq_jobs::store::Store;
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result};
 use serde_json::{Value, json};
 
 use crate::group;
@@ -42,11 +43,12 @@ pub struct Pool<'a> {
 ///
 /// # Errors
 ///
-/// At the end, if a job has failed; the store then has the results of the others.
+/// At the end, if a job has failed; the store then has the results of the others. [`JobError::again`] is `true` if each
+/// of those that failed may succeed later.
 pub fn complete(jobs: &[Job], store: &Store, pool: &Pool<'_>) -> Result<()> {
     let progress = Progress::new(pool.quiet, "starting")?;
     let schedule = Schedule::new(jobs, |job| store.has(&job.address), pool.tries);
-    let mut work = Working { jobs, store, schedule, pool, shares: BTreeMap::new() };
+    let mut work = Working { jobs, store, schedule, pool, shares: BTreeMap::new(), is_final: false };
     let ended = work.work(&progress);
     drop(progress);
     ended?;
@@ -62,8 +64,11 @@ pub fn complete(jobs: &[Job], store: &Store, pool: &Pool<'_>) -> Result<()> {
         0 => String::new(),
         _ => format!(", and {} after them did not run", count(skipped, "job")),
     };
-    ensure!(failed == 0, "{} failed{skipped}{kept}", count(failed, "job"));
-    Ok(())
+    if failed == 0 {
+        return Ok(());
+    }
+    let error = Error::input(format!("{} failed{skipped}{kept}", count(failed, "job")));
+    Err(JobError { again: !work.is_final, error }.into())
 }
 
 /// Jobs, store and workers.
@@ -74,6 +79,8 @@ struct Working<'a> {
     pool: &'a Pool<'a>,
     /// Share done of each running job.
     shares: BTreeMap<usize, f64>,
+    /// `true` after a failure that every try repeats.
+    is_final: bool,
 }
 
 /// A message of a worker's thread.
@@ -164,6 +171,7 @@ impl Working<'_> {
     }
 
     fn end(&mut self, job: usize, Try { ended, status, seconds, said }: &Try) -> Result<()> {
+        self.is_final |= *ended == Ended::Never;
         let again = self.schedule.end(job, *ended);
         let job = &self.jobs[job];
         if *ended != Ended::Done {
