@@ -31,6 +31,7 @@ impl PortKind {
 
 /// A raw input, or targets: values that follow each other in the observation, or in the action.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(not(feature = "writer"), non_exhaustive)]
 pub struct Port<'a> {
     /// Input, or the quantity of a target.
     pub kind: PortKind,

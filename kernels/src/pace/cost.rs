@@ -20,6 +20,7 @@ use crate::x::{Extent, Plan};
 
 /// Modelled instructions and cycles of a Cortex-M4.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(not(feature = "writer"), non_exhaustive)]
 pub struct Cost {
     /// Modelled instructions.
     pub instructions: u64,
