@@ -1,7 +1,7 @@
 //! The documents against the commands: `docs/CLI.md` holds every help text, and every command that is shown exists.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use actq_bench::command::{actq, run, succeeded};
@@ -12,15 +12,6 @@ use tempfile::TempDir;
 
 const GENERATED: &str = "<!-- Below, the help of every command. Do not edit; write it anew by\n     \
                          ACTQ_BLESS=1 cargo test --release -p actq-host-tests docs:: -->\n";
-const OTHERS: &[&str] = &[
-    "README.md",
-    "CONTRIBUTING.md",
-    "RELEASING.md",
-    "firmware-demo/README.md",
-    "fuzz/README.md",
-    "examples/ur3/README.md",
-    "research/README.md",
-];
 /// Commands of cargo itself, of cargo-fuzz and of cargo-semver-checks.
 const CARGO: &[&str] = &["+nightly", "build", "check", "install", "publish", "run", "semver-checks", "test"];
 
@@ -111,17 +102,35 @@ fn check_script(path: &str) -> Result<()> {
     Ok(())
 }
 
+/// Adds the documents of a folder and of those in it. Records are of the tree of their dates.
+fn add_documents(folder: &Path, to: &mut Vec<PathBuf>) -> Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
+        let is_other = name.starts_with('.') || ["target", "records", "node_modules"].contains(&name.as_str());
+        match entry.file_type()?.is_dir() {
+            true if !is_other => add_documents(&path, to)?,
+            false if name.ends_with(".md") && name != "CHANGELOG.md" => to.push(path),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn every_shown_command_is_known() -> Result<()> {
-    let listed = fs::read_dir(root().join("docs"))?.map(|entry| Ok(entry?.path())).collect::<Result<Vec<PathBuf>>>()?;
-    let documents = listed.into_iter().filter(|path| path.extension().is_some_and(|ending| ending == "md"));
+    let mut documents = Vec::new();
+    add_documents(&root(), &mut documents)?;
+    for expected in ["README.md", "docs/families/lerobot.md", "capi/README.md", "quantizer/python/README.md"] {
+        ensure!(documents.contains(&root().join(expected)), "{expected} was not found");
+    }
     let (reference, aliases, xtask) =
         (read("docs/CLI.md")?, read(".cargo/config.toml")?, read("tools/xtask/src/main.rs")?);
     let members = read("Cargo.toml")?;
     let members = members.split('"').map(|member| root().join(member).join("Cargo.toml")).filter(|path| path.is_file());
     let manifests = members.map(fs::read_to_string).collect::<Result<String, _>>()?;
     let mut count = 0;
-    for path in documents.chain(OTHERS.iter().map(|path| root().join(path))) {
+    for path in documents {
         let text = fs::read_to_string(&path)?;
         for words in commands(text.split(GENERATED).next().unwrap_or(&text)) {
             let checked = match words[0] {
@@ -148,9 +157,25 @@ fn shown_answers_are_read() -> Result<()> {
     let text = read("docs/DEPLOY.md")?;
     let answers = listings(&text, "toml");
     ensure!(answers.len() == 2, "docs/DEPLOY.md has {} listings of answers", answers.len());
-    for answers in answers {
+    let family = read("docs/families/holosoma.md")?;
+    for answers in answers.into_iter().chain(listings(&family, "toml")) {
         Answers::parse(answers)?;
     }
+    Ok(())
+}
+
+/// The Python package's tests run the listings of PYTHON and IMPORT; this one needs lerobot.
+#[test]
+fn the_shown_export_of_lerobot_parses() -> Result<()> {
+    let text = read("docs/families/lerobot.md")?;
+    let [listing] = listings(&text, "python")[..] else { bail!("docs/families/lerobot.md has one listing in Python") };
+    let mut python = Command::new("python3");
+    python.args(["-c", "import ast, sys; ast.parse(sys.stdin.read())"]);
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped("python3 is not installed");
+        return Ok(());
+    }
+    succeeded(&run(python, listing.as_bytes())?)?;
     Ok(())
 }
 

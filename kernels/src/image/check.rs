@@ -4,7 +4,7 @@ use super::contract::{ARRAY_BINARISE, CONTRACT_ARRAYS};
 use super::header::{self as h, Words};
 use super::info::check_whole;
 use super::matrix::{matrix, row_block};
-use super::op::{Op, OpKind, Uses};
+use super::op::{Around, Op, OpKind, Uses};
 use super::ports::PortKind;
 use super::proof::fits_i32;
 use super::region::Region;
@@ -262,8 +262,8 @@ impl<'a> Image<'a> {
             if i != 0 || self.first_denoising_op() == 0 {
                 return Err(ImageError::Denoising);
             }
-        } else if op.kind.is_around() {
-            check_around(op, front)?;
+        } else if let Some(kind) = op.kind.around() {
+            check_around(kind, op, front)?;
         } else if *constants > 0 {
             let [constants, arrays] = [*constants, *arrays].map(usize::from);
             for constant in front.constants(op.data(), constants)? {
@@ -326,24 +326,24 @@ impl<'a> Image<'a> {
 
 /// Checks the data of an operation around a network.
 #[inline(never)]
-fn check_around(op: &Op<'_>, front: &mut Front<'_>) -> Result<(), ImageError> {
+fn check_around(kind: Around, op: &Op<'_>, front: &mut Front<'_>) -> Result<(), ImageError> {
     let n = op.dst().len;
-    let valid = match op.kind {
-        OpKind::Select => {
+    let valid = match kind {
+        Around::Select => {
             front.take(op.data(), 1 + n.div_ceil(2))?;
             op.half(1) == 0 && (0..n).all(|i| op.half(2 + i) < op.half(0))
         }
-        OpKind::Constant | OpKind::Start => {
+        Around::Constant | Around::Start => {
             front.take_finite(op.data(), n)?;
             true
         }
-        OpKind::Row => {
+        Around::Row => {
             let rows = op.half(0);
             front.take(op.data(), 2)?;
             front.take_finite(op.data() + 2, rows * n)?;
             op.half(1) < rows && op.half(2) < rows && op.half(3) == 0
         }
-        OpKind::Stand => {
+        Around::Stand => {
             let groups = op.half(1);
             front.take(op.data(), 2)?;
             front.take_finite(op.data() + 2, n)?;
@@ -351,15 +351,15 @@ fn check_around(op: &Op<'_>, front: &mut Front<'_>) -> Result<(), ImageError> {
             let sum: usize = (0..groups).map(|group| op.half(2 * (2 + n) + group)).sum();
             sum == op.half(0) && is_positive(op.constant(1))
         }
-        OpKind::History => {
+        Around::History => {
             front.take(op.data(), 3)?;
             let [frame, slots, length, stride, newest, flags] = [0, 1, 2, 3, 4, 5].map(|i| op.half(i));
             // The ring has the oldest frame. The products of two u16 and their sum fit 32 bits.
             let oldest = length.saturating_sub(1) * stride + newest;
             n == frame * length && stride > 0 && newest < 2 && flags < 4 && slots == oldest.max(1)
         }
-        // A clip has no data.
-        _ => true,
+        // It has no data.
+        Around::Clip => true,
     };
     if valid { Ok(()) } else { Err(ImageError::Around) }
 }

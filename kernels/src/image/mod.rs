@@ -35,6 +35,7 @@ pub(crate) use matrix::row_block;
 #[cfg(feature = "writer")]
 pub use matrix::{BlockRecord, MatrixRecord, block_bytes, half_words, quarter_words};
 pub use matrix::{Matrix, RowBlock};
+pub(crate) use op::Around;
 #[cfg(feature = "writer")]
 pub use op::OpRecord;
 pub use op::{Op, OpKind};

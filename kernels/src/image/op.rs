@@ -73,20 +73,53 @@ pub enum OpKind {
     History,
 }
 
+/// An operation around a network ([`crate::ops::around`]): see [`OpKind`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Around {
+    Select,
+    Clip,
+    Constant,
+    Start,
+    Row,
+    Stand,
+    History,
+}
+
 impl OpKind {
     /// Returns `true` if the operation differs between denoising steps.
     pub(super) fn is_of_step(self) -> bool {
         cfg!(feature = "flow") && matches!(self, Self::Table | Self::Denoise)
     }
 
-    /// Returns `true` for the operations around a network ([`crate::ops::around`]). A build without them has none.
+    /// Returns the operation around a network; `None` for all others, and in a build without these operations.
     #[inline(always)]
-    pub(crate) fn is_around(self) -> bool {
-        cfg!(feature = "around")
-            && matches!(
-                self,
-                Self::Select | Self::Clip | Self::Constant | Self::Start | Self::Row | Self::Stand | Self::History
-            )
+    pub(crate) fn around(self) -> Option<Around> {
+        if !cfg!(feature = "around") {
+            return None;
+        }
+        Some(match self {
+            Self::Select => Around::Select,
+            Self::Clip => Around::Clip,
+            Self::Constant => Around::Constant,
+            Self::Start => Around::Start,
+            Self::Row => Around::Row,
+            Self::Stand => Around::Stand,
+            Self::History => Around::History,
+            // No wildcard: a new operation is decided on here.
+            Self::Normalize { .. }
+            | Self::Linear { .. }
+            | Self::Function(_)
+            | Self::LayerNorm
+            | Self::RmsNorm
+            | Self::Add
+            | Self::Copy
+            | Self::LstmCell
+            | Self::GruCell
+            | Self::Mul
+            | Self::Noise
+            | Self::Table
+            | Self::Denoise => return None,
+        })
     }
 
     #[cfg(feature = "writer")]
@@ -434,7 +467,8 @@ impl<'a> Image<'a> {
     /// Returns `true` if the image has operations or ports around its network: then firmware needs the crate's feature
     /// `around`.
     pub fn has_around(&self) -> bool {
-        self.header.kind() >> 8 != 0 || (0..self.op_count()).any(|i| self.op(i).is_ok_and(|op| op.kind.is_around()))
+        self.header.kind() >> 8 != 0
+            || (0..self.op_count()).any(|i| self.op(i).is_ok_and(|op| op.kind.around().is_some()))
     }
 
     /// Returns the values of noise that an evaluation takes; 0 for a policy without noise.
@@ -473,7 +507,7 @@ impl<'a> Image<'a> {
                 }
                 OpKind::Function(function)
             }
-            kind if kind.is_around() && kind != OpKind::Clip => {
+            kind if kind.around().is_some_and(|kind| kind != Around::Clip) => {
                 // Lengths in the data's first word: of a frame, or of all of `src`; of a history's slots.
                 let sizes = self.word(data as usize);
                 src = if src > 0 { low(sizes) } else { 0 };

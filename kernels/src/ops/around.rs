@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use crate::arena::{part, regions};
 use crate::error::Fault;
-use crate::image::{Op, OpKind, Region};
+use crate::image::{Around, Op, Region};
 use crate::math::clamp;
 use crate::ops::elementwise::{copy, copy_le};
 
@@ -26,61 +26,60 @@ fn clip(x: u32, low: u32, high: u32) -> u32 {
 ///
 /// [`Fault::Damaged`] if the image does not have the operation's regions or data.
 #[inline(never)]
-pub(super) fn run(op: &Op<'_>, arena: &mut [u32], units: &Range<usize>) -> Result<(), Fault> {
+pub(super) fn run(kind: Around, op: &Op<'_>, arena: &mut [u32], units: &Range<usize>) -> Result<(), Fault> {
     let [dst, src, third, _] = regions(arena, &op.regions, Region::default());
     let is_last = units.end == op.units();
     if dst.is_empty() {
         return Err(Fault::Damaged);
     }
-    match op.kind {
-        OpKind::Select => {
+    // Operations that keep something for the next step have a count as their last word.
+    let count = third.last().copied().unwrap_or(0);
+    let next = match kind {
+        Around::Select => {
             for (to, i) in part(dst, units).iter_mut().zip(units.clone()) {
                 *to = *src.get(op.half(2 + i)).ok_or(Fault::Damaged)?;
             }
             return Ok(());
         }
-        OpKind::Clip => {
+        Around::Clip => {
             for (x, (low, high)) in part(dst, units).iter_mut().zip(part(src, units).iter().zip(part(third, units))) {
                 *x = clip(*x, *low, *high);
             }
             return Ok(());
         }
-        OpKind::Constant => {
+        Around::Constant => {
             copy_le(op.part(0, units), part(dst, units));
             return Ok(());
         }
-        _ => {}
-    }
-    let Some((count, ring)) = third.split_last_mut() else { return Err(Fault::Damaged) };
-    let next = match op.kind {
-        OpKind::Start => {
-            if *count == 0 {
+        Around::Start => {
+            if count == 0 {
                 copy_le(op.part(0, units), part(dst, units));
             }
             1
         }
-        OpKind::Row => {
+        Around::Row => {
             let (rows, first) = (op.half(0), op.half(1));
-            let row = (*count as usize).checked_sub(1).unwrap_or(first).min(rows.saturating_sub(1));
+            let row = (count as usize).checked_sub(1).unwrap_or(first).min(rows.saturating_sub(1));
             copy_le(op.part(row, units), part(dst, units));
             // 0 is for a step after a reset.
             1 + if row + 1 < rows { row + 1 } else { op.half(2) } as u32
         }
-        OpKind::Stand => {
+        Around::Stand => {
             if !stands(op, src) {
                 return Ok(());
             }
             copy_le(op.part(0, units), part(dst, units));
             1
         }
-        _ => {
-            let history = History::of(op, *count as usize);
+        Around::History => {
+            let Some((_, ring)) = third.split_last_mut() else { return Err(Fault::Damaged) };
+            let history = History::of(op, count as usize);
             history.run(units, src, ring, dst);
             history.next()
         }
     };
     if is_last {
-        *count = next;
+        *third.last_mut().ok_or(Fault::Damaged)? = next;
     }
     Ok(())
 }

@@ -68,8 +68,8 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         denoise(&by, op.constant(0), v, z, x, y);
         return Ok(units.end == len);
     }
-    if op.kind.is_around() {
-        around::run(op, arena, &units)?;
+    if let Some(kind) = op.kind.around() {
+        around::run(kind, op, arena, &units)?;
         return Ok(units.end == len);
     }
     let is_norm = cfg!(feature = "norm") && matches!(op.kind, OpKind::LayerNorm | OpKind::RmsNorm);
@@ -101,11 +101,30 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         OpKind::GruCell if cfg!(feature = "recurrent") => {
             arch::gru_elements(range.clone(), f(src), f(third), f(dst));
         }
+        OpKind::Normalize { .. } => {
+            let [mean, scale] = [0, 1].map(|i| op.part(i, &range));
+            if scale.is_empty() {
+                return Err(Fault::Damaged);
+            }
+            elementwise::normalize(f(src), mean, scale, op.constant(0), op.constant(1), f(dst));
+        }
+        kind @ (OpKind::LayerNorm | OpKind::RmsNorm) if is_norm => {
+            let (weights, biases) = (op.part(0, &range), op.part(1, &range));
+            let (epsilon, moments) = (op.constant(0), &mut cursor.moments);
+            match kind {
+                OpKind::RmsNorm if !weights.is_empty() => {
+                    norm::rms_norm_units(units.clone(), moments, f(dst), weights, epsilon)
+                }
+                OpKind::LayerNorm if !biases.is_empty() => {
+                    norm::layer_norm_units(units.clone(), moments, f(dst), weights, biases, epsilon)
+                }
+                _ => return Err(Fault::Damaged),
+            }
+        }
         // The match has no wildcard: it does not compile without an arm for every operation. `Linear`, `Denoise` and
         // the operations around a network have returned above, and a checked image has none that the build leaves out.
-        kind @ (OpKind::LayerNorm
+        OpKind::LayerNorm
         | OpKind::RmsNorm
-        | OpKind::Normalize { .. }
         | OpKind::Linear { .. }
         | OpKind::Denoise
         | OpKind::LstmCell
@@ -116,21 +135,7 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         | OpKind::Start
         | OpKind::Row
         | OpKind::Stand
-        | OpKind::History) => {
-            let (first, second) = (op.part(0, &range), op.part(1, &range));
-            if (if kind == OpKind::RmsNorm { first } else { second }).is_empty() {
-                return Err(Fault::Damaged);
-            }
-            let constant = op.constant(0);
-            let (moments, done) = (&mut cursor.moments, units.clone());
-            if !is_norm {
-                elementwise::normalize(f(src), first, second, constant, op.constant(1), f(dst));
-            } else if kind == OpKind::RmsNorm {
-                norm::rms_norm_units(done, moments, f(dst), first, constant);
-            } else {
-                norm::layer_norm_units(done, moments, f(dst), first, second, constant);
-            }
-        }
+        | OpKind::History => return Err(Fault::Damaged),
     }
     Ok(units.end == len)
 }

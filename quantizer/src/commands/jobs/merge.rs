@@ -51,13 +51,7 @@ pub(crate) fn refuse_inside<'a>(store: &Path, outputs: impl IntoIterator<Item = 
 }
 
 /// Prints the results of a plan that are in the store, and writes the outputs: a plot, then figures as JSON.
-pub(crate) fn report(
-    jobs: &[Job],
-    store: &Store,
-    outputs: Outputs,
-    svg: bool,
-    json: bool,
-) -> Result<()> {
+pub(crate) fn report(jobs: &[Job], store: &Store, outputs: Outputs, svg: bool, json: bool) -> Result<()> {
     let merged = merged(jobs, store)?;
     print(&merged::report(&merged))?;
     let svg = svg.then(|| frontiers::svg(&merged));
