@@ -146,6 +146,23 @@ fn every_shown_command_is_known() -> Result<()> {
     Ok(())
 }
 
+/// A stranger follows a weight, and an observation, through few files.
+#[test]
+fn paths_have_at_most_nine_files() -> Result<()> {
+    let text = read("docs/ARCHITECTURE.md")?;
+    for title in ["## The path of a weight, from", "## The path of an observation to an action"] {
+        let (_, section) = text.split_once(title).with_context(|| format!("no section {title}"))?;
+        let section = section.split("\n## ").next().unwrap_or(section);
+        let files: Vec<&str> = section.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect();
+        ensure!((1..=9).contains(&files.len()), "{title}: {} files", files.len());
+        ensure!(section.contains("Nine files") == (files.len() == 9), "{title}: {} files", files.len());
+        for file in files {
+            ensure!(root().join(file).is_file(), "{title}: {file} does not exist");
+        }
+    }
+    Ok(())
+}
+
 /// The listings of a document in a language.
 pub(crate) fn listings<'a>(document: &'a str, language: &str) -> Vec<&'a str> {
     let parts = document.split(&format!("```{language}\n")).skip(1).collect::<Vec<_>>();
