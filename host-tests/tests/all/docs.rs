@@ -146,6 +146,25 @@ fn every_shown_command_is_known() -> Result<()> {
     Ok(())
 }
 
+/// Cargo packages the files in a crate's folder only.
+#[test]
+fn shipped_packages_hold_their_licences() -> Result<()> {
+    let manifest = read("Cargo.toml")?;
+    let members: Vec<&str> =
+        manifest.split('"').filter(|part| root().join(part).join("Cargo.toml").is_file()).collect();
+    let mut shipped = vec!["quantizer/python"];
+    for member in members {
+        if !read(&format!("{member}/Cargo.toml"))?.contains("publish = false") {
+            shipped.push(member);
+        }
+    }
+    ensure!(shipped.len() >= 12, "{shipped:?}");
+    for (folder, name) in shipped.iter().flat_map(|folder| [(folder, "LICENSE-MIT"), (folder, "LICENSE-APACHE")]) {
+        ensure!(read(&format!("{folder}/{name}"))? == read(name)?, "{folder}/{name} is not the project's");
+    }
+    Ok(())
+}
+
 /// A stranger follows a weight, and an observation, through few files.
 #[test]
 fn paths_have_at_most_nine_files() -> Result<()> {

@@ -195,7 +195,8 @@ impl Files {
 
 /// Adds the licences of the crates in the library; returns these with their versions and licences.
 fn licences(files: &mut Files) -> Result<Vec<Value>> {
-    for name in ["LICENSE-MIT", "LICENSE-APACHE"] {
+    let own = ["LICENSE-MIT", "LICENSE-APACHE"];
+    for name in own {
         files.put(name, &fs::read(root().join(name))?);
     }
     let metadata = cargo("the list of crates", &["metadata", "--format-version", "1", "--locked"], &[])?;
@@ -216,21 +217,30 @@ fn licences(files: &mut Files) -> Result<Vec<Value>> {
         }
         let mut part = json!({ "name": name, "version": number, "licence": text("license") });
         let folder = Path::new(text("manifest_path")).parent().context("no folder")?;
-        // Some crates have none; the texts of MIT and Apache-2.0 are at the top of the package.
-        let mut found = Vec::new();
-        for entry in fs::read_dir(folder)? {
-            let entry = entry?;
-            let file = entry.file_name().to_string_lossy().into_owned();
-            if entry.path().is_file() && ["LICENSE", "COPYING"].iter().any(|start| file.starts_with(start)) {
-                let to = format!("licences/{name}/{file}");
-                files.put(&to, &fs::read(folder.join(&file))?);
-                found.push(to);
-            }
-        }
-        part["files"] = found.into();
+        part["files"] = match package["source"].is_null() {
+            // A crate of this project.
+            true => own.map(str::to_owned).to_vec().into(),
+            false => licences_of(name, folder, files)?.into(),
+        };
         parts.push(part);
     }
     let compiled_in = json!({ "name": "core and compiler_builtins of Rust", "licence": "MIT OR Apache-2.0" });
     parts.push(compiled_in);
     Ok(parts)
+}
+
+/// Adds the licences in a crate's folder; returns their names. Some crates have none; the texts of MIT and Apache-2.0 are
+/// at the top of the package.
+fn licences_of(name: &str, folder: &Path, files: &mut Files) -> Result<Vec<String>> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let file = entry.file_name().to_string_lossy().into_owned();
+        if entry.path().is_file() && ["LICENSE", "COPYING"].iter().any(|start| file.starts_with(start)) {
+            let to = format!("licences/{name}/{file}");
+            files.put(&to, &fs::read(folder.join(&file))?);
+            found.push(to);
+        }
+    }
+    Ok(found)
 }
