@@ -99,8 +99,8 @@ impl Client {
                 }
             }
             wait = wait.mul_f64(1.5).min(MAX_REPEAT);
-            // The connection gives up a lost port; after its return the request is sent again. One that opens and closes
-            // again and again never returns.
+            // A lost port ends the wait early, and the request is repeated after reconnecting. A port that opens and
+            // closes again and again never reconnects.
             let (waited, is_over) = (begun.elapsed(), if was_open { self.timeout } else { 2 * self.timeout });
             if waited >= is_over {
                 bail!("no answer for {waited:.1?}: {}", self.connection.silence());
@@ -226,9 +226,9 @@ impl Client {
         self.change_unless(message, |_, _| Ok(false))
     }
 
-    /// As [`Self::with_token`], until the token is accepted, `is_done` is true, or time is over: a repetition of an
-    /// earlier request, or a silent line, may have changed the token again. `is_done` also takes how often the refused
-    /// request was sent.
+    /// Repeats the request with new tokens until one is accepted, `is_done` is true, or the time is over: a repetition
+    /// of an earlier request, or a silent line, may have changed the token again. `is_done` also takes how often the
+    /// refused request was sent.
     fn change_unless<'m>(
         &mut self,
         message: impl Fn(u32) -> Message<'m>,

@@ -6,14 +6,14 @@ use actq_kernels::{Head, Image};
 use actq_link::code::Refusal;
 
 use crate::running::SLICE;
-use crate::timeouts::MAX_PIECE;
+use crate::timeouts::MAX_SLICE;
 
 /// Default rate of an axis, in full ranges (low to high) per second, if the build has none.
 const RANGES_PER_SECOND: f32 = 10.0;
 
 /// Opens an image: checks it and its lengths, and runs its self-test, which must match bit for bit. It feeds the
 /// watchdog before the check, whose time grows with the image, and before each slice of the self-test, which is at most
-/// [`MAX_PIECE`].
+/// [`MAX_SLICE`].
 ///
 /// # Errors
 ///
@@ -30,10 +30,10 @@ pub fn open<'i, 's>(
         return Err(Refusal::Unfit);
     }
     let mut head = Head::new(image, scratch).map_err(|_| Refusal::Unfit)?;
-    if head.least_budget() > MAX_PIECE {
+    if head.least_budget() > MAX_SLICE {
         return Err(Refusal::Unfit);
     }
-    head.self_test_in_pieces(SLICE, || watchdog.feed()).map_err(|_| Refusal::SelfTest)?;
+    head.self_test_in_slices(SLICE, || watchdog.feed()).map_err(|_| Refusal::SelfTest)?;
     Ok(head)
 }
 

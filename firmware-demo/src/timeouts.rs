@@ -18,4 +18,4 @@ pub const TIMEOUTS: Timeouts = Timeouts { turn: 500, long: 4000 };
 /// Longest piece of a step that an image may need ([`actq_kernels::Image::least_budget`]), in modelled instructions. An
 /// image with a longer one is refused. `host-tests/tests/all/on_target/start.rs` asserts that it is shorter than
 /// [`Timeouts::turn`] at the slowest clock.
-pub const MAX_PIECE: u32 = 100_000;
+pub const MAX_SLICE: u32 = 100_000;

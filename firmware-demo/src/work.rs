@@ -1,4 +1,4 @@
-//! The loop below the tick: the link's bytes, slices of the head, pieces of an update, the watchdog.
+//! The loop below the tick: the link's bytes, slices of the head, update chunks, the watchdog.
 
 use actq_boards::port::Port;
 use actq_boards::seams::Watchdog;
@@ -55,7 +55,7 @@ pub struct State {
     faults: Faults,
     /// Hidden progress, as bits.
     #[cfg(feature = "faults")]
-    hidden: u8,
+    hidden_parts: u8,
 }
 
 impl State {
@@ -134,7 +134,7 @@ where
     fn take(&mut self, byte: u8, micros: u32) {
         #[cfg(feature = "faults")]
         match self.state.faults.push(byte) {
-            Some(Request::Hide(parts)) => self.state.hidden = parts,
+            Some(Request::Hide(parts)) => self.state.hidden_parts = parts,
             #[cfg(target_os = "none")]
             Some(Request::Undefined) => cortex_m::asm::udf(),
             #[cfg(target_os = "none")]
@@ -160,10 +160,10 @@ where
 
     #[cfg(feature = "faults")]
     fn hide(&mut self) {
-        let (progress, hidden) = (&mut self.state.progress, self.state.hidden);
-        progress.link &= hidden & 1 == 0;
-        progress.head &= hidden & 2 == 0;
-        progress.output &= hidden & 4 == 0;
+        let (progress, hidden_parts) = (&mut self.state.progress, self.state.hidden_parts);
+        progress.link &= hidden_parts & 1 == 0;
+        progress.head &= hidden_parts & 2 == 0;
+        progress.output &= hidden_parts & 4 == 0;
     }
 }
 

@@ -308,7 +308,7 @@ fn a_sliced_self_test_is_the_same_test() -> Result<()> {
             with_head::<_, anyhow::Error>(buffer.image(Path::new("slices"))?, |head| {
                 let mut pieces = 0;
                 let whole = head.self_test();
-                Ok((head.self_test_in_pieces(budget, || pieces += 1), whole, pieces, head.image().self_test_steps()))
+                Ok((head.self_test_in_slices(budget, || pieces += 1), whole, pieces, head.image().self_test_steps()))
             })
         };
         let (passed, whole, finest, steps) = in_pieces(&bytes, 0)?;

@@ -23,7 +23,7 @@ impl Head<'_, '_> {
     /// # Errors
     ///
     /// Those of [`Self::self_test`].
-    pub fn self_test_in_pieces(&mut self, budget: u32, mut before: impl FnMut()) -> Result<(), StepError> {
+    pub fn self_test_in_slices(&mut self, budget: u32, mut before: impl FnMut()) -> Result<(), StepError> {
         let budget = budget.max(self.least_budget());
         self.play_self_test(|head| {
             before();

@@ -93,13 +93,13 @@ impl Code {
         for executed in &region.executed {
             let instruction = self.instruction(executed.address)?;
             // Executions that continued from the instruction before it in memory.
-            let (behind, follows) = match &before {
+            let (previous, follows) = match &before {
                 Some((next, count, instruction)) if *next == executed.address => (Some(instruction), *count),
                 _ => (None, 0),
             };
             ensure!(follows <= executed.count, "the counts at {:#x} contradict each other", executed.address);
             let mut cycles = (executed.count - follows) * instruction.cycles();
-            cycles += follows * behind.map_or(0, |before| instruction.cycles_after(before));
+            cycles += follows * previous.map_or(0, |before| instruction.cycles_after(before));
             if instruction.class == Class::Conditional {
                 cycles += executed.jumps * REFILL;
             }

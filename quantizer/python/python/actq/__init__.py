@@ -7,8 +7,9 @@
     action = head(observation)
 
 `import_policy` reads a policy, `quantize` and `tune` make an `Image` of it, `Head` runs the image, `rollout` drives
-Gymnasium's environments by it, `evaluate` measures its errors, `FakeQuant` is its network in torch, and `Link` talks to a motor controller. Every failure is an `actq.Error`
-with the text of the command `actq`. The log `actq` has what the command calls notes.
+Gymnasium's environments by it, `evaluate` measures its errors, `FakeQuant` is its network in torch, and `Link` talks
+to a motor controller. Every failure is an `actq.Error` with the text of the command `actq`. The logger `actq` receives
+the command's notes.
 """
 
 from __future__ import annotations

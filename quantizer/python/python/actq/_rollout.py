@@ -78,7 +78,7 @@ def rollout(
         Discrete.
     success: is called with each `Episode` and says if it succeeded. The default reads "is_success" or "success" of the
         environment's info.
-    every: of each episode, only every so many frames are recorded: those at which a policy with chunks plans.
+    every: record only every n-th frame of an episode: those at which a policy with chunks plans.
 
     Raises what policy and environment raise.
     """
@@ -135,14 +135,14 @@ def _joined(kept: List[Tuple[Floats, Array, Array]]) -> Tuple[Floats, Array]:
 
 
 def _share(episodes: Sequence[Episode], success: Callable[[Episode], Optional[bool]]) -> Optional[float]:
-    """Returns the share of successful episodes; `None` if there are none, or one does not tell."""
-    told = [found for found in map(success, episodes) if found is not None]
-    return float(np.mean(told)) if told and len(told) == len(episodes) else None
+    """Returns the share of successful episodes; `None` if there are none, or one has no outcome."""
+    outcomes = [found for found in map(success, episodes) if found is not None]
+    return float(np.mean(outcomes)) if outcomes and len(outcomes) == len(episodes) else None
 
 
 def _succeeded(episode: Episode) -> Optional[bool]:
-    told = [episode.info[key] for key in ("is_success", "success") if key in episode.info]
-    return bool(told[0]) if told else None
+    values = [episode.info[key] for key in ("is_success", "success") if key in episode.info]
+    return bool(values[0]) if values else None
 
 
 def _info(infos: Mapping[str, Any], i: int, n: int, mode: str) -> Dict[str, Any]:
@@ -152,11 +152,11 @@ def _info(infos: Mapping[str, Any], i: int, n: int, mode: str) -> Dict[str, Any]
 
 
 def _of_robot(infos: Mapping[str, Any], i: int, n: int) -> Dict[str, Any]:
-    """Returns what infos, also nested ones, say of robot `i` of `n`. What has no value for each says it of all."""
+    """Returns the infos of robot `i` of `n`, also nested ones. A value that is not one for each robot is of all."""
     info: Dict[str, Any] = {}
     for key, value in infos.items():
-        told = infos.get(f"_{key}")
-        if key.startswith("_") or told is not None and not told[i]:
+        is_present = infos.get(f"_{key}")
+        if key.startswith("_") or is_present is not None and not is_present[i]:
             continue
         if isinstance(value, Mapping):
             info[key] = _of_robot(value, i, n)

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result};
 
 use crate::bits;
 
-/// What the board sent, as far as it tells the state of its head.
+/// A sent item that determines the state of the board's head.
 #[derive(Clone, Debug)]
 pub(super) enum Sent {
     /// A status.
@@ -24,7 +24,7 @@ pub(super) enum Sent {
     Dropped,
 }
 
-/// What a board sent, and the observations that it was sent.
+/// Items from a board, and the observations that were sent to it.
 #[derive(Clone, Debug, Default)]
 pub struct Log {
     pub(super) sent: Vec<Sent>,

@@ -26,7 +26,7 @@ const C_HEADER: &str = "actq-capi-header";
 
 /// The tests that only `cargo verify --all` runs, modules of `host-tests/tests/all`: those in QEMU beyond the smoke run, those that
 /// learn for long, and those of packages that the short run does not download.
-const LEFT_OUT: [&str; 6] = ["--skip", "on_target::", "--skip", "learning::", "--skip", "built_once::"];
+const SKIPPED_TESTS: [&str; 6] = ["--skip", "on_target::", "--skip", "learning::", "--skip", "built_once::"];
 
 /// A command with a name.
 pub(super) struct Step {
@@ -60,7 +60,7 @@ impl Installed {
 pub(super) fn short() -> Vec<Step> {
     let mut steps = Steps::default();
     steps.format_and_lints();
-    steps.add("tests", &[&TESTS[..], &["--"], &LEFT_OUT].concat());
+    steps.add("tests", &[&TESTS[..], &["--"], &SKIPPED_TESTS].concat());
     steps.0
 }
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::{heads, kernels};
 
-/// /// The content of the JSON file.
+/// The content of the JSON file.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Entry<'a> {
