@@ -81,8 +81,8 @@ unsafe fn write(to: Buffer<f32>, action: &[f32]) {
 ///
 /// # Safety
 ///
-/// `head` is null, misaligned, or valid for reads and writes, and nothing else uses it meanwhile; if it was initialized,
-/// the image's bytes and the scratch memory are still its own.
+/// `head` is null, misaligned, or valid for reads and writes, and nothing else uses it meanwhile; if it was
+/// initialized, the image's bytes and the scratch memory are still its own.
 unsafe fn with(head: *mut ActqHead, run: impl FnOnce(&mut Running) -> Result<(), Failure>) -> ActqStatus {
     let place = head.cast::<Running>();
     status(Buffer::new(place.cast::<usize>(), 1).and_then(|found| {
@@ -182,9 +182,9 @@ pub unsafe extern "C" fn actq_step(
     }
 }
 
-/// Begins a step with an observation; `actq_poll` does the work. A step that has begun and is not ready is dropped; if a
-/// poll has already worked on it, the recurrent state is reset. The first call takes longer, unless `actq_least_budget`
-/// was called before.
+/// Begins a step with an observation; `actq_poll` does the work. A step that has begun and is not ready is dropped; if
+/// a poll has already worked on it, the recurrent state is reset. The first call takes longer, unless
+/// `actq_least_budget` was called before.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_begin(
     head: *mut ActqHead,
@@ -203,8 +203,8 @@ pub unsafe extern "C" fn actq_begin(
     }
 }
 
-/// Gives the smallest budget of a poll, instructions. The first call for a head computes it, which takes about as long as a
-/// short step: call it before the control loop.
+/// Gives the smallest budget of a poll, instructions. The first call for a head computes it, which takes about as long
+/// as a short step: call it before the control loop.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_least_budget(head: *mut ActqHead, budget: *mut u32) -> ActqStatus {
     // SAFETY: as the caller promises.

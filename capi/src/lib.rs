@@ -1,7 +1,7 @@
 //! C interface of the executor. `include/actq.h` is made from it by cbindgen; a test compares them.
 //!
-//! Each function takes the caller's pointers, checks them (`memory.rs`), and calls `actq-kernels`. It returns the number
-//! of a [`Code`]: 0, or the number of the kernels' error.
+//! Each function takes the caller's pointers, checks them (`memory.rs`), and calls `actq-kernels`. It returns the
+//! number of a [`Code`]: 0, or the number of the kernels' error.
 //!
 //! # Safety
 //!
@@ -24,8 +24,8 @@ pub use status::*;
 /// Number of this interface: it changes with every change of a structure or a function.
 pub const ACTQ_ABI: u32 = 1;
 
-/// Bytes of stack that a call takes at most on a Cortex-M with the assembler kernels, without interrupts. A test computes
-/// them from the calls in a linked program, for any image.
+/// Bytes of stack that a call takes at most on a Cortex-M with the assembler kernels, without interrupts. A test
+/// computes them from the calls in a linked program, for any image.
 pub const ACTQ_STACK_BYTES: usize = 2560;
 
 /// Returns the library's `ACTQ_ABI`. A program that was compiled with another header must not go on.

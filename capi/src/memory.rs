@@ -46,8 +46,8 @@ impl<T> Buffer<T> {
     ///
     /// # Safety
     ///
-    /// The pointer is valid for reads and writes of `len` values that nothing else uses while `'a` lasts. Any bits are a
-    /// value of `T`.
+    /// The pointer is valid for reads and writes of `len` values that nothing else uses while `'a` lasts. Any bits are
+    /// a value of `T`.
     pub(crate) unsafe fn write<'a>(&self) -> &'a mut [T] {
         // SAFETY: it is not null, aligned, and of a possible length; the caller promises the rest.
         unsafe { core::slice::from_raw_parts_mut(self.pointer, self.len) }

@@ -187,8 +187,8 @@ impl Client {
         outcome.with_context(|| format!("cannot set {parameter} of axis {axis} to {value}"))
     }
 
-    /// Arms the controller. If one of several repetitions of the request may have armed it, and it is not armed any more,
-    /// it is not armed again: it may have stopped for a reason.
+    /// Arms the controller. If one of several repetitions of the request may have armed it, and it is not armed any
+    /// more, it is not armed again: it may have stopped for a reason.
     ///
     /// # Errors
     ///

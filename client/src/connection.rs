@@ -67,8 +67,8 @@ impl Connection {
         let now = Instant::now();
         // Larger than the numbers of an earlier process that sent fewer than a thousand frames a second.
         let first = since_epoch().as_millis() as u32;
-        // From the time of day, so that a process continues the times of an earlier one, and then monotonic: a clock that
-        // is set back would make observations old.
+        // From the time of day, so that a process continues the times of an earlier one, and then monotonic: a clock
+        // that is set back would make observations old.
         let start = since_epoch().as_micros() as u32;
         let clock = Box::new(move || start.wrapping_add(now.elapsed().as_micros() as u32));
         Ok(Self {

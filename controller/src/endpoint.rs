@@ -158,8 +158,8 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
     }
 
     /// While not armed: resets the clock tracking if no valid observation arrived in time, and the sequence numbers if
-    /// no good frame arrived for [`Settings::quiet`] ticks. An earlier frame could then be accepted again, so the token is
-    /// renewed.
+    /// no good frame arrived for [`Settings::quiet`] ticks. An earlier frame could then be accepted again, so the token
+    /// is renewed.
     fn relearn<const AXES: usize>(&mut self, safety: &mut impl Shared<AXES>) {
         let (ticks, stale, state) = safety.with(|safety| (safety.ticks(), safety.is_stale(), safety.state()));
         if state == State::Armed {

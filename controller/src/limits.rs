@@ -42,7 +42,8 @@ impl core::error::Error for LimitsError {}
 
 impl Limits {
     /// Returns the limits of axis `i`: the stricter of the image's and the build's. `built` has limits for each axis,
-    /// or one for all; the image's may be infinite. Returns `None` without finite limits, and if the two do not overlap.
+    /// or one for all; the image's may be infinite. Returns `None` without finite limits, and if the two do not
+    /// overlap.
     pub fn of_axis(i: usize, image: Option<[f32; 2]>, built: &[Self]) -> Option<Self> {
         let image = image.map(|[low, high]| Self { low, high, rate: None });
         let limits = match (image, built.get(i).or(built.first())) {

@@ -99,8 +99,8 @@ impl<const AXES: usize> Safety<AXES> {
         self.since_observation = 0;
     }
 
-    /// Records that ticks may have been lost, as while flash was written: the age of the last observation is unknown. So
-    /// arming needs a new one. No effect while armed, when nothing may hold up the tick.
+    /// Records that ticks may have been lost, as while flash was written: the age of the last observation is unknown.
+    /// So arming needs a new one. No effect while armed, when nothing may hold up the tick.
     pub fn stalled(&mut self) {
         if !matches!(self.state, State::Armed(_)) {
             self.since_observation = u32::MAX;

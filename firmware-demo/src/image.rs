@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn one_limit_of_the_contract_makes_the_builds_stricter() {
+    fn one_contract_limit_tightens_the_builds() {
         let contract = |i: usize| [None, Some([f32::NEG_INFINITY, 0.5]), Some([0.25, f32::INFINITY])][i];
         let built = "-1:1".parse::<Limits>().expect("valid limits");
         let of = |built: &[Limits]| axes_within::<3>(contract, built, 1000.0).map(|axis| (axis.low(), axis.high()));

@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn an_active_break_input_is_a_fault_while_coasting_too() {
+    fn break_inputs_are_faults_while_coasting() {
         let mut bridges = Bridges::new(Mock::default());
         bridges.stage.broken = true;
         assert!(!bridges.apply(&[Output::Coast; 3], &[Axis::STILL; 3]));
@@ -153,7 +153,7 @@ mod tests {
 
     /// A host narrows the limits of the second controller: an action within both has the same duty cycle.
     #[test]
-    fn stricter_limits_do_not_change_what_a_value_means() {
+    fn stricter_limits_keep_the_meaning_of_values() {
         let axis = Axis::new(-1.0, 1.0, 2.0, 0.0, SafeAction::Ramp { step: 2.0 }).expect("the axis is valid");
         let duty = |limits: &[(Parameter, f32)], action: f32| {
             let mut safety = Safety::new([axis], 1..=100, 1);

@@ -1,5 +1,5 @@
-//! A bundle whose files hold any bytes is refused or becomes a description. The first byte chooses the files' names, and
-//! so the family; a zero byte ends a file.
+//! A bundle whose files hold any bytes is refused or becomes a description. The first byte chooses the files' names,
+//! and so the family; a zero byte ends a file.
 #![no_main]
 
 use std::fs;

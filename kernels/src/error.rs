@@ -199,7 +199,8 @@ errors! {
 errors! {
     /// Why a step gave no action. The recurrent state and the chunk are reset; the last action stays, so that the step
     /// limit holds across the error. [`StepError::Budget`], [`StepError::NotBegun`] and the
-    /// [`StepError::Stale`] of [`crate::Head::play`] change nothing; [`StepError::SelfTest`] resets the last action, too.
+    /// [`StepError::Stale`] of [`crate::Head::play`] change nothing; [`StepError::SelfTest`] resets the last action,
+    /// too.
     StepError, "80 to 127" {
         /// The observation's length differs from the image's.
         ObservationLength {

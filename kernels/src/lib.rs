@@ -23,10 +23,10 @@
 //! Features:
 //!
 //! - `w2`, `w3`, `w4`, `w8`: matrices of weights of these bits.
-//! - `single`, `paired`: matrices of one weight in a lane of 16 bits (activations above 127, or groups of 64 or 128), and
-//!   of two (all others). `groups`: group scales.
-//! - `elu`: ELU, tanh and sigmoid. `silu`: SiLU. `functions`: GELU, softplus, mish, exp, sine, cosine. (ReLU is in every
-//!   build.)
+//! - `single`, `paired`: matrices of one weight in a lane of 16 bits (activations above 127, or groups of 64 or 128),
+//!   and of two (all others). `groups`: group scales.
+//! - `elu`: ELU, tanh and sigmoid. `silu`: SiLU. `functions`: GELU, softplus, mish, exp, sine, cosine. (ReLU is in
+//!   every build.)
 //! - `norm`: layer norm and RMS norm. `recurrent`: LSTM and GRU cells. `flow`: flow and diffusion policies.
 //! - `chunks`: action chunks of more than one action, with overlap and temporal ensemble.
 //! - `around`: the operations around a network (`docs/DEPLOY.md`): raw values in, targets out.

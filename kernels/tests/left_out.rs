@@ -9,7 +9,7 @@ struct Aligned<const N: usize>([u8; N]);
 static VALID: Aligned<{ include_bytes!("valid.actq").len() }> = Aligned(*include_bytes!("valid.actq"));
 
 #[test]
-fn an_image_that_needs_more_than_the_build_has_is_refused() {
+fn images_beyond_the_build_are_refused() {
     let all = cfg!(all(
         feature = "w2",
         feature = "w3",

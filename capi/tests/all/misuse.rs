@@ -66,7 +66,7 @@ fn null_misaligned_and_short_buffers_are_errors() {
 }
 
 #[test]
-fn structures_that_were_not_opened_or_are_copies_are_errors() {
+fn unopened_and_copied_structures_are_errors() {
     let mut program = Program::start();
     let (obs, act) = program.lengths();
     let (observation, mut action) = (vec![0.5f32; obs], vec![0.0f32; act]);
@@ -100,7 +100,7 @@ fn structures_that_were_not_opened_or_are_copies_are_errors() {
 }
 
 #[test]
-fn overlapping_buffers_are_errors_and_an_action_may_replace_its_observation() {
+fn only_action_and_observation_may_overlap() {
     let mut program = Program::start();
     let (obs, act) = program.lengths();
     let mut values = vec![0.5f32; obs.max(act)];
@@ -129,7 +129,7 @@ fn overlapping_buffers_are_errors_and_an_action_may_replace_its_observation() {
 
 /// A structure where the caller's other memory lies.
 #[test]
-fn a_structure_over_other_memory_is_an_error_before_anything_is_written() {
+fn overlapping_structures_are_refused_before_any_write() {
     let mut program = Program::start();
     let mut bytes = Box::new(Aligned(BYTES.0));
     let in_bytes = bytes.0.as_mut_ptr().wrapping_add(64);
@@ -149,7 +149,7 @@ fn a_structure_over_other_memory_is_an_error_before_anything_is_written() {
 }
 
 #[test]
-fn a_step_during_polls_is_an_error_until_the_action_or_a_reset() {
+fn a_step_during_polls_is_an_error() {
     let mut program = Program::start();
     let (obs, act) = program.lengths();
     let (observation, mut action) = (vec![0.5f32; obs], vec![0.0f32; act]);
@@ -174,7 +174,7 @@ fn a_step_during_polls_is_an_error_until_the_action_or_a_reset() {
 }
 
 #[test]
-fn a_damaged_image_and_values_that_are_not_finite_are_errors() {
+fn damaged_images_and_infinite_values_are_errors() {
     let mut damaged = Box::new(Aligned(BYTES.0));
     let middle = damaged.0.len() / 2;
     damaged.0[middle] ^= 1;

@@ -32,7 +32,7 @@ fn expected(observations: &[Vec<f32>]) -> Vec<Vec<u32>> {
 }
 
 #[test]
-fn steps_slices_and_restored_heads_have_the_bits_of_the_kernels() {
+fn steps_slices_and_restores_match_the_kernels() {
     let mut program = Program::start();
     let (obs, act) = program.lengths();
     let (observations, mut action) = (observations(obs), vec![0.0; act]);
@@ -74,7 +74,7 @@ fn steps_slices_and_restored_heads_have_the_bits_of_the_kernels() {
 }
 
 #[test]
-fn names_costs_and_numbers_are_those_of_the_image() {
+fn names_costs_and_numbers_match_the_image() {
     let mut program = Program::start();
     let expected = Image::new_checked(&BYTES.0).expect("a valid image");
     let (mut name, mut cost) = (Text { data: std::ptr::null(), len: 0 }, CCost::default());
@@ -138,7 +138,7 @@ fn every_error_of_the_kernels_has_a_code() {
 /// Another layout, or another number, needs another `ACTQ_ABI`.
 #[cfg(target_pointer_width = "64")]
 #[test]
-fn structures_and_numbers_are_those_of_the_interfaces_version() {
+fn structures_and_numbers_match_the_interface_version() {
     let sizes = [
         size_of::<ActqImage>(),
         size_of::<ActqHead>(),

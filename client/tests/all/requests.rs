@@ -161,7 +161,7 @@ fn answering(
 
 /// The controller was armed, its answer was lost, and an overrun latched: a repetition must not arm it again.
 #[test]
-fn a_controller_that_stopped_meanwhile_is_not_armed_again() {
+fn stopped_controllers_are_not_armed_again() {
     let (mut client, controller) = answering(|armings, of, message| match message {
         Message::Ask(_) => Some(Message::Status(Status {
             state: if armings == 0 { State::Disarmed } else { State::Latched },
@@ -184,7 +184,7 @@ fn a_controller_that_stopped_meanwhile_is_not_armed_again() {
 
 /// Only the token changed, as on a line that was silent: the one request did not arm.
 #[test]
-fn a_request_with_an_old_token_is_repeated_with_the_new_one() {
+fn old_tokens_are_replaced_by_new_ones() {
     let (mut client, controller) = answering(|armings, of, message| match message {
         Message::Ask(_) => Some(Message::Status(Status { token: 1 + armings as u32, ..IDLE })),
         Message::Arm { token } => {

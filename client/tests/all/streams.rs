@@ -65,7 +65,8 @@ fn a_stopped_controller_ends_the_stream() {
     });
     let error = stream(&mut client, cut, &PACE, &mut log, |_| ()).expect_err("it has latched");
     assert!(error.to_string().contains("no valid observation arrived within the deadline"), "{error:#}");
-    // A controller that is late loses the last answers with the connection, but not that to the observation before arming.
+    // A controller that is late loses the last answers with the connection, but not that to the observation before
+    // arming.
     assert!(log.rows().len() >= 30 && !log.latencies().is_empty());
 }
 

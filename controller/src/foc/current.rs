@@ -70,8 +70,9 @@ impl CurrentLoop {
     /// Computes one tick towards `target`. The voltage stays within the supply's limit. If it is not enough for both
     /// axes, d has priority, which preserves the flux.
     ///
-    /// Returns `None` without any change if a value, a gain or the supply's square is not finite, the supply is not positive,
-    /// or the angle is beyond [`MAX_RADIANS`]. The sensor is then broken, and the firmware must switch the outputs off.
+    /// Returns `None` without any change if a value, a gain or the supply's square is not finite, the supply is not
+    /// positive, or the angle is beyond [`MAX_RADIANS`]. The sensor is then broken, and the firmware must switch the
+    /// outputs off.
     pub fn step(&mut self, measured: &Measured, target: Rotor) -> Option<Tick> {
         let Measured { phases, angle, supply } = *measured;
         let [a, b, c] = phases;

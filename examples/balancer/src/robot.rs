@@ -54,8 +54,8 @@ impl Robot {
 
     /// Advances by `dt` with the motors' torques (right, left) and a horizontal push at the centre of mass.
     ///
-    /// The equations are those of a cart-pole whose cart is driven by wheels: a torque on the wheels acts on the body with
-    /// the opposite sign.
+    /// The equations are those of a cart-pole whose cart is driven by wheels: a torque on the wheels acts on the body
+    /// with the opposite sign.
     pub(crate) fn advance(&mut self, dt: f64, torques: [f64; 2], push: f64) {
         let State { speed, pitch, pitch_rate, yaw_rate, .. } = self.state;
         let [right, left] = torques.map(|torque| torque.clamp(-TORQUE_LIMIT, TORQUE_LIMIT));

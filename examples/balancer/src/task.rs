@@ -5,8 +5,8 @@ use anyhow::Result;
 
 use crate::robot::{Robot, State, TRACK, WHEEL_RADIUS};
 
-/// Values of all sensors and of the command, one after the other: angular velocity (3), orientation (4: w, x, y, z), wheel
-/// velocities (2: right, left), command (2: speed, turn rate).
+/// Values of all sensors and of the command, one after the other: angular velocity (3), orientation (4: w, x, y, z),
+/// wheel velocities (2: right, left), command (2: speed, turn rate).
 pub const RAW_LEN: usize = 11;
 
 /// Control steps a second, and simulated steps in each.

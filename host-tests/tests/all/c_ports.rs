@@ -21,7 +21,7 @@ unsafe fn text<'a>(text: Text) -> &'a [u8] {
 }
 
 #[test]
-fn inputs_go_to_their_places_and_ports_are_those_of_the_image() -> Result<()> {
+fn inputs_and_ports_follow_the_image() -> Result<()> {
     let bytes = four_bits(&Made::deployment()?.1.policy)?;
     let buffer = ImageBuffer::new(&bytes);
     let expected = buffer.image("made".as_ref())?;

@@ -286,7 +286,7 @@ fn the_command_watches_streams_and_updates() -> Result<()> {
 
 /// The noise of a recorded flow stays on the host: the controller takes observations alone, and draws its own.
 #[test]
-fn the_observations_of_a_flow_are_streamed_without_noise() -> Result<()> {
+fn flow_observations_are_streamed_without_noise() -> Result<()> {
     let (folder, recording) = folder()?;
     let path = |name: &str| folder.path().join(name).display().to_string();
     let image = flow()?;

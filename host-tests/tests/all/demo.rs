@@ -228,7 +228,7 @@ fn blanked(line: &str) -> String {
 }
 
 #[test]
-fn the_policy_by_hand_is_what_the_command_prints() -> Result<()> {
+fn the_policy_by_hand_matches_the_command() -> Result<()> {
     let document = read("docs/DEMO.md")?;
     let (_, by_hand) = document.split_once("\n## One policy by hand\n").context("no policy by hand")?;
     let dir = TempDir::new()?;

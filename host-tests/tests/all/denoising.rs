@@ -1,6 +1,6 @@
 //! Flow and diffusion policies: their steps against the textbook formulas in f64, with hoisted weights and tables that
-//! are computed when the image is built; noise; and the same bits in any slicing of a step, on the host. `on_target::denoising`
-//! has the target.
+//! are computed when the image is built; noise; and the same bits in any slicing of a step, on the host.
+//! `on_target::denoising` has the target.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};

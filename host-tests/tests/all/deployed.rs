@@ -117,7 +117,7 @@ fn gives(deployment: &Deployment, raw: &[Vec<Vec<f64>>], targets: &[f64]) -> Res
 }
 
 #[test]
-fn published_bundles_in_an_image_give_the_targets_of_their_deploy_code() -> Result<()> {
+fn images_of_bundles_give_their_codes_targets() -> Result<()> {
     for (name, answers) in PUBLISHED {
         let Some((plan, deployment, reference)) = published(name, answers)? else { return Ok(()) };
         let targets = reference.array("target").context("no targets")?;
@@ -223,7 +223,7 @@ impl Made {
 }
 
 #[test]
-fn every_operation_in_an_image_gives_what_the_description_says() -> Result<()> {
+fn every_operation_matches_its_description() -> Result<()> {
     let (plan, deployment) = Made::deployment()?;
     let raw = Made::raw(150);
     let mut runner = Runner::new(plan);
@@ -233,7 +233,7 @@ fn every_operation_in_an_image_gives_what_the_description_says() -> Result<()> {
 }
 
 #[test]
-fn an_image_names_its_inputs_its_targets_and_their_joints() -> Result<()> {
+fn images_name_inputs_targets_and_joints() -> Result<()> {
     let bytes = four_bits(&Made::deployment()?.1.policy)?;
     let buffer = ImageBuffer::new(&bytes);
     let found: Vec<_> = buffer.image(Path::new("new"))?.ports().map(|p| (p.kind, p.name, p.len, p.names)).collect();
@@ -262,7 +262,7 @@ fn balanced(episodes: u64, mut step: impl FnMut(Option<&[f32]>) -> Result<Vec<f3
 
 /// The bundle of the repository keeps the robot up: as it is described, and as an image.
 #[test]
-fn the_balancer_stands_by_its_description_and_by_an_image() -> Result<()> {
+fn description_and_image_balance_the_robot() -> Result<()> {
     const EPISODES: u64 = 10;
     let folder = actq_balancer::bundle();
     let bundle = Bundle::open(folder)?;
@@ -292,7 +292,7 @@ fn the_balancer_stands_by_its_description_and_by_an_image() -> Result<()> {
 }
 
 #[test]
-fn slices_resets_and_restored_states_of_a_description_have_the_same_bits() -> Result<()> {
+fn sliced_and_restored_descriptions_have_the_same_bits() -> Result<()> {
     let bytes = four_bits(&Made::deployment()?.1.policy)?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(Path::new("new"))?;

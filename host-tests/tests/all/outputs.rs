@@ -165,7 +165,7 @@ fn writing_to_a_link_writes_its_target() -> Result<()> {
 }
 
 #[test]
-fn an_image_does_not_replace_a_file_of_another_kind() -> Result<()> {
+fn images_replace_no_files_of_other_kinds() -> Result<()> {
     let fixture = Fixture::new()?;
     let out = fixture.path("train.py");
     fs::write(&out, "import torch\n")?;

@@ -67,8 +67,8 @@ fn statistics_sum_to_the_image_and_explain_widths() -> Result<()> {
         ensure!(shares.values().is_sorted_by(|a, b| a > b), "{shares:?}");
         ensure!(allocation.importance.iter().all(|h| *h > 0.0));
     }
-    // All matrices but the last make elements of one residual stream: they lose the same ones, and the others keep their
-    // order.
+    // All matrices but the last make elements of one residual stream: they lose the same ones, and the others keep
+    // their order.
     let without: usize = stats.matrices.iter().flat_map(|m| &m.widths).filter(|w| **w == 0).count();
     let [first, blocks @ .., last] = &stats.matrices[..] else { bail!("fewer than two matrices") };
     ensure!(last.image_rows.iter().copied().eq(0..last.rows));

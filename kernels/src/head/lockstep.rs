@@ -1,5 +1,5 @@
-//! A step that its caller runs operation by operation. Many heads of one image can then run each operation together, and
-//! the caller can compute an operation itself.
+//! A step that its caller runs operation by operation. Many heads of one image can then run each operation together,
+//! and the caller can compute an operation itself.
 
 use super::step::to_next_op;
 use super::{Head, Phase};

@@ -19,8 +19,8 @@ impl Head<'_, '_> {
     ///
     /// # Errors
     ///
-    /// [`StepError::ObservationLength`], [`StepError::ObservationNotFinite`] and [`StepError::ObservationRange`] for the
-    /// observation;
+    /// [`StepError::ObservationLength`], [`StepError::ObservationNotFinite`] and [`StepError::ObservationRange`] for
+    /// the observation;
     /// [`StepError::NotFinite`] if a value inside the network exceeds f32's range, [`StepError::Damaged`] if the
     /// image's memory has changed since its check, [`StepError::Stale`] if the action is older than its deadline.
     ///
@@ -59,8 +59,8 @@ impl Head<'_, '_> {
 
     /// Runs a slice of the step that has begun: at most `budget` instructions by the cost model
     /// ([`crate::Image::step_cost`]). It returns the action as soon as it is ready. Without a step that has begun, it
-    /// returns the last action again, and fails if there is none since the start or a reset. A step that continues a chunk
-    /// has little to do and is ready at the first poll. A budget of 2^28 or more is no limit.
+    /// returns the last action again, and fails if there is none since the start or a reset. A step that continues a
+    /// chunk has little to do and is ready at the first poll. A budget of 2^28 or more is no limit.
     ///
     /// The cost model is that of the build for thumbv7em-none-eabihf; on other targets a step is cut in the same
     /// places. However a step is cut, its bits are the same.
@@ -110,9 +110,9 @@ impl Head<'_, '_> {
         Ok(self.floats(self.image.action()))
     }
 
-    /// Computes the network's raw output for `observation` (`chunk * act_len` values), before the action contract. Values
-    /// that overflowed are NaN or infinite, not an error. It advances the recurrent state, and drops the rest of a chunk
-    /// and a step that has begun.
+    /// Computes the network's raw output for `observation` (`chunk * act_len` values), before the action contract.
+    /// Values that overflowed are NaN or infinite, not an error. It advances the recurrent state, and drops the rest of
+    /// a chunk and a step that has begun.
     ///
     /// # Errors
     ///

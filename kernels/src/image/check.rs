@@ -176,8 +176,8 @@ impl<'a> Image<'a> {
             let [name, words, names] = self.port_texts(i);
             front.take(name, words)?;
             let port = self.port_without_names(i).ok_or(ImageError::Ports)?;
-            // A port without a list of its own may name that of an earlier port, the last that there was. A list is read
-            // once, so that the time is linear in the image's length.
+            // A port without a list of its own may name that of an earlier port, the last that there was. A list is
+            // read once, so that the time is linear in the image's length.
             if names != 0 && names != list {
                 front.take(names, 1)?;
                 front.take(names + 1, (self.word(names) as usize).div_ceil(4))?;

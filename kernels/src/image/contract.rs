@@ -23,8 +23,8 @@ impl<'a> Image<'a> {
         }
     }
 
-    /// Returns the lower and upper limit of action value `i`, if the contract has one of them; the other is infinite. (If
-    /// it limits only other values, f32's largest number means no limit.)
+    /// Returns the lower and upper limit of action value `i`, if the contract has one of them; the other is infinite.
+    /// (If it limits only other values, f32's largest number means no limit.)
     pub fn limits(&self, i: usize) -> Option<[f32; 2]> {
         if i >= self.act_len() {
             return None;

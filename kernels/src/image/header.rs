@@ -111,8 +111,8 @@ header! { |header|
     W_MATRICES = 28: matrices Whole = header.matrices.offset as usize;
     /// u16 number of matrices, u16 chunks that a temporal ensemble averages for an action, or 0.
     W_MATRIX_COUNT = 29: matrix_count Low = header.matrices.count, horizon High = header.horizon;
-    /// u16 first operation that every denoising step runs, u16 denoising steps; both 0 if an evaluation runs the network
-    /// one time.
+    /// u16 first operation that every denoising step runs, u16 denoising steps; both 0 if an evaluation runs the
+    /// network one time.
     W_DENOISING = 30: first_denoising_op Low = header.first_denoising_op, denoising_steps High = header.denoising_steps;
     /// u16 actions that blend one chunk into the next, u16 age from which on an action never plays; 0 for none.
     W_PLAYBACK = 31: overlap Low = header.overlap, deadline High = header.deadline;

@@ -193,7 +193,8 @@ pub(super) struct Uses {
     /// Lengths of `src` and of the third region; 0 for none. (Linear has its own length.)
     src: u8,
     third: u8,
-    /// Single constants, and arrays after them. (A table has one array for each denoising step, a row one for each row.)
+    /// Single constants, and arrays after them. (A table has one array for each denoising step, a row one for each
+    /// row.)
     pub(super) constants: u8,
     pub(super) arrays: u8,
     /// Passes over the elements; a slice may end inside each of them.

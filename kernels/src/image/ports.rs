@@ -1,5 +1,5 @@
-//! The raw inputs and the targets of an image with operations around its network: names, lengths and ranges. The section
-//! follows the self-test vector.
+//! The raw inputs and the targets of an image with operations around its network: names, lengths and ranges. The
+//! section follows the self-test vector.
 
 use super::text::is_text;
 use super::view::Image;

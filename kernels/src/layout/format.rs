@@ -102,8 +102,8 @@ pub trait Format {
     #[cfg(feature = "writer")]
     const CODE_BITS: u32 = (1 << Self::WIDTH.bits()) - 1;
 
-    /// Returns the place of the code at (`row`, `col`) of a cell: the index of its part ([`Self::parts`]), its first bit
-    /// there, modulo 32, and the bits of the code that are stored inverted.
+    /// Returns the place of the code at (`row`, `col`) of a cell: the index of its part ([`Self::parts`]), its first
+    /// bit there, modulo 32, and the bits of the code that are stored inverted.
     #[cfg(feature = "writer")]
     fn place(row: usize, col: usize) -> (usize, usize, u32);
 

@@ -75,7 +75,8 @@ impl Width {
         if built == 1 && !cfg!(feature = "writer") { Self::ALL.split_at(only).1.split_at(1).0 } else { &Self::ALL }
     };
 
-    /// Returns the width's index in a table. (No block has a width that the build does not: `image::matrix` refuses it.)
+    /// Returns the width's index in a table. (No block has a width that the build does not: `image::matrix` refuses
+    /// it.)
     #[inline(always)]
     pub(crate) const fn index(self) -> usize {
         if Self::IN_TABLES.len() == 1 { 0 } else { self as usize }

@@ -99,8 +99,8 @@ impl Function {
         }
     }
 
-    /// Applies the function to every element, as [`Function::apply`] does, in a loop of its own that is inlined: a caller that
-    /// is compiled for vectors gets a loop of vectors.
+    /// Applies the function to every element, as [`Function::apply`] does, in a loop of its own that is inlined: a
+    /// caller that is compiled for vectors gets a loop of vectors.
     #[cfg(feature = "writer")]
     #[inline(always)]
     pub fn apply_inlined(self, x: &mut [f32]) {

@@ -286,8 +286,8 @@ fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, us
     }
 }
 
-/// Counts the features of a linear operation before its blocks; `apart` says how outputs are initialized that the blocks
-/// do not initialize themselves.
+/// Counts the features of a linear operation before its blocks; `apart` says how outputs are initialized that the
+/// blocks do not initialize themselves.
 fn begin_linear([rows, cols]: [usize; 2], apart: Option<OutputStart>, add: &mut dyn FnMut(Feature, usize)) {
     add(Feature::operation(op::LINEAR), 1);
     magnitude(cols, add);

@@ -87,7 +87,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn a_network_of_all_operations_has_the_bits_of_heads(seed in any::<u64>(), count in 1usize..=130) {
+    fn all_operations_have_the_bits_of_heads(seed in any::<u64>(), count in 1usize..=130) {
         let outcome = images::network(seed).and_then(|bytes| same_bits(&bytes, count, seed));
         prop_assert!(outcome.is_ok(), "{outcome:?}");
     }
@@ -105,7 +105,7 @@ proptest! {
     }
 
     #[test]
-    fn operations_around_a_network_have_the_bits_of_heads(seed in any::<u64>(), count in 1usize..=70) {
+    fn around_operations_have_the_bits_of_heads(seed in any::<u64>(), count in 1usize..=70) {
         let outcome = images::around(seed).and_then(|bytes| same_bits(&bytes, count, seed));
         prop_assert!(outcome.is_ok(), "{outcome:?}");
     }
@@ -117,7 +117,7 @@ fn products_that_accumulate_have_the_bits_of_heads() -> Result<()> {
 }
 
 #[test]
-fn the_number_of_threads_does_not_change_the_bits() -> Result<()> {
+fn thread_counts_do_not_change_the_bits() -> Result<()> {
     let bytes = images::network(3)?;
     for threads in [1, 3, 8] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;

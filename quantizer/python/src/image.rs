@@ -225,8 +225,8 @@ impl Image {
         .or_raise()
     }
 
-    /// Returns the same network for `actq.FakeQuant`: inputs, outputs, constants, and nodes as (operator, inputs, output,
-    /// attributes, magnitude to which the first input is rounded).
+    /// Returns the same network for `actq.FakeQuant`: inputs, outputs, constants, and nodes as (operator, inputs,
+    /// output, attributes, magnitude to which the first input is rounded).
     fn network<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let network = export::network(&self.image()?).or_raise()?;
         let dict = PyDict::new(py);

@@ -79,8 +79,8 @@ fn append(object: &Bound<'_, PyAny>, name: &Path, to: &mut Vec<Passed>) -> PyRes
     Ok(())
 }
 
-/// Splits `(observations, starts)` into the observations of each episode. `starts[i]` is true if step i is the first of an
-/// episode; so is step 0.
+/// Splits `(observations, starts)` into the observations of each episode. `starts[i]` is true if step i is the first of
+/// an episode; so is step 0.
 fn episodes(pair: &Bound<'_, PyTuple>, name: &Path) -> PyResult<Vec<Tensor>> {
     let shown = name.display();
     let wrong = || error!("{shown} is a tuple of {} items; pass (observations, starts)", pair.len());

@@ -104,9 +104,9 @@ impl Core {
         fs::read(&file).with_context(|| file.display().to_string())
     }
 
-    /// Writes the package to `out`: an archive if its name ends in `.zip`, otherwise a folder. Neither may exist before,
-    /// but for an empty folder. The library runs any image, or only images that need no other features of the kernels
-    /// than `image`; its loops are short if `compact`.
+    /// Writes the package to `out`: an archive if its name ends in `.zip`, otherwise a folder. Neither may exist
+    /// before, but for an empty folder. The library runs any image, or only images that need no other features of the
+    /// kernels than `image`; its loops are short if `compact`.
     ///
     /// # Errors
     ///
@@ -229,8 +229,8 @@ fn licences(files: &mut Files) -> Result<Vec<Value>> {
     Ok(parts)
 }
 
-/// Adds the licences in a crate's folder; returns their names. Some crates have none; the texts of MIT and Apache-2.0 are
-/// at the top of the package.
+/// Adds the licences in a crate's folder; returns their names. Some crates have none; the texts of MIT and Apache-2.0
+/// are at the top of the package.
 fn licences_of(name: &str, folder: &Path, files: &mut Files) -> Result<Vec<String>> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder)? {

@@ -5,10 +5,10 @@
 //! known exactly as well. `instruction.rs` has the cost of each. It is a model.
 //!
 //! A board's flash has wait states. The counter plays every instruction and load in order through the caches of an
-//! STM32F4 (see `tools/xtask/insn-count`), so the missed lines are exact for initially empty caches. A line costs the flash's
-//! wait states; the next line of code is prefetched while the current one is executed, one cycle per instruction. That
-//! is a model, too: fetches of code and data do not delay each other, and RAM has no wait states. An STM32F405 at 168
-//! MHz has 5 wait states.
+//! STM32F4 (see `tools/xtask/insn-count`), so the missed lines are exact for initially empty caches. A line costs the
+//! flash's wait states; the next line of code is prefetched while the current one is executed, one cycle per
+//! instruction. That is a model, too: fetches of code and data do not delay each other, and RAM has no wait states. An
+//! STM32F405 at 168 MHz has 5 wait states.
 
 use std::collections::BTreeMap;
 use std::path::Path;

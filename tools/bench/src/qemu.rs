@@ -152,8 +152,8 @@ impl Counter {
         Ok(())
     }
 
-    /// Runs a firmware that ends by itself with this standard input, as [`command_on`] without arguments. Returns its output and the
-    /// regions; the firmware must succeed.
+    /// Runs a firmware that ends by itself with this standard input, as [`command_on`] without arguments. Returns its
+    /// output and the regions; the firmware must succeed.
     pub fn run(&self, target: Target, elf: &Path, slot: Option<&Path>, input: &[u8]) -> Result<(String, Vec<Region>)> {
         let mut command = command_on(target, elf, slot, "")?;
         self.attach(&mut command, elf)?;

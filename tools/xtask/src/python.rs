@@ -101,8 +101,8 @@ fn test(optional: bool, pytest: &[String]) -> Result<()> {
     run(Command::new(&python).current_dir(&package).args(["-m", "mypy"]))
 }
 
-/// Builds the motor controller, and returns the words of a command that runs it in QEMU, one a line, with its serial port
-/// at the socket `{socket}`. Returns `None` if QEMU is not installed.
+/// Builds the motor controller, and returns the words of a command that runs it in QEMU, one a line, with its serial
+/// port at the socket `{socket}`. Returns `None` if QEMU is not installed.
 fn controller() -> Result<Option<String>> {
     let Some(board) = Target::on(BOARD).filter(|target| version(target.board().emulator).is_ok()) else {
         return Ok(None);

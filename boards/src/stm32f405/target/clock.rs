@@ -77,8 +77,8 @@ fn fast(rcc: &pac::RCC, flash: &pac::FLASH, power: &pac::PWR) -> bool {
         return false;
     }
     // If the crystal stops, the part goes on from the internal oscillator, the power stage's outputs go off (section
-    // 17.3.12), and a non-maskable interrupt comes, whose handler in the application resets. A handler that returns must
-    // clear the flag (CSSC).
+    // 17.3.12), and a non-maskable interrupt comes, whose handler in the application resets. A handler that returns
+    // must clear the flag (CSSC).
     rcc.cr().modify(|_, w| w.csson().set_bit());
     true
 }

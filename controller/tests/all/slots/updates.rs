@@ -90,7 +90,7 @@ impl NorFlash for Failing<'_> {
 
 /// An update that was refused because one write failed does not run after the next start.
 #[test]
-fn an_update_whose_flash_failed_is_not_tried_at_the_next_start() {
+fn failed_updates_are_not_tried_at_start() {
     let (old, new) = (Image::new(40, 1, true), Image::new(40, 2, true));
     let mut refused = 0;
     for write in 0.. {

@@ -16,8 +16,8 @@ const FIRST_SEED: u64 = 100_000;
 const NOISE: f64 = 0.15;
 const MEMORY: f64 = 0.9;
 
-/// Writes `raw [step, 11]`, `applied [step, 2]` (torques), `torque [step, 2]` (the expert's) and `first [step, 1]` (1 where
-/// an episode begins) to the file that the argument names.
+/// Writes `raw [step, 11]`, `applied [step, 2]` (torques), `torque [step, 2]` (the expert's) and `first [step, 1]` (1
+/// where an episode begins) to the file that the argument names.
 fn main() -> Result<()> {
     let path = env::args().nth(1).context("usage: balancer-record FILE.npz")?;
     let (mut raw, mut applied, mut torque, mut first) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());

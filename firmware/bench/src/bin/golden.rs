@@ -1,5 +1,5 @@
-//! Replays golden kernel cases from standard input (see `tools/bench/src/golden.rs`) through the compiled backend and the
-//! portable one, and fails at the first sum that differs.
+//! Replays golden kernel cases from standard input (see `tools/bench/src/golden.rs`) through the compiled backend and
+//! the portable one, and fails at the first sum that differs.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(not(target_os = "none"))]

@@ -86,7 +86,7 @@ fn expect(path: &Path, newest_first: bool) -> Result<()> {
 }
 
 #[test]
-fn a_bundle_without_answers_is_asked_about_and_nothing_is_written() -> Result<()> {
+fn open_questions_are_asked_before_any_write() -> Result<()> {
     let robot = Robot::new(YAML)?;
     let output = run(robot.import("out", &[]), b"")?;
     let (asked, error) = (String::from_utf8(output.stdout)?, String::from_utf8(output.stderr)?);
@@ -287,7 +287,7 @@ fn bad_bundles_are_refused_by_file_and_key() -> Result<()> {
 }
 
 #[test]
-fn descriptions_that_leave_their_folder_and_wrong_options_are_refused() -> Result<()> {
+fn foreign_paths_and_wrong_options_are_refused() -> Result<()> {
     let robot = Robot::new(YAML)?;
     succeeded(&run(robot.import("out", &["--accept-profile"]), b"")?)?;
     let again = run(robot.import("out", &["--accept-profile"]), b"")?;

@@ -32,7 +32,7 @@ pub(super) fn compiles(command: &mut Command) -> Result<()> {
 }
 
 #[test]
-fn constants_compile_and_have_the_places_of_inputs_targets_and_joints() -> Result<()> {
+fn compiled_constants_index_inputs_targets_and_joints() -> Result<()> {
     let dir = TempDir::new()?;
     let path = |name: &str| dir.path().join(name);
     let written = |name: &str| text(&path(name));
@@ -92,7 +92,7 @@ pub(super) fn has_compiler(file: &Path, standard: &str) -> Result<bool> {
 }
 
 #[test]
-fn constants_are_refused_for_other_languages_and_without_gains() -> Result<()> {
+fn constants_need_a_language_and_gains() -> Result<()> {
     let dir = TempDir::new()?;
     let path = |name: &str| text(&dir.path().join(name));
     fs::write(dir.path().join("made.actq"), four_bits(&Made::deployment()?.1.policy)?)?;

@@ -31,7 +31,7 @@ fn numbers(source: &str, array: &str) -> Vec<u32> {
 }
 
 #[test]
-fn exported_sources_compile_and_have_the_image_and_the_actions_of_this_host() -> Result<()> {
+fn exported_sources_have_the_hosts_image_and_actions() -> Result<()> {
     let dir = TempDir::new()?;
     let at = |name: &str| dir.path().join(name);
     let bytes = four_bits(&Made::deployment()?.1.policy)?;
@@ -84,7 +84,7 @@ fn exported_sources_compile_and_have_the_image_and_the_actions_of_this_host() ->
 }
 
 #[test]
-fn names_that_are_no_identifiers_and_files_that_are_no_images_are_refused() -> Result<()> {
+fn invalid_names_and_images_are_refused() -> Result<()> {
     let dir = TempDir::new()?;
     let at = |name: &str| text(&dir.path().join(name));
     fs::write(dir.path().join("made.actq"), four_bits(&Made::deployment()?.1.policy)?)?;

@@ -1,5 +1,5 @@
-//! Options that name a file, a folder or a board: what is missing, malformed or of another kind is refused with the remedy,
-//! before any work.
+//! Options that name a file, a folder or a board: what is missing, malformed or of another kind is refused with the
+//! remedy, before any work.
 
 use std::fs;
 #[cfg(unix)]
@@ -21,7 +21,7 @@ fn with_image() -> Result<Robot> {
 }
 
 #[test]
-fn missing_and_malformed_files_are_named_with_the_remedy() -> Result<()> {
+fn bad_files_are_named_with_the_remedy() -> Result<()> {
     let robot = with_image()?;
     let names = ["bundle", "new", "head.actq", "made.h", "none", "text", "raw.npz", "out/deploy.toml"];
     let [bundle, new, image, header, none, malformed, raw, description] = names.map(|name| text(&robot.path(name)));

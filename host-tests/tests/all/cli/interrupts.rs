@@ -97,7 +97,7 @@ fn a_drive_may_handle_the_signal() -> Result<()> {
 }
 
 #[test]
-fn a_second_signal_kills_a_drive_that_ignores_it() -> Result<()> {
+fn a_second_signal_kills_the_drive() -> Result<()> {
     let fixture = Fixture::with_long_recording()?;
     let drive = "trap 'touch heard' TERM; touch started; while :; do sleep 0.01; done";
     let mut child = start_tune(&fixture, actq(&[]), drive)?;

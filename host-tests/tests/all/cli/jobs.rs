@@ -247,7 +247,7 @@ fn task_of(statuses: &[i32]) -> Result<(bool, Option<i32>)> {
 }
 
 #[test]
-fn a_slurm_task_is_queued_again_if_one_of_its_jobs_may_succeed() -> Result<()> {
+fn slurm_tasks_that_may_succeed_are_queued_again() -> Result<()> {
     for (statuses, expected) in [
         (&[0, 0][..], (false, Some(0))),
         (&[0, 1], (false, Some(1))),
@@ -263,7 +263,7 @@ fn a_slurm_task_is_queued_again_if_one_of_its_jobs_may_succeed() -> Result<()> {
 }
 
 #[test]
-fn a_plan_without_its_merge_is_refused_before_it_runs() -> Result<()> {
+fn plans_without_a_merge_are_refused() -> Result<()> {
     let sweep = Sweep::new()?;
     let plan = succeeded(&sweep.run("plan sweep.toml", "")?)?;
     let (jobs, merge): (Vec<&str>, Vec<&str>) = plan.lines().partition(|line| !line.contains("\"kind\":\"merge\""));

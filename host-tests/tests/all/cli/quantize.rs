@@ -218,7 +218,7 @@ fn choices_of_actquant_reach_the_image() -> Result<()> {
 }
 
 #[test]
-fn actquant_is_refused_with_the_command_that_has_it() -> Result<()> {
+fn actquant_is_refused_with_its_command() -> Result<()> {
     let folder = TempDir::new()?;
     let out = folder.path().join("image.actq");
     let mut quantize = actq(&["quantize", "--method", "actquant", "--out"]);

@@ -267,7 +267,7 @@ fn damaged_images_are_refused_by_every_command() -> Result<()> {
 /// The disk is full. clap prints the first three by itself.
 #[cfg(target_os = "linux")]
 #[test]
-fn an_output_that_cannot_be_written_is_an_error() -> Result<()> {
+fn unwritable_outputs_are_errors() -> Result<()> {
     let fixture = Fixture::new()?;
     let image = text(&fixture.image("")?);
     let commands: [&[&str]; 5] =

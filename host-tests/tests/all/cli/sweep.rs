@@ -32,7 +32,7 @@ fn sweep_accepts_named_recordings() -> Result<()> {
 /// After an error of the sweep itself no job starts, and it ends after the workers that run.
 #[test]
 #[cfg(target_os = "linux")]
-fn no_worker_outlives_a_sweep_that_cannot_write_its_log() -> Result<()> {
+fn no_worker_outlives_a_sweep_without_log() -> Result<()> {
     let fixture = Fixture::new()?;
     let (policy, store) = (text(&fixture.policy()), fixture.out("store"));
     let line = "--methods rtn --bpw 2,3,4 --threads 2 --log /dev/full --store";

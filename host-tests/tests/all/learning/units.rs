@@ -171,7 +171,7 @@ fn units_do_not_change_the_error() -> Result<()> {
 /// Columns in a row keep the error in every network, scattered ones in the mean over the networks: there, constants of
 /// most columns are stored, and one network's error varies by more than the ratio leaves.
 #[test]
-fn units_do_not_change_the_error_of_a_small_network() -> Result<()> {
+fn units_do_not_change_a_networks_error() -> Result<()> {
     let units = |scale: f32, is_scaled: &dyn Fn(usize) -> bool| -> Vec<f32> {
         (0..SMALL_OBS).map(|i| if is_scaled(i) { scale } else { 1.0 }).collect()
     };

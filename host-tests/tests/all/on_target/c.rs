@@ -87,7 +87,7 @@ pub(super) fn shell(dir: &TempDir, commands: &str) -> Result<String> {
 }
 
 #[test]
-fn the_commands_of_the_document_give_the_hosts_bits() -> Result<()> {
+fn the_documents_commands_give_the_hosts_bits() -> Result<()> {
     let Some(dir) = folder(Runs::AnyImage)? else { return Ok(()) };
     let at = |name: &str| dir.path().join(name);
     let document = fs::read_to_string(root().join("docs/C.md"))?;
@@ -137,7 +137,7 @@ fn keeps_its_stack(program: &Path, functions: &[&str]) -> Result<()> {
 const CODE_LIMIT_OF_ONE: u64 = 17 << 10;
 
 #[test]
-fn a_library_for_one_image_is_smaller_and_gives_the_same_bits() -> Result<()> {
+fn a_library_for_one_image_is_smaller() -> Result<()> {
     let Some(dir) = folder(Runs::ThisImage)? else { return Ok(()) };
     let document = fs::read_to_string(root().join("docs/C.md"))?;
     let printed = shell(&dir, &listings(&document, "sh")[..2].concat())?;
@@ -173,28 +173,28 @@ const OPEN: [&str; 2] = ["actq_image_open", "actq_image_open_checksummed"];
 type Limits = [u64; OPEN.len()];
 
 #[test]
-fn a_library_for_an_mlp_of_2_bits_is_small() -> Result<()> {
+fn a_library_of_2_bits_is_small() -> Result<()> {
     library_takes_at_most([14 << 10, 23 << 9], &[Width::W2], Function::Elu, "w2 paired elu")
 }
 
 #[test]
-fn a_library_for_an_mlp_of_4_bits_is_small() -> Result<()> {
+fn a_library_of_4_bits_is_small() -> Result<()> {
     library_takes_at_most([14 << 10, 23 << 9], &[Width::W4], Function::Elu, "w4 paired elu")
 }
 
 #[test]
-fn a_library_for_an_mlp_of_3_4_and_8_bits_is_small() -> Result<()> {
+fn a_library_of_3_4_8_bits_is_small() -> Result<()> {
     let widths = [Width::W3, Width::W4, Width::W8];
     library_takes_at_most([17 << 10, 14 << 10], &widths, Function::Silu, "w3 w4 w8 paired silu")
 }
 
 #[test]
-fn a_library_for_an_mlp_of_all_widths_is_small() -> Result<()> {
+fn a_library_of_all_widths_is_small() -> Result<()> {
     library_takes_at_most([18 << 10, 31 << 9], &Width::ALL, Function::Silu, "w2 w3 w4 w8 paired silu")
 }
 
 #[test]
-fn a_compact_library_for_an_mlp_of_all_widths_is_smaller() -> Result<()> {
+fn a_compact_library_of_all_widths_is_smaller() -> Result<()> {
     library_takes_at_most([33 << 9, 14 << 10], &Width::ALL, Function::Silu, "w2 w3 w4 w8 paired silu compact")
 }
 
@@ -277,7 +277,7 @@ int main(void) {
 const CALL_LIMIT: u64 = 200;
 
 #[test]
-fn a_step_from_c_costs_what_one_from_rust_does() -> Result<()> {
+fn steps_cost_the_same_from_c() -> Result<()> {
     let Some(dir) = folder(Runs::AnyImage)? else { return Ok(()) };
     let buffer = ImageBuffer::read(firmware::built_in()?)?;
     let image = buffer.image(firmware::built_in()?)?;
@@ -313,7 +313,7 @@ fn text(path: &Path) -> String {
 }
 
 #[test]
-fn the_link_client_in_c_arms_a_controller_and_reads_its_actions() -> Result<()> {
+fn the_c_client_arms_and_reads_actions() -> Result<()> {
     const ACTIONS: usize = 20;
     if !is_installed("cc") {
         skipped("cc is not installed");

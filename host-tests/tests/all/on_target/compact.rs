@@ -15,7 +15,8 @@ fn short_loops_give_the_golden_sums() -> Result<()> {
     gives_the_sums_in(&firmware::compact_binary("golden")?, Target::Fpu, &actq_bench::golden::cases(1), "Armv7em")
 }
 
-/// Upper limits of the ratio of short loops to the usual ones, of a whole call's instructions and modelled cycles, by bits.
+/// Upper limits of the ratio of short loops to the usual ones, of a whole call's instructions and modelled cycles, by
+/// bits.
 const LIMITS: [(&str, f64); 3] = [("3", 1.06), ("4", 1.10), ("8", 1.14)];
 
 #[test]

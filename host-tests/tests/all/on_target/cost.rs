@@ -45,7 +45,8 @@ fn observations(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
     Ok(all.iter().step_by(all.len() / STEPS).take(STEPS).cloned().collect())
 }
 
-/// Compares a predicted cost with the mean of counted ones, up to a relative error; returns the mean of the instructions.
+/// Compares a predicted cost with the mean of counted ones, up to a relative error; returns the mean of the
+/// instructions.
 fn near(what: &str, predicted: Cost, counted: &[Cost], limit: f64) -> Result<f64> {
     let mean = |of: fn(&Cost) -> u64| counted.iter().map(of).sum::<u64>() as f64 / counted.len() as f64;
     let instructions = mean(|c| c.instructions);
@@ -138,8 +139,8 @@ fn steps_of_shared_policies_match_the_prediction() -> Result<()> {
     Ok(())
 }
 
-/// Runs every image in polls of several budgets, which depend on the image's least one: each poll stays within its budget,
-/// and the actions have the host's bits. Returns the number of budgets that were not below the least.
+/// Runs every image in polls of several budgets, which depend on the image's least one: each poll stays within its
+/// budget, and the actions have the host's bits. Returns the number of budgets that were not below the least.
 pub(super) fn polls_keep_their_budget(
     elf: &Path,
     dir: &Path,

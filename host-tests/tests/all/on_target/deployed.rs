@@ -40,7 +40,7 @@ fn published_bundles_have_the_bits_of_the_host() -> Result<()> {
 
 /// The cost model knows the operations around a network: whole steps, and polls of the least budget.
 #[test]
-fn steps_and_polls_of_a_description_match_the_prediction() -> Result<()> {
+fn steps_and_polls_match_the_prediction() -> Result<()> {
     let bytes = four_bits(&Made::deployment()?.1.policy)?;
     let raw = &single(&Made::raw(24))[..24];
     let buffer = ImageBuffer::new(&bytes);

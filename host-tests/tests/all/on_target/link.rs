@@ -100,8 +100,8 @@ fn serve_answers_a_simulator_then_disarms() -> Result<()> {
     failed(&link(&controller, &["serve"], &step_request(&observation)[..9])?, 1, &["ended inside an observation"])
 }
 
-/// It sends requests until QEMU's socket and the port's queue are full, and is silent. The board drops answers for longer
-/// than the watchdog timeout of its own time: QEMU may run slowly, so the host is silent for longer and longer.
+/// It sends requests until QEMU's socket and the port's queue are full, and is silent. The board drops answers for
+/// longer than the watchdog timeout of its own time: QEMU may run slowly, so the host is silent for longer and longer.
 #[test]
 fn a_host_that_never_reads_causes_no_reset() -> Result<()> {
     let (controller, _slot) = start()?;
@@ -149,8 +149,8 @@ fn arrived(port: &mut dyn Port) -> Result<Vec<u8>> {
     }
 }
 
-/// The board goes away while it serves a simulator: the command reports it after its timeout. QEMU may not answer within
-/// that before, so the timeout doubles until it does.
+/// The board goes away while it serves a simulator: the command reports it after its timeout. QEMU may not answer
+/// within that before, so the timeout doubles until it does.
 #[test]
 fn a_cut_line_is_reported() -> Result<()> {
     let (controller, slot) = start()?;

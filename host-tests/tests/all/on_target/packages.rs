@@ -57,7 +57,7 @@ fn check_common(package: &Path) -> Result<()> {
 
 /// Cargo gives the libraries of all features one name.
 #[test]
-fn packages_that_are_made_together_have_their_own_libraries() -> Result<()> {
+fn packages_have_their_own_libraries() -> Result<()> {
     let file = firmware::built_in()?;
     let buffer = ImageBuffer::read(file)?;
     let image = buffer.image(file)?;

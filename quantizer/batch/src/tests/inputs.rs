@@ -20,7 +20,7 @@ fn batch() -> Result<(Batch, Vec<f32>, Vec<f32>)> {
 }
 
 #[test]
-fn an_image_that_is_none_and_a_batch_of_no_heads_are_refused() -> Result<()> {
+fn invalid_images_and_empty_batches_are_refused() -> Result<()> {
     let image = images::products(1)?;
     assert_eq!(Batch::new(&[], 1).err(), Some(Error::Image(ImageError::TooShort)));
     assert_eq!(Batch::new(&image[1..], 1).err().map(|error| error.source().is_some()), Some(true));

@@ -108,7 +108,8 @@ fn python_with(modules: &str) -> Option<OsString> {
     None
 }
 
-/// Runs `actq import --check` on a file with these initializers, the observation `obs`, and one layer of 20 values before the last one.
+/// Runs `actq import --check` on a file with these initializers, the observation `obs`, and one layer of 20 values
+/// before the last one.
 fn checked(python: impl AsRef<OsStr>, initializers: &[proto::Tensor], layer: &str) -> Result<Output> {
     let dir = TempDir::new()?;
     let mut file = File::default();

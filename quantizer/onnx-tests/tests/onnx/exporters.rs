@@ -19,8 +19,8 @@ fn of_input(name: &str, dims: &[i64], text: &str, len: usize) -> Vec<u8> {
 
 #[test]
 fn layers_of_constants_are_folded() -> Result<()> {
-    // The time of a denoising step that the exporter wrote as a constant, with its embedding and layers; then beside the observation,
-    // through one function.
+    // The time of a denoising step that the exporter wrote as a constant, with its embedding and layers; then beside
+    // the observation, through one function.
     let folded = "x = gemm(drawn(1, 4), 8, 4)
                   x = HardSigmoid(Tanh(LeakyRelu(Softplus(Elu(x * Erf(x))))))
                   w = drawn(8)

@@ -1,9 +1,10 @@
 //! A notation for graphs.
 //!
-//! A line is an expression: `Op(value, attribute=1)`, `a + b`, `a - b`, `a * b`, `a / b`, or a value. A value is a name, a real scalar
-//! `0.5`, integers `[1, 4]`, reals `[0.5, 1.0]`, random weights `drawn(3, 4)` of a shape, `full(0.5, 3, 4)` of one number and a shape, or
-//! a layer `gemm(x, 3, 4)` of rows and columns. An argument may be empty. `name = ..` names a value within the text, `name := ..` and
-//! `first, second := ..` name the outputs of a node in the file.
+//! A line is an expression: `Op(value, attribute=1)`, `a + b`, `a - b`, `a * b`, `a / b`, or a value. A value is a
+//! name, a real scalar `0.5`, integers `[1, 4]`, reals `[0.5, 1.0]`, random weights `drawn(3, 4)` of a shape,
+//! `full(0.5, 3, 4)` of one number and a shape, or a layer `gemm(x, 3, 4)` of rows and columns. An argument may be
+//! empty. `name = ..` names a value within the text, `name := ..` and `first, second := ..` name the outputs of a node
+//! in the file.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -23,7 +24,8 @@ struct Reader<'f, 't> {
 }
 
 impl File {
-    /// Adds the nodes of the lines, in which the names `x`, `y` and `z` stand for the given values. Returns the value of the last line.
+    /// Adds the nodes of the lines, in which the names `x`, `y` and `z` stand for the given values. Returns the value
+    /// of the last line.
     pub(super) fn write(&mut self, given: &[&str], text: &str) -> String {
         let names = ["x", "y", "z"].into_iter().zip(given.iter().map(|name| (*name).to_owned())).collect();
         let mut reader = Reader { file: self, names, rest: "" };

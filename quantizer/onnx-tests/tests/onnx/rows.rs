@@ -6,8 +6,8 @@ use super::file::File;
 use super::same;
 use super::styles::{OBS, begun, between, ended, ops};
 
-/// The op of each, and the nodes that exporters make of it: a norm of the last axis of `x`, with `weights` that rise from 0, as after
-/// pruning, and `drawn(n)` for a value of `n` elements.
+/// The op of each, and the nodes that exporters make of it: a norm of the last axis of `x`, with `weights` that rise
+/// from 0, as after pruning, and `drawn(n)` for a value of `n` elements.
 pub(super) const NORMS: [(&str, &str); 6] = [
     ("layernorm", "LayerNormalization(x, weights, drawn(n), axis=-1)"),
     // Keras subtracts the mean after the product.

@@ -12,7 +12,8 @@ use object::{FileFlags, Object as _, ObjectSection as _, ObjectSymbol as _, Sect
 const VECTORS: &str = ".vector_table";
 
 /// Constants that hold no addresses for a call: the built-in image (`firmware-demo/src/bin/controller/start.rs`), the
-/// tables of the cost model, and of the examples in C the image, its golden run and the vectors, which the processor calls.
+/// tables of the cost model, and of the examples in C the image, its golden run and the vectors, which the processor
+/// calls.
 const NUMBERS: [&str; 4] = ["controller::start::BUILT_IN", "actq_kernels::pace::", "policy_", "vectors"];
 
 /// A function.

@@ -122,8 +122,8 @@ pub struct Run {
     pub applied: u32,
     /// Resets of the board.
     pub resets: u32,
-    /// `true` if this machine has delayed the host beyond the fault, or if the host read too slowly to tell the reaction
-    /// time: a failed check then tells nothing about the controller.
+    /// `true` if this machine has delayed the host beyond the fault, or if the host read too slowly to tell the
+    /// reaction time: a failed check then tells nothing about the controller.
     pub disturbed: bool,
 }
 

@@ -24,8 +24,8 @@ const ONNX_TESTS: &str = "actq-onnx-tests";
 /// The check of the C header, whose generator takes long to build, too.
 const C_HEADER: &str = "actq-capi-header";
 
-/// The tests that only `cargo verify --all` runs, modules of `host-tests/tests/all`: those in QEMU beyond the smoke run, those that
-/// learn for long, and those of packages that the short run does not download.
+/// The tests that only `cargo verify --all` runs, modules of `host-tests/tests/all`: those in QEMU beyond the smoke
+/// run, those that learn for long, and those of packages that the short run does not download.
 const SKIPPED_TESTS: [&str; 6] = ["--skip", "on_target::", "--skip", "learning::", "--skip", "built_once::"];
 
 /// A command with a name.

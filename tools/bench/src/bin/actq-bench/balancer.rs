@@ -44,7 +44,8 @@ pub(crate) fn quantize() -> Result<Dataset> {
     Ok(raw)
 }
 
-/// Drives the robot with the bundle in f32 and with the images of [`quantize`], on the host and in QEMU; returns a report.
+/// Drives the robot with the bundle in f32 and with the images of [`quantize`], on the host and in QEMU; returns a
+/// report.
 pub(crate) fn drive(counter: &Counter, raw: &Dataset, episodes: u64, qemu_episodes: u64) -> Result<String> {
     let f32_bytes = 4 * Deployment::load(bundle())?.policy.parameters;
     println!("\nBalancer: closed loop in f32, {episodes} episodes");

@@ -1,5 +1,5 @@
-//! `cargo demo`: takes the UR3 policies from their PyTorch weights, and the balancer from its bundle, to a Cortex-M4, in
-//! closed loop.
+//! `cargo demo`: takes the UR3 policies from their PyTorch weights, and the balancer from its bundle, to a Cortex-M4,
+//! in closed loop.
 
 use std::fs;
 use std::path::PathBuf;

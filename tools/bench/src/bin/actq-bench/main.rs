@@ -85,11 +85,12 @@ enum Command {
         /// A new folder for the package, or a new file F.zip
         #[arg(long, value_name = "DIR|F.zip")]
         out: PathBuf,
-        /// Leave out what this image does not need: widths, operations, functions. The library refuses images that need it
+        /// Leave out what this image does not need: widths, operations, functions. The library refuses images that need
+        /// it
         #[arg(long, value_name = "F.actq")]
         image: Option<PathBuf>,
-        /// Use shorter loops: up to 1.8 KB of code less, up to 13 % more time, the same bits (not on cores without the assembler:
-        /// cortex-m0plus, cortex-m3, rv32imac, host)
+        /// Use shorter loops: up to 1.8 KB of code less, up to 13 % more time, the same bits (not on cores without the
+        /// assembler: cortex-m0plus, cortex-m3, rv32imac, host)
         #[arg(long)]
         compact: bool,
     },
