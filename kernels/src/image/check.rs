@@ -1,16 +1,18 @@
 //! The check of an image: everything in it, one time. `docs/FORMAT.md` has the list.
 
 use super::contract::{ARRAY_BINARISE, CONTRACT_ARRAYS};
+use super::front::Front;
 use super::header::{self as h, Words};
 use super::info::check_whole;
 use super::matrix::{matrix, row_block};
-use super::op::{Around, Op, OpKind, Uses};
+use super::op::{Around, OpKind, Uses};
 use super::ports::PortKind;
 use super::proof::fits_i32;
+use super::record::Op;
 use super::region::Region;
 use super::text::is_text;
 use super::view::Image;
-use super::words::{low, section, word};
+use super::words::{low, word};
 use crate::error::ImageError;
 use crate::layout::Block;
 use crate::x::Plan;
@@ -362,59 +364,6 @@ fn check_around(kind: Around, op: &Op<'_>, front: &mut Front<'_>) -> Result<(), 
         Around::Clip => true,
     };
     if valid { Ok(()) } else { Err(ImageError::Around) }
-}
-
-/// Takes sections in their order in the image. No two share a word. Constants that several operations have in common
-/// are in the image one time, and are checked one time: so the check is linear in the image's length.
-struct Front<'a> {
-    words: &'a [u32],
-    /// End of the last section.
-    at: usize,
-    /// From here to that end all words are finite constants.
-    finite: usize,
-}
-
-impl<'a> Front<'a> {
-    #[inline(always)]
-    fn take(&mut self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
-        self.next(offset, len).ok_or(ImageError::Section)
-    }
-
-    #[inline(never)]
-    fn next(&mut self, offset: usize, len: usize) -> Option<&'a [u32]> {
-        let section = section(self.words, offset, len).filter(|_| offset >= self.at)?;
-        self.at = offset + len;
-        self.finite = self.at;
-        Some(section)
-    }
-
-    /// Takes f32 constants as [`Self::take`] does, or again some that were taken before and are finite.
-    #[inline(never)]
-    fn constants(&mut self, offset: usize, len: usize) -> Result<&'a [u32], ImageError> {
-        if self.has(offset, len) {
-            return section(self.words, offset, len).ok_or(ImageError::Section);
-        }
-        let begin = if offset == self.at { self.finite } else { offset };
-        let constants = self.take(offset, len)?;
-        if constants.iter().all(|&w| f32::from_bits(u32::from_le(w)).is_finite()) {
-            self.finite = begin;
-        }
-        Ok(constants)
-    }
-
-    /// Takes constants; refuses them if one is not finite.
-    #[inline(never)]
-    fn take_finite(&mut self, offset: usize, len: usize) -> Result<(), ImageError> {
-        if !self.has(offset, len) {
-            self.constants(offset, len)?;
-        }
-        if self.has(offset, len) { Ok(()) } else { Err(ImageError::Constant) }
-    }
-
-    /// Returns `true` if these were taken before and are finite.
-    fn has(&self, offset: usize, len: usize) -> bool {
-        self.finite <= offset && offset <= self.at && len <= self.at - offset
-    }
 }
 
 /// Checks the matrix of the record at `at`: its blocks, their rows' outputs, their sums, and that its prepared input

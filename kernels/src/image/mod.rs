@@ -10,6 +10,7 @@ mod contract;
 mod crc;
 #[cfg(feature = "writer")]
 mod features;
+mod front;
 pub mod header;
 mod info;
 mod matrix;
@@ -17,6 +18,7 @@ pub mod op;
 mod playback;
 mod ports;
 mod proof;
+pub mod record;
 mod region;
 mod text;
 mod view;
@@ -36,14 +38,15 @@ pub(crate) use matrix::row_block;
 pub use matrix::{BlockRecord, MatrixRecord, block_bytes, half_words, quarter_words};
 pub use matrix::{Matrix, RowBlock};
 pub(crate) use op::Around;
-#[cfg(feature = "writer")]
-pub use op::OpRecord;
-pub use op::{Op, OpKind};
+pub use op::OpKind;
 #[cfg(feature = "writer")]
 pub use playback::kept_words;
 pub use ports::{Port, PortKind};
 #[cfg(feature = "writer")]
 pub use proof::{largest_sum_bound, worst_case};
+pub use record::Op;
+#[cfg(feature = "writer")]
+pub use record::OpRecord;
 pub use region::Region;
 pub use view::Image;
 #[cfg(feature = "writer")]

@@ -16,7 +16,7 @@ use actq_boards::stm32f405::watchdog_time;
 use actq_client::keys;
 use actq_firmware_demo::image;
 use actq_firmware_demo::running::SLICE;
-use actq_firmware_demo::timeouts::{MAX_PIECE, TIMEOUTS};
+use actq_firmware_demo::timeouts::{MAX_SLICE, TIMEOUTS};
 use actq_kernels::Width;
 use actq_link::code::Refusal;
 use anyhow::{Context as _, Result, ensure};
@@ -54,7 +54,7 @@ fn the_watchdog_outlasts_start_and_check() -> Result<()> {
             // This is the time between two feeds of the watchdog for any length of a self-test; the longest that an
             // image may need, at the cycles of these instructions, is within a turn of the loop, too.
             assert!((SLICE / 2..=SLICE).contains(&(instructions as u32)), "{instructions}");
-            let most = u64::from(MAX_PIECE) * cycles / instructions / SLOWEST;
+            let most = u64::from(MAX_SLICE) * cycles / instructions / SLOWEST;
             assert!(most < watchdog_time::milliseconds(TIMEOUTS.turn).into(), "{most} ms");
         }
     }
@@ -86,7 +86,7 @@ fn images_with_too_long_pieces_are_refused() -> Result<()> {
         let (mut scratch, mut feeds) = (vec![0; made.scratch_words()], Feeds(0));
         let lengths = [made.obs_len(), made.act_len()];
         let opened = image::open(buffer.bytes(), &mut scratch, lengths, &mut feeds).map(drop);
-        assert_eq!((opened, made.least_budget() > MAX_PIECE), (outcome, outcome.is_err()), "{}", made.least_budget());
+        assert_eq!((opened, made.least_budget() > MAX_SLICE), (outcome, outcome.is_err()), "{}", made.least_budget());
         // Before the check; and before a slice that would reach it.
         assert!(if outcome.is_ok() { feeds.0 > made.self_test_steps() } else { feeds.0 == 1 }, "{}", feeds.0);
     }
