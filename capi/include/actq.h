@@ -143,8 +143,8 @@ enum actq_code {
 #define ACTQ_ABI 1
 
 /**
- * Bytes of stack that a call takes at most on a Cortex-M with the assembler kernels, without interrupts. A test computes
- * them from the calls in a linked program, for any image.
+ * Bytes of stack that a call takes at most on a Cortex-M with the assembler kernels, without interrupts. A test
+ * computes them from the calls in a linked program, for any image.
  */
 #define ACTQ_STACK_BYTES 2560
 
@@ -317,18 +317,17 @@ actq_status actq_step(struct actq_head *head,
                       size_t action_len);
 
 /**
- * Begins a step with an observation; `actq_poll` does the work. A step that has begun and is not ready is dropped; if a
- * poll has already worked on it, the recurrent state is reset. The first call takes longer, unless `actq_least_budget`
- * was called before.
+ * Begins a step with an observation; `actq_poll` does the work. A step that has begun and is not ready is dropped; if
+ * a poll has already worked on it, the recurrent state is reset. The first call takes longer, unless
+ * `actq_least_budget` was called before.
  */
 actq_status actq_begin(struct actq_head *head, const float *observation, size_t observation_len);
 
 /**
- * Gives the smallest budget of a poll, instructions. The first call for a head computes it, which takes about as long as a
- * short step: call it before the control loop.
+ * Gives the smallest budget of a poll, instructions. The first call for a head computes it, which takes about as long
+ * as a short step: call it before the control loop.
  */
-actq_status actq_least_budget(struct actq_head *head,
-                              uint32_t *budget);
+actq_status actq_least_budget(struct actq_head *head, uint32_t *budget);
 
 /**
  * Runs a slice of the step that has begun, of at most `budget` instructions by the cost model, at least

@@ -95,37 +95,31 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
             }
         }
         OpKind::Table => copy_le(op.part(cursor.step, &range), dst),
+        OpKind::LayerNorm | OpKind::RmsNorm if cfg!(not(feature = "norm")) => return Err(Fault::Damaged),
         OpKind::LstmCell if cfg!(feature = "recurrent") => {
             arch::lstm_elements(range.clone(), f(src), f(third), f(dst));
         }
         OpKind::GruCell if cfg!(feature = "recurrent") => {
             arch::gru_elements(range.clone(), f(src), f(third), f(dst));
         }
-        OpKind::Normalize { .. } => {
-            let [mean, scale] = [0, 1].map(|i| op.part(i, &range));
-            if scale.is_empty() {
+        kind @ (OpKind::Normalize { .. } | OpKind::LayerNorm | OpKind::RmsNorm) => {
+            let (first, second) = (op.part(0, &range), op.part(1, &range));
+            if (if kind == OpKind::RmsNorm { first } else { second }).is_empty() {
                 return Err(Fault::Damaged);
             }
-            elementwise::normalize(f(src), mean, scale, op.constant(0), op.constant(1), f(dst));
-        }
-        kind @ (OpKind::LayerNorm | OpKind::RmsNorm) if is_norm => {
-            let (weights, biases) = (op.part(0, &range), op.part(1, &range));
-            let (epsilon, moments) = (op.constant(0), &mut cursor.moments);
-            match kind {
-                OpKind::RmsNorm if !weights.is_empty() => {
-                    norm::rms_norm_units(units.clone(), moments, f(dst), weights, epsilon)
-                }
-                OpKind::LayerNorm if !biases.is_empty() => {
-                    norm::layer_norm_units(units.clone(), moments, f(dst), weights, biases, epsilon)
-                }
-                _ => return Err(Fault::Damaged),
+            let constant = op.constant(0);
+            let (moments, done) = (&mut cursor.moments, units.clone());
+            if !is_norm {
+                elementwise::normalize(f(src), first, second, constant, op.constant(1), f(dst));
+            } else if kind == OpKind::RmsNorm {
+                norm::rms_norm_units(done, moments, f(dst), first, constant);
+            } else {
+                norm::layer_norm_units(done, moments, f(dst), first, second, constant);
             }
         }
         // The match has no wildcard: it does not compile without an arm for every operation. `Linear`, `Denoise` and
         // the operations around a network have returned above, and a checked image has none that the build leaves out.
-        OpKind::LayerNorm
-        | OpKind::RmsNorm
-        | OpKind::Linear { .. }
+        OpKind::Linear { .. }
         | OpKind::Denoise
         | OpKind::LstmCell
         | OpKind::GruCell
