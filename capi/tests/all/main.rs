@@ -15,7 +15,7 @@ const FILE: &[u8; include_bytes!("../../../kernels/tests/valid.actq").len()] =
 #[repr(align(8))]
 pub(crate) struct Aligned<const N: usize>(pub(crate) [u8; N]);
 
-/// What a C program has: structures, scratch memory and buffers, at addresses that stay.
+/// Parts of a C program: structures, scratch memory and buffers, at addresses that stay.
 pub(crate) struct Program {
     pub(crate) image: Box<MaybeUninit<ActqImage>>,
     pub(crate) head: Box<MaybeUninit<ActqHead>>,

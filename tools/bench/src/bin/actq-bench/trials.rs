@@ -1,4 +1,4 @@
-//! What trials of policies in closed loop share: episodes, the firmware as the policy, and tables.
+//! Parts that trials of policies in closed loop share: episodes, the firmware as the policy, and tables.
 
 use std::path::{Path, PathBuf};
 
