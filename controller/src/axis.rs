@@ -44,11 +44,12 @@ pub struct Axis {
 pub enum AxisError {
     /// A limit is not finite, or the lower one exceeds the upper one.
     Limits,
-    /// The largest change in a tick is not positive.
+    /// The largest change in a tick is not positive, or so small that f32 rounds it away at the larger limit.
     Rate,
     /// The value at the start is outside the limits.
     Start,
-    /// A ramp's step is not positive and finite, or its end, 0, is outside the limits.
+    /// A ramp's step is not positive and finite, f32 rounds it away at the larger limit, or its end, 0, is outside the
+    /// limits.
     Ramp,
 }
 
@@ -56,9 +57,11 @@ impl fmt::Display for AxisError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Limits => "an axis' limits are not finite or reversed",
-            Self::Rate => "an axis' largest change in a tick is not positive",
+            Self::Rate => "an axis' largest change in a tick is not positive, or too small beside its limits",
             Self::Start => "an axis' value at the start is outside its limits",
-            Self::Ramp => "an axis' ramp has no positive step, or its limits exclude its end, 0",
+            Self::Ramp => {
+                "an axis' ramp has no positive step, one too small beside its limits, or limits that exclude its end, 0"
+            }
         })
     }
 }
@@ -79,14 +82,16 @@ impl Axis {
         if !(low.is_finite() && high.is_finite() && low <= high) {
             return Err(AxisError::Limits);
         }
-        if !rate.gt(&0.0) {
+        // A smaller change may leave a value as it is, for ever.
+        let least = f32::EPSILON * if -low > high { -low } else { high };
+        if !(rate > 0.0 && rate >= least) {
             return Err(AxisError::Rate);
         }
         if !(low..=high).contains(&start) {
             return Err(AxisError::Start);
         }
         if let SafeAction::Ramp { step } = safe
-            && !(step > 0.0 && step.is_finite() && (low..=high).contains(&0.0))
+            && !(step > 0.0 && step >= least && step.is_finite() && (low..=high).contains(&0.0))
         {
             return Err(AxisError::Ramp);
         }
@@ -159,4 +164,24 @@ impl Axis {
 fn towards(from: f32, to: f32, step: f32) -> f32 {
     let way = to - from;
     if way.abs() <= step { to } else { from + step.copysign(way) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_that_rounding_swallows_are_refused() {
+        let axis = |rate: f32, step: f32| Axis::new(-1e6, 4e5, rate, 0.0, SafeAction::Ramp { step });
+        assert_eq!([axis(0.1, 1.0), axis(f32::NAN, 1.0)], [Err(AxisError::Rate); 2]);
+        assert_eq!([axis(1.0, 0.1), axis(1.0, f32::INFINITY)], [Err(AxisError::Ramp); 2]);
+        let axis = axis(0.12, 1.0).expect("the axis is valid");
+        let mut last = Output::Drive(-1e6);
+        // Rounded to multiples of 1/16 at first, by half of one at most.
+        let ticks = (0..20_000_000).take_while(|_| {
+            last = axis.rest(last);
+            last != Output::Drive(0.0)
+        });
+        assert!(ticks.count() < 16_000_000, "{last:?}");
+    }
 }

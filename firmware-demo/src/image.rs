@@ -63,7 +63,7 @@ fn limited(limits: Limits, hz: f32) -> Option<Axis> {
     let step = match rate {
         Some(rate) => rate / hz,
         // An axis with a single value does not move at any rate.
-        None if low == high => 1.0,
+        None if low == high => 1.0 + high.abs(),
         None => (high - low) / (hz / RANGES_PER_SECOND),
     };
     let start = 0f32.max(low).min(high);

@@ -44,8 +44,14 @@ fn safe_actions() -> impl Strategy<Value = SafeAction> {
 fn axes() -> impl Strategy<Value = Axis> {
     let limit = prop_oneof![4 => 0.01..2.0f32, 1 => Just(f32::MAX), 1 => Just(0.0)];
     let rate = prop_oneof![4 => 0.001..1.0f32, 1 => Just(f32::INFINITY), 1 => Just(f32::MAX)];
-    (limit.clone(), limit, rate, safe_actions())
-        .prop_map(|(low, high, rate, safe)| Axis::new(-low, high, rate, 0.0, safe).expect("the axis is valid"))
+    (limit.clone(), limit, rate, safe_actions()).prop_map(|(low, high, rate, safe)| {
+        let least = f32::EPSILON * low.max(high);
+        let safe = match safe {
+            SafeAction::Ramp { step } => SafeAction::Ramp { step: step.max(least) },
+            other => other,
+        };
+        Axis::new(-low, high, rate.max(least), 0.0, safe).expect("the axis is valid")
+    })
 }
 
 /// Returns the largest change of an axis in a tick, including rounding.
