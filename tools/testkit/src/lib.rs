@@ -6,8 +6,14 @@ mod line;
 mod nor;
 mod power;
 mod random;
+#[cfg(feature = "tensors")]
+mod tensors;
 
 pub use line::{Fault, Line};
 pub use nor::{NoPower, Nor};
 pub use power::{Change, Power};
 pub use random::Random;
+#[cfg(feature = "tensors")]
+pub use safetensors::Dtype;
+#[cfg(feature = "tensors")]
+pub use tensors::{f32_tensors, safetensors};

@@ -19,8 +19,8 @@ use actq_jobs::run::run;
 use actq_jobs::spec::Spec;
 use actq_jobs::store::Store;
 use actq_jobs::work::Custom;
+use actq_testkit::f32_tensors;
 use ndarray::Array3;
-use safetensors::tensor::{Dtype, TensorView, serialize};
 use tempfile::TempDir;
 
 const OBS: usize = 4;
@@ -58,12 +58,9 @@ pub(crate) fn folder(spec: &str) -> TempDir {
     let json = format!(r#"{{"name": "tiny", "obs_dim": {OBS}, "act_dim": {ACT}, "ops": {ops}}}"#);
     fs::write(policy.join("policy.json"), json).expect("written");
     let mut random = Random::new(7);
-    let mut bytes = |n: usize| (0..n).flat_map(|_| random.unit().to_le_bytes()).collect::<Vec<u8>>();
-    let tensors = [("in", [HIDDEN, OBS], bytes(HIDDEN * OBS)), ("out", [ACT, HIDDEN], bytes(ACT * HIDDEN))];
-    let views = tensors
-        .iter()
-        .map(|(name, shape, bytes)| (*name, TensorView::new(Dtype::F32, shape.to_vec(), bytes).expect("a tensor")));
-    fs::write(policy.join("policy.safetensors"), serialize(views, None).expect("tensors")).expect("written");
+    let mut values = |n: usize| (0..n).map(|_| random.unit()).collect::<Vec<f32>>();
+    let tensors = [("in", [HIDDEN, OBS], values(HIDDEN * OBS)), ("out", [ACT, HIDDEN], values(ACT * HIDDEN))];
+    fs::write(policy.join("policy.safetensors"), f32_tensors(tensors)).expect("written");
     for (name, seed) in [("calib.npz", 1), ("heldout.npz", 2)] {
         let mut random = Random::new(seed);
         let obs = Array3::from_shape_simple_fn((5, 50, OBS), || random.unit());
