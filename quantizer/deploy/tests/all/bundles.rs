@@ -7,7 +7,7 @@ use actq::error::{Context as _, Result, ensure};
 use actq_deploy::description::{Op, Order};
 use actq_deploy::{Answers, Bundle, Plan, Reference, Variant, explain, read, variants};
 
-use crate::common::made::{Made, agrees, refused, shared};
+use crate::common::made::{Files, agrees, refused, shared};
 
 #[test]
 fn unitree_rl_lab_agrees_with_its_deploy_code() -> Result<()> {
@@ -24,26 +24,26 @@ fn limx_agrees_with_its_deploy_code() -> Result<()> {
 fn terms_of_unitree_rl_lab_may_choose_joints() -> Result<()> {
     let Some(folder) = shared("unitree_lab_g1_velocity") else { return Ok(()) };
     let bundle = folder.join("bundle");
-    let yaml = fs::read_to_string(bundle.join("params/deploy.yaml"))?;
-    let policy = fs::read(bundle.join("exported/policy.onnx"))?;
-    let with = |term: &str, joint_ids: &str| -> Result<Made> {
-        let plain = format!("{term}:\n    params: {{}}\n");
-        ensure!(yaml.matches(&plain).count() == 1, "{term}");
-        let yaml = yaml.replace(&plain, &format!("{term}:\n    params: {{asset_cfg: {{joint_ids: {joint_ids}}}}}\n"));
-        Made::of([("params/deploy.yaml", yaml.as_bytes()), ("exported/policy.onnx", &policy)])
+    let (yaml, policy) = ("params/deploy.yaml", "exported/policy.onnx");
+    let files = Files::default()
+        .with_file(yaml, fs::read(bundle.join(yaml))?)
+        .with_file(policy, fs::read(bundle.join(policy))?);
+    let with = |term: &str, joint_ids: &str| {
+        let chosen = format!("{term}:\n    params: {{asset_cfg: {{joint_ids: {joint_ids}}}}}\n");
+        files.with(&format!("{term}:\n    params: {{}}\n"), &chosen)
     };
     let plain = read(&Bundle::open(&bundle)?, true, Answers::default())?.description;
     let reversed: Vec<usize> = (0..29).rev().collect();
     for (term, at) in [("joint_pos_rel", 2), ("joint_vel_rel", 1)] {
         for all in ["null", "slice(None, None, None)", "[]"] {
-            ensure!(with(term, all)?.reading(true, "")?.description == plain, "{term}: {all}");
+            ensure!(with(term, all).reading(true, "")?.description == plain, "{term}: {all}");
         }
         let mut expected = plain.clone();
         let value = expected.values.iter_mut().find(|value| value.name == term).context("the term")?;
         value.ops.insert(at, Op::Select(Order::Places(reversed.clone())));
-        ensure!(with(term, &format!("{reversed:?}"))?.reading(true, "")?.description == expected, "{term}");
+        ensure!(with(term, &format!("{reversed:?}")).reading(true, "")?.description == expected, "{term}");
         for wrong in ["[0, 29]", "[0, -1]", "[0.5]"] {
-            refused(term, with(term, wrong)?.reading(true, ""), "must be numbers of joints below 29")?;
+            refused(term, with(term, wrong).reading(true, ""), "must be numbers of joints below 29")?;
         }
     }
     Ok(())
@@ -51,18 +51,19 @@ fn terms_of_unitree_rl_lab_may_choose_joints() -> Result<()> {
 
 #[test]
 fn answers_to_a_described_bundle_are_refused() -> Result<()> {
-    let made = Made::of([("deploy.toml", "")])?;
+    let files = Files::default().with_file("deploy.toml", "");
     refused(
         "an answer",
-        made.reading(true, "rate_hz = 100"),
+        files.reading(true, "rate_hz = 100"),
         "answers: nothing asks for rate_hz: deploy.toml describes",
     )
 }
 
 #[test]
 fn a_missing_key_of_unitree_rl_lab_is_named() -> Result<()> {
-    let made = Made::of([("params/deploy.yaml", "joint_ids_map: [0]\nactions: {}\nobservations: {}\n")])?;
-    refused("no step_dt", made.reading(true, ""), "deploy.yaml: step_dt: it looks like a file of unitree_rl_lab")
+    let yaml = "joint_ids_map: [0]\nactions: {}\nobservations: {}\n";
+    let files = Files::default().with_file("params/deploy.yaml", yaml);
+    refused("no step_dt", files.reading(true, ""), "deploy.yaml: step_dt: it looks like a file of unitree_rl_lab")
 }
 
 /// Every convention, changed alone, is detected, and changing it back explains the difference.

@@ -1,9 +1,8 @@
 //! Bundles of holosoma.
 
 use actq::error::{Result, ensure};
-use actq_deploy::Plan;
 
-use crate::common::made::{Made, agrees, asked, refused};
+use crate::common::made::{Files, agrees, refused};
 use crate::common::onnx;
 
 /// Answers for the Booster T1.
@@ -28,35 +27,33 @@ const METADATA: [(&str, &str); 3] = [("dof_names", "[\"a\", \"b\"]"), ("kp", "[1
 /// Length of its observation.
 const LEN: usize = 3 * 2 + 3 + 3 + 3 + 4;
 
-fn made(file: &[u8]) -> Result<Made> {
-    Made::of([("policy.onnx", file)])
+fn files(network: Vec<u8>) -> Files {
+    Files::default().with_file("policy.onnx", network)
 }
 
 #[test]
 fn another_robot_is_read() -> Result<()> {
-    let two = made(&onnx::linear(LEN, 2, &METADATA))?;
+    let two = files(onnx::linear(LEN, 2, &METADATA));
     let found = two.reading(true, TWO)?;
     ensure!(found.questions.is_empty(), "{:#?}", found.questions);
-    let plan = Plan::new(&found.description, &two.bundle()?)?;
+    let plan = two.plan(&found.description)?;
     assert!(plan.inputs().iter().any(|(name, len)| name == "base_quat" && *len == 4));
 
     // An action of fewer joints is that of the last ones.
     let three = [("dof_names", "[a, b, c]"), ("kp", "[1, 2, 3]"), ("kd", "[1, 2, 3]")];
     let answers = TWO.replace("[0.1, 0.2]", "[0.1, 0.2, 0.3]");
-    let three = made(&onnx::linear(LEN + 2, 2, &three))?;
+    let three = files(onnx::linear(LEN + 2, 2, &three));
     let found = three.reading(true, &answers)?;
     ensure!(found.questions.is_empty(), "{:#?}", found.questions);
-    Plan::new(&found.description, &three.bundle()?)?;
+    three.plan(&found.description)?;
     Ok(())
 }
 
 #[test]
 fn every_rule_is_a_question() -> Result<()> {
-    let made = made(&onnx::linear(LEN, 2, &METADATA))?;
     let is_asked = |accepted, mut expected: Vec<&str>| -> Result<()> {
-        let reading = made.reading(accepted, "")?;
-        let mut found = asked(&reading);
-        found.sort_unstable();
+        let mut found = files(onnx::linear(LEN, 2, &METADATA)).asked(accepted, "")?;
+        found.sort();
         expected.sort_unstable();
         assert_eq!(found, expected);
         Ok(())
@@ -103,7 +100,7 @@ fn bad_files_are_refused() -> Result<()> {
         ("a text", with("", ""), TWO.replace("= 0.25\ngravity", "= \"much\"\ngravity"), "answer action_scale"),
     ];
     for (name, file, answers, expected) in cases {
-        refused(name, made(&file)?.reading(true, &answers), expected)?;
+        refused(name, files(file).reading(true, &answers), expected)?;
     }
     Ok(())
 }

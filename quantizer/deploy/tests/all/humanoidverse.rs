@@ -3,7 +3,7 @@
 use actq::error::Result;
 use actq_deploy::{Answers, Bundle, read};
 
-use crate::common::made::{Made, Tick, agrees, asked, refused, shared};
+use crate::common::made::{Files, Tick, agrees, asked, refused, shared};
 use crate::common::onnx;
 
 const ANSWERS: &str = "action_scale = 0.25\nrate_hz = 50\n";
@@ -72,16 +72,15 @@ mimic_models: {jump: model.onnx, kick: model.onnx}
 motion_length_s: {jump: 2.0, kick: 3.0}
 ";
 
-/// Makes a bundle of a YAML file and networks.
-fn made(yaml: &str, networks: &[(&str, Vec<u8>)]) -> Result<Made> {
-    let made = Made::of(networks.iter().map(|(file, bytes)| (*file, bytes)))?;
-    made.write("robot.yaml", yaml.as_bytes())?;
-    Ok(made)
+/// The bundle of a YAML file and networks.
+fn files(yaml: &str, networks: &[(&str, Vec<u8>)]) -> Files {
+    let robot = Files::default().with_file("robot.yaml", yaml);
+    networks.iter().fold(robot, |files, (name, network)| files.with_file(name, network.clone()))
 }
 
 /// Runs a bundle; each raw value is `raw(name, tick)`.
 fn run(yaml: &str, network: (&str, Vec<u8>), raw: fn(&str, usize) -> Vec<f64>, ticks: usize) -> Result<Vec<Tick>> {
-    made(yaml, &[network])?.run(ANSWERS, ticks, |name, _, tick| raw(name, tick))
+    files(yaml, &[network]).run(ANSWERS, ticks, |name, _, tick| raw(name, tick))
 }
 
 fn raw(name: &str, tick: usize) -> Vec<f64> {
@@ -171,7 +170,7 @@ fn bad_files_are_refused() -> Result<()> {
         ("a longer action", falcon(), vec![("policy.onnx", onnx::linear(14, 4, &[]))], "contradicts itself"),
     ];
     for (name, yaml, networks, expected) in cases {
-        refused(name, made(&yaml, &networks)?.reading(true, ANSWERS), expected)?;
+        refused(name, files(&yaml, &networks).reading(true, ANSWERS), expected)?;
     }
     Ok(())
 }
@@ -187,7 +186,7 @@ fn what_nothing_states_is_a_question() -> Result<()> {
         (moved, vec![policy()], "raw.joints"),
         (format!("{ROBOT}{FALCON}"), several, "network"),
     ] {
-        assert_eq!(asked(&made(&yaml, &networks)?.reading(true, ANSWERS)?), [expected]);
+        assert_eq!(files(&yaml, &networks).asked(true, ANSWERS)?, [expected]);
     }
     Ok(())
 }

@@ -1,60 +1,35 @@
 //! Isaac Lab's exports: env.yaml, IO_descriptors.yaml, and both.
 
 use actq::error::{Context as _, Result, ensure};
-use actq_deploy::{Answers, Plan, Reading, Runner, read};
+use actq_deploy::Runner;
 
 use crate::common::isaaclab::{self, DESCRIPTORS, ENVIRONMENT, JOINTS, LEN};
-use crate::common::made::{Made, Tick, message, refused};
+use crate::common::made::{Files, Tick, message, refused};
 use crate::common::onnx;
 
-/// Files of a bundle: text files by name, and the network.
-struct Files {
-    texts: Vec<(&'static str, String)>,
-    network: Vec<u8>,
+const NETWORK: &str = "exported/policy.onnx";
+
+/// Adds the network: a linear function of `inputs` values.
+fn with_network(files: &Files, inputs: usize, outputs: usize) -> Files {
+    files.with_file(NETWORK, onnx::linear(inputs, outputs, &[]))
 }
 
-impl Files {
-    fn environment() -> Self {
-        let texts = vec![("params/env.yaml", ENVIRONMENT.to_owned())];
-        Self { texts, network: onnx::linear(LEN + 2, 4, &[]) }
-    }
+fn environment() -> Files {
+    with_network(&Files::default().with_file("params/env.yaml", ENVIRONMENT), LEN + 2, 4)
+}
 
-    /// Descriptors lack the term gait_phase, whose function has none.
-    fn descriptors() -> Self {
-        let texts = vec![("io_descriptors/IO_descriptors.yaml", DESCRIPTORS.to_owned())];
-        Self { texts, network: onnx::linear(LEN, 4, &[]) }
-    }
+/// Descriptors lack the term gait_phase, whose function has none.
+fn descriptors() -> Files {
+    with_network(&Files::default().with_file("io_descriptors/IO_descriptors.yaml", DESCRIPTORS), LEN, 4)
+}
 
-    fn both() -> Self {
-        let texts = [Self::environment().texts, Self::descriptors().texts].concat();
-        Self { texts, network: onnx::linear(LEN + 2, 4, &[]) }
-    }
+fn both() -> Files {
+    environment().with_file("io_descriptors/IO_descriptors.yaml", DESCRIPTORS)
+}
 
-    /// Replaces a text that occurs one time in one of the files.
-    fn with(mut self, from: &str, to: &str) -> Self {
-        let found: usize = self.texts.iter().map(|(_, text)| text.matches(from).count()).sum();
-        assert_eq!(found, 1, "{from:?} must occur one time");
-        self.texts.iter_mut().for_each(|(_, text)| *text = text.replace(from, to));
-        self
-    }
-
-    fn made(&self) -> Result<Made> {
-        let made = Made::new()?;
-        for (name, text) in &self.texts {
-            made.write(name, text.as_bytes())?;
-        }
-        made.write("exported/policy.onnx", &self.network)?;
-        Ok(made)
-    }
-
-    fn reading(&self, answers: &str) -> Result<Reading> {
-        read(&self.made()?.bundle()?, true, Answers::parse(answers)?)
-    }
-
-    /// Runs 20 ticks; returns observations and targets.
-    fn run(&self, answers: &str) -> Result<Vec<Tick>> {
-        self.made()?.run(answers, 20, isaaclab::raw)
-    }
+/// Runs 20 ticks; returns observations and targets.
+fn run(files: &Files, answers: &str) -> Result<Vec<Tick>> {
+    files.run(answers, 20, isaaclab::raw)
 }
 
 fn answers(joints: &[&str]) -> String {
@@ -72,10 +47,10 @@ fn differs(ticks: &[Tick], gait: bool) -> Option<String> {
 
 #[test]
 fn an_environment_agrees_with_its_code() -> Result<()> {
-    let files = Files::environment();
-    let differs = differs(&files.run(&answers(&JOINTS))?, true);
+    let files = environment();
+    let differs = differs(&run(&files, &answers(&JOINTS))?, true);
     ensure!(differs.is_none(), "{differs:?}");
-    let reading = files.reading(&answers(&JOINTS))?;
+    let reading = files.reading(true, &answers(&JOINTS))?;
     ensure!(reading.unread.is_empty(), "{:?}", reading.unread);
     let description = reading.description;
     ensure!((description.rate_hz - 50.0).abs() < 1e-9, "{}", description.rate_hz);
@@ -86,10 +61,10 @@ fn an_environment_agrees_with_its_code() -> Result<()> {
 
 #[test]
 fn descriptors_agree_with_the_code() -> Result<()> {
-    let files = Files::descriptors();
-    let differs = differs(&files.run("")?, false);
+    let files = descriptors();
+    let differs = differs(&run(&files, "")?, false);
     ensure!(differs.is_none(), "{differs:?}");
-    let reading = files.reading("")?;
+    let reading = files.reading(true, "")?;
     ensure!(reading.unread.is_empty(), "{:?}", reading.unread);
     ensure!(reading.description.joints["robot"] == JOINTS, "{:?}", reading.description.joints);
     Ok(())
@@ -97,10 +72,10 @@ fn descriptors_agree_with_the_code() -> Result<()> {
 
 #[test]
 fn both_files_together_need_no_order() -> Result<()> {
-    let files = Files::both();
-    let differs = differs(&files.run("raw.gait_phase = 2")?, true);
+    let files = both();
+    let differs = differs(&run(&files, "raw.gait_phase = 2")?, true);
     ensure!(differs.is_none(), "{differs:?}");
-    ensure!(files.reading("raw.gait_phase = 2")?.unread.is_empty(), "unread keys");
+    ensure!(files.reading(true, "raw.gait_phase = 2")?.unread.is_empty(), "unread keys");
     Ok(())
 }
 
@@ -112,30 +87,26 @@ fn gains_of_zero_in_descriptors_are_no_gains() -> Result<()> {
         let damping = if both { "[0.0, 0.0, 0.0, 0.0]" } else { "[0.5, 0.0, 0.0, 0.0]" };
         files.with("default_joint_damping: [0.5, 0.5, 0.5, 0.5]", &format!("default_joint_damping: {damping}"))
     };
-    let description = zero(Files::descriptors(), true).reading("")?.description;
+    let description = zero(descriptors(), true).reading(true, "")?.description;
     ensure!(description.gains.is_none(), "{:?}", description.gains);
-    let gains = zero(Files::both(), true).reading("raw.gait_phase = 2")?.description.gains.context("gains")?;
+    let gains = zero(both(), true).reading(true, "raw.gait_phase = 2")?.description.gains.context("gains")?;
     ensure!(gains.stiffness == [25.0, 25.0, 30.0, 30.0] && gains.damping == [0.5; 4], "{gains:?}");
     // A joint with one gain of 0 has the other one.
-    let error = message(zero(Files::both(), false).reading("raw.gait_phase = 2"));
+    let error = message(zero(both(), false).reading(true, "raw.gait_phase = 2"));
     ensure!(error.contains("stiffness: the bundle contradicts itself"), "{error}");
-    let some = Files::both()
+    let some = both()
         .with("default_joint_stiffness: [25.0, 25.0, 30.0, 30.0]", "default_joint_stiffness: [0.0, 25.0, 30.0, 30.0]")
         .with("default_joint_damping: [0.5, 0.5, 0.5, 0.5]", "default_joint_damping: [0.0, 0.5, 0.5, 0.5]");
-    let gains = some.reading("raw.gait_phase = 2")?.description.gains.context("gains")?;
+    let gains = some.reading(true, "raw.gait_phase = 2")?.description.gains.context("gains")?;
     ensure!(gains.stiffness == [25.0, 25.0, 30.0, 30.0], "{gains:?}");
     Ok(())
 }
 
 #[test]
 fn rules_are_questions_until_accepted() -> Result<()> {
-    let keys = |files: &Files, accepted| -> Result<Vec<String>> {
-        let reading = read(&files.made()?.bundle()?, accepted, Answers::default())?;
-        Ok(reading.questions.into_iter().map(|question| question.key).collect())
-    };
-    ensure!(keys(&Files::environment(), true)? == ["joints", "raw.gait_phase"], "accepted");
-    ensure!(keys(&Files::descriptors(), true)?.is_empty(), "accepted");
-    let mut all = keys(&Files::environment(), false)?;
+    assert_eq!(environment().asked(true, "")?, ["joints", "raw.gait_phase"]);
+    assert!(descriptors().asked(true, "")?.is_empty());
+    let mut all = environment().asked(false, "")?;
     all.sort();
     let expected = [
         "action.clip",
@@ -152,14 +123,14 @@ fn rules_are_questions_until_accepted() -> Result<()> {
         "raw.gait_phase",
         "unmatched",
     ];
-    ensure!(all == expected, "{all:?}");
+    assert_eq!(all, expected);
     Ok(())
 }
 
 #[test]
 fn each_convention_changes_the_result() -> Result<()> {
     let own = answers(&JOINTS);
-    let with = |rule: &str| Files::environment().run(&format!("{own}{rule}\n"));
+    let with = |rule: &str| run(&environment(), &format!("{own}{rule}\n"));
     for rule in [
         "clip_first = false",
         "history.first = \"newest\"",
@@ -171,7 +142,7 @@ fn each_convention_changes_the_result() -> Result<()> {
         ensure!(differs(&with(rule)?, true).is_some(), "{rule}: nothing differs");
     }
     let [a, b, c, d] = JOINTS;
-    ensure!(differs(&Files::environment().run(&answers(&[b, a, c, d]))?, true).is_some(), "another order of joints");
+    ensure!(differs(&run(&environment(), &answers(&[b, a, c, d]))?, true).is_some(), "another order of joints");
     ensure!(differs(&with("gravity = \"rpy\"")?, true).is_some(), "gravity of an orientation");
     for (rule, expected) in [
         ("history.layout = \"frame\"", "different lengths"),
@@ -182,8 +153,7 @@ fn each_convention_changes_the_result() -> Result<()> {
             "params/env.yaml: observations.actor is missing; answer group with one of policy, critic",
         ),
     ] {
-        let error = message(Files::environment().reading(&format!("{own}{rule}\n")));
-        ensure!(error.contains(expected), "{rule}: {error}");
+        refused(rule, environment().reading(true, &format!("{own}{rule}\n")), expected)?;
     }
     Ok(())
 }
@@ -191,20 +161,17 @@ fn each_convention_changes_the_result() -> Result<()> {
 #[test]
 fn the_agent_limits_the_action() -> Result<()> {
     let with = |clip: &str| {
-        let mut files = Files::environment();
-        files
-            .texts
-            .push(("params/agent.yaml", format!("seed: 42\nclip_actions: {clip}\npolicy:\n  activation: elu\n")));
-        files
+        let agent = format!("seed: 42\nclip_actions: {clip}\npolicy:\n  activation: elu\n");
+        environment().with_file("params/agent.yaml", agent)
     };
     let own = answers(&JOINTS);
-    ensure!(differs(&with("null").run(&own)?, true).is_none(), "no limit");
-    ensure!(differs(&with("100.0").run(&own)?, true).is_none(), "a limit that no action reaches");
+    ensure!(differs(&run(&with("null"), &own)?, true).is_none(), "no limit");
+    ensure!(differs(&run(&with("100.0"), &own)?, true).is_none(), "a limit that no action reaches");
     ensure!(
-        differs(&with("0.5").run(&format!("{own}clip_actions = false\n"))?, true).is_none(),
+        differs(&run(&with("0.5"), &format!("{own}clip_actions = false\n"))?, true).is_none(),
         "the rule does not hold"
     );
-    let ticks = with("0.5").run(&own)?;
+    let ticks = run(&with("0.5"), &own)?;
     for (tick, (observation, target)) in ticks.iter().enumerate() {
         let action = isaaclab::network(observation, 4).into_iter().map(|action| action.clamp(-0.5, 0.5));
         let action: Vec<f64> = action.collect();
@@ -218,23 +185,22 @@ fn the_agent_limits_the_action() -> Result<()> {
         }
     }
     ensure!(differs(&ticks, true).is_some(), "the limit changes nothing");
-    let error = message(with("-1").reading(&own));
-    ensure!(error.contains("params/agent.yaml: clip_actions (line 2) must be a number above 0"), "{error}");
-    Ok(())
+    let expected = "params/agent.yaml: clip_actions (line 2) must be a number above 0";
+    refused("a limit below 0", with("-1").reading(true, &own), expected)
 }
 
 #[test]
 fn the_agent_names_the_group_of_observations() -> Result<()> {
     let with = |groups: &str| {
-        let mut files = Files::environment().with("observations:\n  policy:\n", "observations:\n  proprio:\n");
-        files.texts.push(("params/agent.yaml", format!("clip_actions: null\nobs_groups: {groups}\n")));
-        files
+        environment()
+            .with("observations:\n  policy:\n", "observations:\n  proprio:\n")
+            .with_file("params/agent.yaml", format!("clip_actions: null\nobs_groups: {groups}\n"))
     };
     let own = answers(&JOINTS);
     for groups in ["{policy: [proprio], critic: [critic]}", "{actor: [proprio]}"] {
-        ensure!(differs(&with(groups).run(&own)?, true).is_none(), "{groups}");
+        ensure!(differs(&run(&with(groups), &own)?, true).is_none(), "{groups}");
     }
-    let asked = with("{}").reading(&format!("{own}group = \"proprio\"\n"))?.questions;
+    let asked = with("{}").asked(true, &format!("{own}group = \"proprio\"\n"))?;
     ensure!(asked.is_empty(), "{asked:?}");
     for (groups, expected) in [
         ("{}", "params/env.yaml: observations.policy is missing; answer group"),
@@ -245,8 +211,7 @@ fn the_agent_names_the_group_of_observations() -> Result<()> {
         ("{policy: []}", "obs_groups.policy: the policy reads 0 groups"),
         ("{policy: 3}", "obs_groups.policy (line 2) must be a list of texts"),
     ] {
-        let error = message(with(groups).reading(&own));
-        ensure!(error.contains(expected), "{groups}: {error}");
+        refused(groups, with(groups).reading(true, &own), expected)?;
     }
     Ok(())
 }
@@ -256,14 +221,12 @@ fn several_actions_become_several_targets() -> Result<()> {
     let legs = "  joint_pos:\n    class_type: isaaclab.envs.mdp.actions.joint_actions:JointPositionAction";
     let wheels = "  wheels:\n    class_type: isaaclab.envs.mdp.actions.joint_actions:JointVelocityAction\n    asset_name: robot\n    \
         joint_names: .*_knee\n    scale: 5.0\n    offset: 0.0\n    use_default_offset: true\n    clip: null\n";
-    let files = Files { network: onnx::linear(LEN + 2 + 2, 6, &[]), ..Files::environment() };
-    let files = files.with(legs, &format!("{wheels}{legs}"));
-    let description = files.reading(&answers(&JOINTS))?.description;
+    let files = with_network(&environment(), LEN + 2 + 2, 6).with(legs, &format!("{wheels}{legs}"));
+    let description = files.reading(true, &answers(&JOINTS))?.description;
     let kinds: Vec<String> = description.targets.iter().map(|target| format!("{:?}", target.kind)).collect();
     ensure!(kinds == ["Velocity", "Position"], "{kinds:?}");
     ensure!(description.joints["action_0"] == ["FL_knee", "FR_knee"], "{:?}", description.joints);
-    let made = files.made()?;
-    let mut runner = Runner::new(Plan::new(&description, &made.bundle()?)?);
+    let mut runner = Runner::new(files.plan(&description)?);
     let raw: Vec<Vec<f64>> = runner.plan().inputs().iter().map(|(name, len)| isaaclab::raw(name, *len, 3)).collect();
     let tick = runner.step(&raw);
     let expected: Vec<f64> = tick.action[..2].iter().map(|action| 5.0 * action).collect();
@@ -273,12 +236,11 @@ fn several_actions_become_several_targets() -> Result<()> {
 
 #[test]
 fn relative_actions_are_asked() -> Result<()> {
-    let files = Files::environment()
+    let files = environment()
         .with("joint_actions:JointPositionAction", "joint_actions:RelativeJointPositionAction")
         .with("use_default_offset: true", "use_zero_offset: true");
-    let asked = files.reading(&answers(&JOINTS))?.questions;
-    ensure!(asked.len() == 1 && asked[0].key == "relative.once", "{asked:?}");
-    let ticks = files.run(&format!("{}relative.once = true\n", answers(&JOINTS)))?;
+    assert_eq!(files.asked(true, &answers(&JOINTS))?, ["relative.once"]);
+    let ticks = run(&files, &format!("{}relative.once = true\n", answers(&JOINTS)))?;
     let network = isaaclab::network(&ticks[0].0, 4);
     // The first joint of the action is FR_hip, whose scale is 0.25 and whose limits are -2 and 0.3.
     let expected = (0.25 * network[0]).clamp(-2.0, 0.3) + isaaclab::raw("joint_pos", 4, 0)[1];
@@ -296,17 +258,16 @@ fn metadata_of_the_network_is_used_and_checked() -> Result<()> {
             ("action_scale", "0.25,0.5,0.25,0.5"),
         ]
     };
-    let files =
-        |metadata: &[(&str, &str)], files: Files| Files { network: onnx::linear(LEN + 2, 4, metadata), ..files };
+    let with = |metadata: &[(&str, &str)], files: Files| files.with_file(NETWORK, onnx::linear(LEN + 2, 4, metadata));
     let own = "FL_hip,FR_hip,FL_knee,FR_knee";
     let good = metadata(own, "0.1,-0.1,0.0,-1.5");
-    ensure!(differs(&files(&good, Files::environment()).run("raw.gait_phase = 2")?, true).is_none(), "differs");
+    ensure!(differs(&run(&with(&good, environment()), "raw.gait_phase = 2")?, true).is_none(), "differs");
     for (metadata, other, expected) in [
-        (metadata(own, "0.1,-0.1,0.2,-1.5"), Files::environment(), "default positions: the bundle contradicts itself"),
-        (metadata("FR_hip,FL_hip,FL_knee,FR_knee", "0.1,-0.1,0,-1.5"), Files::both(), "order of the joints"),
-        (metadata("FL_hip,FR_hip,FL_knee", "0.1,-0.1,0"), Files::both(), "3 joints"),
+        (metadata(own, "0.1,-0.1,0.2,-1.5"), environment(), "default positions: the bundle contradicts itself"),
+        (metadata("FR_hip,FL_hip,FL_knee,FR_knee", "0.1,-0.1,0,-1.5"), both(), "order of the joints"),
+        (metadata("FL_hip,FR_hip,FL_knee", "0.1,-0.1,0"), both(), "3 joints"),
     ] {
-        let error = message(files(&metadata, other).reading("raw.gait_phase = 2"));
+        let error = message(with(&metadata, other).reading(true, "raw.gait_phase = 2"));
         ensure!(error.contains(expected) && error.contains("policy.onnx metadata"), "{expected}: {error}");
     }
     Ok(())
@@ -349,7 +310,7 @@ fn bad_environments_are_refused() -> Result<()> {
         ("scene:\n", "scene:\n  robot: 1\n", "occurs twice"),
     ];
     for (from, to, expected) in cases {
-        refused(to, Files::environment().with(from, to).reading(&own), expected)?;
+        refused(to, environment().with(from, to).reading(true, &own), expected)?;
     }
     for (answers, expected) in [
         (answers(&["FL_hip", "FL_hip", "FL_knee", "FR_knee"]), "answer joints: \"FL_hip\" occurs twice"),
@@ -359,7 +320,7 @@ fn bad_environments_are_refused() -> Result<()> {
         (own.replace("phase = 2", "phase = 3"), "length of the observation"),
         (format!("{own}joint = 1\n"), "nothing asks for joint"),
     ] {
-        refused(&answers, Files::environment().reading(&answers), expected)?;
+        refused(&answers, environment().reading(true, &answers), expected)?;
     }
     Ok(())
 }
@@ -404,11 +365,10 @@ fn bad_descriptors_are_refused() -> Result<()> {
         ),
     ];
     for (from, to, expected) in cases {
-        refused(to, Files::descriptors().with(from, to).reading(""), expected)?;
+        refused(to, descriptors().with(from, to).reading(true, ""), expected)?;
     }
     // The exporter left out a term.
-    let longer = Files { network: onnx::linear(LEN + 2, 4, &[]), ..Files::descriptors() };
-    let error = message(longer.reading(""));
+    let error = message(with_network(&descriptors(), LEN + 2, 4).reading(true, ""));
     ensure!(error.contains("add env.yaml, which has all") && error.contains(&format!("{LEN} values")), "{error}");
     Ok(())
 }
@@ -442,7 +402,7 @@ fn files_that_contradict_each_other_are_refused() -> Result<()> {
         ),
     ];
     for (from, to, expected) in cases {
-        let error = message(Files::both().with(from, to).reading("raw.gait_phase = 2"));
+        let error = message(both().with(from, to).reading(true, "raw.gait_phase = 2"));
         let sources = error.contains("params/env.yaml") && error.contains("io_descriptors/IO_descriptors.yaml");
         ensure!(error.contains(expected) && error.contains("contradicts itself") && sources, "{to}: {error}");
     }
@@ -450,30 +410,21 @@ fn files_that_contradict_each_other_are_refused() -> Result<()> {
 }
 
 #[test]
-fn bundles_without_or_with_many_policies_are_refused() -> Result<()> {
-    let made = Made::new()?;
-    made.write("params/env.yaml", ENVIRONMENT.as_bytes())?;
-    let error = message(read(&made.bundle()?, true, Answers::default()));
-    ensure!(error.contains("params/env.yaml: there is no ONNX file with it"), "{error}");
-    let files = Files::environment();
-    made.write("a.onnx", &files.network)?;
-    made.write("b.onnx", &files.network)?;
-    let error = message(read(&made.bundle()?, true, Answers::default()));
-    ensure!(error.contains("which of a.onnx, b.onnx is its policy?"), "{error}");
-    let made = files.made()?;
-    made.write("other/env.yaml", ENVIRONMENT.as_bytes())?;
-    let error = message(read(&made.bundle()?, true, Answers::default()));
-    ensure!(error.contains("several policies of this family"), "{error}");
-    Ok(())
-}
-
-/// A bundle of unitree_rl_lab has the training's env.yaml, too.
-#[test]
-fn other_families_keep_their_bundles() -> Result<()> {
-    let made = Files::environment().made()?;
+fn bundles_of_no_policy_several_or_another_family_are_refused() -> Result<()> {
+    let files = environment();
+    let none = files.without(NETWORK);
+    let two = none.with_file("a.onnx", files.0[NETWORK].clone()).with_file("b.onnx", files.0[NETWORK].clone());
+    let several = files.with_file("other/env.yaml", ENVIRONMENT);
+    // A bundle of unitree_rl_lab has the training's env.yaml, too.
     let deploy = "joint_ids_map: [0, 1, 2, 3]\nstep_dt: 0.02\nactions: {}\nobservations: {}\n";
-    made.write("params/deploy.yaml", deploy.as_bytes())?;
-    let error = message(read(&made.bundle()?, true, Answers::default()));
-    ensure!(error.contains("unitree_rl_lab bundle"), "{error}");
+    let other_family = files.with_file("params/deploy.yaml", deploy);
+    for (name, files, expected) in [
+        ("no policy", none, "params/env.yaml: there is no ONNX file with it"),
+        ("two policies", two, "which of a.onnx, b.onnx is its policy?"),
+        ("two environments", several, "several policies of this family"),
+        ("another family", other_family, "unitree_rl_lab bundle"),
+    ] {
+        refused(name, files.reading(true, ""), expected)?;
+    }
     Ok(())
 }

@@ -4,7 +4,7 @@ use actq::error::{Context as _, Result, ensure};
 use actq_deploy::description::TargetKind;
 use actq_deploy::{Answers, Bundle, read};
 
-use crate::common::made::{Made, agrees, asked, message, refused, shared};
+use crate::common::made::{Files, agrees, asked, message, refused, shared};
 use crate::common::onnx;
 
 const NAME: &str = "kinfer_zbot_walking";
@@ -64,19 +64,17 @@ fn json(from: &str, to: &str) -> String {
     if from.is_empty() { text.to_owned() } else { text.replace(from, to) }
 }
 
-fn files(xml: &str, json: &str) -> Result<Made> {
+fn files(xml: &str, json: &str) -> Files {
     let inputs = [("t.1", 1), ("dof_pos.1", 3), ("prev_actions.1", 3), ("buffer.1", 12)];
     let outputs = [("actions_raw", 3), ("actions", 3), ("x.5", 12)];
-    let made = Made::of([("policy.kinfer", onnx::graph(&[], &[], &inputs, &outputs, &[("kinfer_metadata", json)]))])?;
-    if !xml.is_empty() {
-        made.write("robot.xml", xml.as_bytes())?;
-    }
-    Ok(made)
+    let network = onnx::graph(&[], &[], &inputs, &outputs, &[("kinfer_metadata", json)]);
+    let files = Files::default().with_file("policy.kinfer", network);
+    if xml.is_empty() { files } else { files.with_file("robot.xml", xml) }
 }
 
 #[test]
 fn other_robots_are_read_by_their_own_files() -> Result<()> {
-    let reading = files(XML, &json("", "").replace("0.005", "0.0025"))?.reading(true, "")?;
+    let reading = files(XML, &json("", "").replace("0.005", "0.0025")).reading(true, "")?;
     let description = &reading.description;
     ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
     ensure!(description.rate_hz == 100.0, "{}", description.rate_hz);
@@ -92,9 +90,8 @@ fn other_robots_are_read_by_their_own_files() -> Result<()> {
 
 #[test]
 fn missing_files_become_questions() -> Result<()> {
-    let files = files("", &json("", ""))?;
-    let reading = files.reading(true, "")?;
-    ensure!(asked(&reading) == ["joints.names", "default_pose"], "{:?}", reading.questions);
+    let files = files("", &json("", ""));
+    assert_eq!(files.asked(true, "")?, ["joints.names", "default_pose"]);
     let answers = "joints.names = [\"a\", \"b\", \"c\"]\ndefault_pose = [1, 2, 3]\n";
     let reading = files.reading(true, answers)?;
     ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
@@ -130,11 +127,11 @@ fn bad_bundles_are_refused() -> Result<()> {
         ("a number", XML.to_owned(), "3".to_owned(), "JSON object"),
     ];
     for (name, xml, json, expected) in cases {
-        refused(name, files(&xml, &json)?.reading(true, ""), expected)?;
+        refused(name, files(&xml, &json).reading(true, ""), expected)?;
     }
     let deep = format!("<mujoco><worldbody>{}{}</worldbody></mujoco>", "<body>".repeat(2000), "</body>".repeat(2000));
-    let error = message(files(&deep, &json("", ""))?.reading(true, ""));
+    let error = message(files(&deep, &json("", "")).reading(true, ""));
     ensure!(error.contains("levels") || error.contains("not XML"), "{error}");
-    let tar = Made::of([("policy.kinfer", b"\x1f\x8b\x08 a tar file")])?;
+    let tar = Files::default().with_file("policy.kinfer", b"\x1f\x8b\x08 a tar file");
     refused("a tar file", tar.reading(true, ""), "policy.kinfer")
 }

@@ -3,8 +3,8 @@
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::description::{Description, Gains, Numbers, TargetKind};
 
-use crate::common::leapp::{self as files, Files, KD, KP, SMOOTH, initial, policy, reference};
-use crate::common::made::{message, refused};
+use crate::common::leapp::{INITIAL, KD, KP, SMOOTH, YAML, initial, policy, reference, run, walker};
+use crate::common::made::{Files, message, refused};
 
 /// Returns the first tick that differs from the reference with these first values.
 fn differs(ticks: &[Vec<f64>], last: f32, smooth: [f32; 4]) -> Option<String> {
@@ -15,20 +15,20 @@ fn differs(ticks: &[Vec<f64>], last: f32, smooth: [f32; 4]) -> Option<String> {
 }
 
 /// The bundle without first values.
-fn without_initial() -> Result<Files> {
-    Files::new()?.with("  initial_values: walker_initial_values.safetensors\n", "")
+fn without_initial() -> Files {
+    walker().with("  initial_values: walker_initial_values.safetensors\n", "")
 }
 
 #[test]
 fn a_pipeline_agrees_with_its_runtime() -> Result<()> {
-    let differs = differs(&Files::new()?.run("")?, 0.0, SMOOTH);
+    let differs = differs(&run(&walker(), "")?, 0.0, SMOOTH);
     ensure!(differs.is_none(), "{differs:?}");
     Ok(())
 }
 
 #[test]
 fn names_gains_and_states_are_described() -> Result<()> {
-    let reading = Files::new()?.reading(false, "")?;
+    let reading = walker().reading(false, "")?;
     ensure!(reading.questions.is_empty() && reading.unread.is_empty(), "{reading:#?}");
     let description = reading.description;
     let text = description.to_toml(&reading.sources)?;
@@ -66,17 +66,17 @@ fn names_gains_and_states_are_described() -> Result<()> {
 
 #[test]
 fn several_outputs_become_several_targets() -> Result<()> {
-    let files = Files::new()?
+    let files = walker()
         .with(
             "    - name: last_action_out\n      dtype: float32\n",
             "    - name: last_action_out\n      dtype: float32\n      kind: target/joint/velocity\n",
-        )?
-        .with("policy: [joint_pos, ", "policy: [last_action_out, joint_pos, ")?;
+        )
+        .with("policy: [joint_pos, ", "policy: [last_action_out, joint_pos, ");
     let description = files.reading(true, "")?.description;
     let kinds: Vec<TargetKind> = description.targets.iter().map(|target| target.kind).collect();
     ensure!(kinds == [TargetKind::Velocity, TargetKind::Position], "{kinds:?}");
     ensure!(description.action == "action", "{}", description.action);
-    let ticks = files.run("")?;
+    let ticks = run(&files, "")?;
     ensure!(ticks.iter().all(|target| target.len() == 8), "{:?}", ticks[0]);
     let positions: Vec<Vec<f64>> = ticks.into_iter().map(|target| target[4..].to_vec()).collect();
     let differs = differs(&positions, 0.0, SMOOTH);
@@ -92,7 +92,7 @@ fn schema_1_4_says_the_same() -> Result<()> {
             format!("axes: [{{kind: robot, names: [robot0]}}, {{kind: element, names: [{names}]}}]"),
         )
     };
-    let mut text = Files::new()?.yaml()?;
+    let mut text = YAML.to_owned();
     let orders =
         ["FL_hip, FR_hip, FL_knee, FR_knee", "FR_hip, FR_knee, FL_hip, FL_knee", "lin_vel_x, lin_vel_y, ang_vel_z"];
     let directions = ["state/", "target/", "command/"].map(|direction| (direction.to_owned(), String::new()));
@@ -100,8 +100,8 @@ fn schema_1_4_says_the_same() -> Result<()> {
         ensure!(text.contains(&from), "{from}");
         text = text.replace(&from, &to);
     }
-    let newer = Files::new()?.set("walker.yaml", text.as_bytes()).reading(false, "")?;
-    let older = Files::new()?.reading(false, "")?;
+    let newer = walker().with_file("walker/walker.yaml", text).reading(false, "")?;
+    let older = walker().reading(false, "")?;
     ensure!(newer.unread.is_empty(), "{:?}", newer.unread);
     ensure!(newer.description == older.description, "{:#?}", newer.description);
     Ok(())
@@ -109,60 +109,56 @@ fn schema_1_4_says_the_same() -> Result<()> {
 
 #[test]
 fn what_the_file_omits_is_asked() -> Result<()> {
-    let keys = |files: &Files, accepted: bool, answers: &str| -> Result<Vec<String>> {
-        Ok(files.reading(accepted, answers)?.questions.into_iter().map(|question| question.key).collect())
-    };
-    let files = without_initial()?.with("  configs:\n    frequency: 50\n", "")?;
-    ensure!(keys(&files, false, "")? == ["rate_hz", "state.start"], "{:?}", keys(&files, false, "")?);
-    ensure!(keys(&files, true, "")? == ["rate_hz"], "{:?}", keys(&files, true, "")?);
-    let files = Files::new()?.with("kind: target/joint/position", "kind: target/body/position")?;
-    ensure!(keys(&files, true, "")? == ["target.joint_pos"], "{:?}", keys(&files, true, "")?);
+    let files = without_initial().with("  configs:\n    frequency: 50\n", "");
+    assert_eq!(files.asked(false, "")?, ["rate_hz", "state.start"]);
+    assert_eq!(files.asked(true, "")?, ["rate_hz"]);
+    let files = walker().with("kind: target/joint/position", "kind: target/body/position");
+    assert_eq!(files.asked(true, "")?, ["target.joint_pos"]);
     let reading = files.reading(true, "target.joint_pos = \"velocity\"")?;
     ensure!(reading.description.targets[0].kind == TargetKind::Velocity, "{:?}", reading.description.targets);
     for (answer, expected) in [
         ("target.joint_pos = \"none\"", "the robot gets none of the outputs"),
         ("target.joint_pos = \"pose\"", "answer target.joint_pos = \"pose\": give \"position\""),
     ] {
-        let error = message(files.reading(true, answer));
-        ensure!(error.contains(expected), "{answer}: {error}");
+        refused(answer, files.reading(true, answer), expected)?;
     }
     Ok(())
 }
 
 #[test]
 fn each_convention_changes_the_result() -> Result<()> {
-    let files = without_initial()?;
-    let zero = differs(&files.run("")?, 0.0, [0.0; 4]);
+    let files = without_initial();
+    let zero = differs(&run(&files, "")?, 0.0, [0.0; 4]);
     ensure!(zero.is_none(), "the profile's start: {zero:?}");
-    let one = files.run("state.start = 1.0")?;
+    let one = run(&files, "state.start = 1.0")?;
     ensure!(differs(&one, 1.0, [1.0; 4]).is_none(), "an answer for the start");
     ensure!(differs(&one, 0.0, [0.0; 4]).is_some(), "the start changes nothing");
     // The values of the file, and those of the profile.
-    ensure!(differs(&Files::new()?.run("")?, 0.0, [0.0; 4]).is_some(), "first values change nothing");
-    let partial = Files::new()?.set("walker_initial_values.safetensors", &initial(&[("observe/smooth_in", SMOOTH)])?);
-    let partial = differs(&partial.run("state.start = 0.5")?, 0.5, SMOOTH);
+    ensure!(differs(&run(&walker(), "")?, 0.0, [0.0; 4]).is_some(), "first values change nothing");
+    let partial = walker().with_file(INITIAL, initial(&[("observe/smooth_in", SMOOTH)]));
+    let partial = differs(&run(&partial, "state.start = 0.5")?, 0.5, SMOOTH);
     ensure!(partial.is_none(), "first values of one input: {partial:?}");
     // Another connection.
-    let crossed = Files::new()?
-        .with("observe/smooth_out: [observe/smooth_in]", "observe/smooth_out: [observe/last_action_in]")?
-        .with("policy/last_action_out: [observe/last_action_in]", "policy/last_action_out: [observe/smooth_in]")?;
-    ensure!(differs(&crossed.run("")?, 0.0, SMOOTH).is_some(), "the feedback changes nothing");
-    let crossed = Files::new()?
-        .with("observe/last: [policy/last]", "observe/last: [policy/position]")?
-        .with("observe/position: [policy/position]", "observe/position: [policy/last]")?;
-    ensure!(differs(&crossed.run("")?, 0.0, SMOOTH).is_some(), "the flow changes nothing");
+    let crossed = walker()
+        .with("observe/smooth_out: [observe/smooth_in]", "observe/smooth_out: [observe/last_action_in]")
+        .with("policy/last_action_out: [observe/last_action_in]", "policy/last_action_out: [observe/smooth_in]");
+    ensure!(differs(&run(&crossed, "")?, 0.0, SMOOTH).is_some(), "the feedback changes nothing");
+    let crossed = walker()
+        .with("observe/last: [policy/last]", "observe/last: [policy/position]")
+        .with("observe/position: [policy/position]", "observe/position: [policy/last]");
+    ensure!(differs(&run(&crossed, "")?, 0.0, SMOOTH).is_some(), "the flow changes nothing");
     Ok(())
 }
 
 #[test]
 fn equal_names_get_their_models_as_prefix() -> Result<()> {
     // The policy's last input gets the name of an input of the other model; LEAPP's runtime finds ports by their places.
-    let files = Files::new()?
+    let files = walker()
         .with(
             "    - name: base_velocity\n      dtype: float32\n      shape: [1, 3]",
             "    - name: robot_joint_vel\n      dtype: float32\n      shape: [1, 3]",
-        )?
-        .with("policy: [base_velocity]", "policy: [robot_joint_vel]")?;
+        )
+        .with("policy: [base_velocity]", "policy: [robot_joint_vel]");
     let names: Vec<String> = files.reading(true, "")?.description.inputs.into_iter().map(|input| input.name).collect();
     ensure!(names == ["robot_joint_pos", "observe_robot_joint_vel", "policy_robot_joint_vel"], "{names:?}");
     Ok(())
@@ -177,7 +173,7 @@ fn damaged_files_are_refused() -> Result<()> {
             "is not a file of the bundle",
         ),
         ("model_path: observe.onnx", "model_path: other.onnx", "there is no \"walker/other.onnx\" in the bundle"),
-        ("sha256sum: HASH policy.onnx", "sha256sum: 0123", "the file has changed since its export"),
+        ("sha256sum: HASH walker/policy.onnx", "sha256sum: 0123", "the file has changed since its export"),
         ("frequency: 50", "frequency: .nan", "pipeline.configs.frequency (line"),
         ("frequency: 50", "frequency: 0", "must be a number above 0"),
         (
@@ -211,24 +207,17 @@ fn damaged_files_are_refused() -> Result<()> {
         ("pipeline:\n  configs", "models: {}\npipeline:\n  configs", "key \"models\" occurs twice"),
     ];
     for (from, to, expected) in cases {
-        refused(to, Files::new()?.with(from, to)?.reading(true, ""), expected)?;
+        refused(to, walker().with(from, to).reading(true, ""), expected)?;
     }
+    let elsewhere = initial(&[("policy/last", SMOOTH)]);
     for (file, bytes, expected) in [
-        (
-            "walker_initial_values.safetensors",
-            initial(&[("observe/smooth_in", [f32::NAN; 4])])?,
-            "value 0 (the first is 0) is NaN",
-        ),
-        (
-            "walker_initial_values.safetensors",
-            initial(&[("policy/last", SMOOTH)])?,
-            "\"policy/last\" is not an input that pipeline.feedback_flow names",
-        ),
-        ("walker_initial_values.safetensors", b"{}".to_vec(), "not a .safetensors file"),
-        ("policy.onnx", b"onnx".to_vec(), "walker/policy.onnx"),
-        ("policy.onnx", policy("smooth"), "the policy computes this gain"),
+        (INITIAL, initial(&[("observe/smooth_in", [f32::NAN; 4])]), "value 0 (the first is 0) is NaN"),
+        (INITIAL, elsewhere, "\"policy/last\" is not an input that pipeline.feedback_flow names"),
+        (INITIAL, b"{}".to_vec(), "not a .safetensors file"),
+        ("walker/policy.onnx", b"onnx".to_vec(), "walker/policy.onnx"),
+        ("walker/policy.onnx", policy("smooth"), "the policy computes this gain"),
     ] {
-        refused(file, Files::new()?.set(file, &bytes).reading(true, ""), expected)?;
+        refused(expected, walker().with_file(file, bytes).reading(true, ""), expected)?;
     }
     Ok(())
 }
@@ -271,21 +260,21 @@ fn contradictions_name_both_sources() -> Result<()> {
     ];
     for (from, to, what, other) in cases {
         let to = to.replace("robot_joint_pos2\n", "robot_joint_pos2\n      dtype: float32\n      shape: [1, 4]\n");
-        let error = message(Files::new()?.with(from, &to)?.reading(true, ""));
+        let error = message(walker().with(from, &to).reading(true, ""));
         ensure!(error.contains(what) && error.contains("contradicts itself") && error.contains(other), "{to}: {error}");
     }
-    let swapped = Files::new()?
+    let swapped = walker()
         .with(
             "    - name: last\n      dtype: float32\n      shape: [1, 4]\n      type: tensor\n    - name: base",
             "    - name: position\n      dtype: float32\n      shape: [1, 4]\n      type: tensor\n    - name: base",
-        )?
-        .with("    inputs:\n    - name: position\n", "    inputs:\n    - name: last\n")?;
+        )
+        .with("    inputs:\n    - name: position\n", "    inputs:\n    - name: last\n");
     let error = message(swapped.reading(true, ""));
     ensure!(error.contains("order of inputs") && error.contains("walker/policy.onnx"), "{error}");
-    let mut shape = initial(&[("observe/smooth_in", SMOOTH)])?;
+    let mut shape = initial(&[("observe/smooth_in", SMOOTH)]);
     let at = shape.windows(5).position(|text| text == b"[1,4]").context("a shape")?;
     shape[at..at + 5].copy_from_slice(b"[4,1]");
-    let error = message(Files::new()?.set("walker_initial_values.safetensors", &shape).reading(true, ""));
+    let error = message(walker().with_file(INITIAL, shape).reading(true, ""));
     ensure!(error.contains("shape of \"smooth_in\"") && error.contains("safetensors: observe/smooth_in"), "{error}");
     Ok(())
 }
@@ -320,33 +309,33 @@ fn what_an_image_cannot_do_is_refused() -> Result<()> {
         ),
     ];
     for (from, to, expected) in cases {
-        let error = message(Files::new()?.with(from, to)?.reading(true, ""));
-        ensure!(error.contains(expected), "{to}: {error}");
+        refused(to, walker().with(from, to).reading(true, ""), expected)?;
     }
     // The order of the models says which tick a value is of.
-    let moved = |from: &str, to: &str| -> Result<String> {
-        let flow = Files::new()?.with(&format!("    {from}\n"), "")?;
-        let flow = flow.with(to, &format!("{to}\n    {from}"))?;
-        Ok(message(flow.reading(true, "")))
-    };
-    let error = moved("policy/last_action_out: [observe/last_action_in]", "  data_flow:")?;
-    ensure!(
-        error.contains("runs before the model that gives its value") && error.contains("pipeline.feedback_flow"),
-        "{error}"
-    );
-    let error = moved("observe/last: [policy/last]", "  feedback_flow:")?;
-    ensure!(
-        error.contains("runs after the model that gives its value") && error.contains("pipeline.data_flow"),
-        "{error}"
-    );
+    for (flow, to, expected, section) in [
+        (
+            "policy/last_action_out: [observe/last_action_in]",
+            "  data_flow:",
+            "runs before the model that gives its value",
+            "pipeline.feedback_flow",
+        ),
+        (
+            "observe/last: [policy/last]",
+            "  feedback_flow:",
+            "runs after the model that gives its value",
+            "pipeline.data_flow",
+        ),
+    ] {
+        let moved = walker().with(&format!("    {flow}\n"), "").with(to, &format!("{to}\n    {flow}"));
+        let error = message(moved.reading(true, ""));
+        ensure!(error.contains(expected) && error.contains(section), "{flow}: {error}");
+    }
     Ok(())
 }
 
 #[test]
 fn several_policies_are_refused() -> Result<()> {
-    let files = Files::new()?;
-    let files = files.set("other.yaml", files::YAML.as_bytes());
-    let error = message(files.reading(true, ""));
-    ensure!(error.contains("several policies of this family: walker/other.yaml and walker/walker.yaml"), "{error}");
-    Ok(())
+    let files = walker().with_file("walker/other.yaml", YAML);
+    let expected = "several policies of this family: walker/other.yaml and walker/walker.yaml";
+    refused("two policies", files.reading(true, ""), expected)
 }

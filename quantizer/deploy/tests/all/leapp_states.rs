@@ -1,11 +1,10 @@
 //! States that LEAPP's exports feed back: with any axes, and those of recurrent cells.
 
-use actq::error::{Context as _, Result, ensure};
+use actq::error::{Result, ensure};
 use actq_deploy::description::Description;
-use actq_deploy::{Answers, Deployment, Plan, Reading, Runner, read};
-use safetensors::tensor::{Dtype, TensorView, serialize};
+use actq_testkit::f32_tensors;
 
-use crate::common::made::{Made, message};
+use crate::common::made::{Files, message, refused};
 use crate::common::onnx::{shaped, weights};
 
 /// A port: its name and shape.
@@ -32,37 +31,22 @@ fn yaml(inputs: &[Port], outputs: &[Port], flow: &str, initial: bool) -> String 
     )
 }
 
-fn bundle(yaml: &str, network: &[u8], initial: &[(&str, &[usize], &[f32])]) -> Result<Made> {
-    let made = Made::new()?;
-    made.write("pipe.yaml", yaml.as_bytes())?;
-    made.write("policy.onnx", network)?;
-    let bytes: Vec<Vec<u8>> =
-        initial.iter().map(|(.., values)| values.iter().flat_map(|value| value.to_le_bytes()).collect()).collect();
-    let views = initial.iter().zip(&bytes);
-    let views = views.map(|((name, shape, _), bytes)| Ok((*name, TensorView::new(Dtype::F32, shape.to_vec(), bytes)?)));
-    made.write("initial.safetensors", &serialize(views.collect::<Result<Vec<_>>>()?, None)?)?;
-    Ok(made)
-}
-
-fn reading(made: &Made) -> Result<Reading> {
-    read(&made.bundle()?, true, Answers::default())
+fn bundle(yaml: &str, network: &[u8], initial: &[(&str, &[usize], &[f32])]) -> Files {
+    Files::default()
+        .with_file("pipe.yaml", yaml)
+        .with_file("policy.onnx", network)
+        .with_file("initial.safetensors", f32_tensors(initial.iter().copied()))
 }
 
 /// Asserts that 20 ticks give the targets of `reference`, which gets the raw input of each tick.
-fn agrees(made: &Made, mut reference: impl FnMut(&[f64]) -> Vec<f64>) -> Result<Description> {
-    let reading = reading(made)?;
-    ensure!(reading.questions.is_empty() && reading.unread.is_empty(), "{reading:#?}");
-    let plan = Plan::new(&reading.description, &made.bundle()?)?;
-    Deployment::new("policy", 50.0, &plan).context("an image of it")?;
-    let mut runner = Runner::new(plan);
-    for tick in 0..20 {
-        let raw: Vec<f64> = (0..4).map(|i| (0.37 * f64::from(tick) + 1.3 * f64::from(i)).sin()).collect();
-        let expected = reference(&raw);
-        let target = runner.step(&[raw]).targets.into_iter().next().context("a target")?.1;
+fn agrees(files: &Files, mut reference: impl FnMut(&[f64]) -> Vec<f64>) -> Result<Description> {
+    let raw = |tick: usize| (0..4).map(|i| (0.37 * tick as f64 + 1.3 * f64::from(i)).sin()).collect::<Vec<f64>>();
+    for (tick, (_, target)) in files.run("", 20, |_, _, tick| raw(tick))?.into_iter().enumerate() {
+        let expected = reference(&raw(tick));
         let near = target.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-5 * (1.0 + b.abs()));
         ensure!(near && target.len() == expected.len(), "tick {tick}: {target:?}, not {expected:?}");
     }
-    Ok(reading.description)
+    Ok(files.reading(true, "")?.description)
 }
 
 /// Returns the sum of inputs by weights, those of an input one after the other.
@@ -90,9 +74,9 @@ fn states_may_have_any_axes() -> Result<()> {
     );
     let start: Vec<f32> = (0..12_u8).map(|i| 0.1 * f32::from(i)).collect();
     let yaml = yaml(&inputs, &outputs, "    policy/memory_out: [policy/memory_in]\n", true);
-    let made = bundle(&yaml, &network, &[("policy/memory_in", &[3, 1, 4], &start)])?;
+    let files = bundle(&yaml, &network, &[("policy/memory_in", &[3, 1, 4], &start)]);
     let mut memory: Vec<f64> = start.iter().copied().map(f64::from).collect();
-    agrees(&made, |q| {
+    agrees(&files, |q| {
         let all: f64 = memory.iter().sum();
         memory.iter_mut().enumerate().for_each(|(i, value)| *value = (*value + q[i % 4]).tanh());
         (0..4).map(|j| 0.5 + sum(q, &weights(4, 4), 4, j) + all).collect()
@@ -126,10 +110,10 @@ fn lstm() -> Vec<u8> {
 
 #[test]
 fn cells_keep_their_states() -> Result<()> {
-    let made = bundle(&yaml(&LSTM_INPUTS, &LSTM_OUTPUTS, LSTM_FLOW, false), &lstm(), &[])?;
+    let files = bundle(&yaml(&LSTM_INPUTS, &LSTM_OUTPUTS, LSTM_FLOW, false), &lstm(), &[]);
     let (mut h, mut c) = (vec![0.0; HIDDEN], vec![0.0; HIDDEN]);
     let (w, r) = (weights(4 * HIDDEN, 4), weights(4 * HIDDEN, HIDDEN));
-    let description = agrees(&made, |q| {
+    let description = agrees(&files, |q| {
         // ONNX has the gates in the order input, output, forget, cell, each with a row for each hidden value.
         let gate = |gate: usize, k: usize| {
             let row = gate * HIDDEN + k;
@@ -154,11 +138,11 @@ fn cells_keep_their_states() -> Result<()> {
 #[test]
 fn cells_that_the_pipeline_feeds_otherwise_are_refused() -> Result<()> {
     let crossed = "    policy/h_out: [policy/c_in]\n    policy/c_out: [policy/h_in]\n";
-    let error = message(reading(&bundle(&yaml(&LSTM_INPUTS, &LSTM_OUTPUTS, crossed, false), &lstm(), &[])?));
+    let error = message(bundle(&yaml(&LSTM_INPUTS, &LSTM_OUTPUTS, crossed, false), &lstm(), &[]).reading(true, ""));
     let both = error.contains("pipeline.feedback_flow.policy/") && error.contains("policy.onnx says the output");
     ensure!(error.contains("next value of") && both, "{error}");
     let yaml = yaml(&LSTM_INPUTS, &LSTM_OUTPUTS, LSTM_FLOW, true);
-    let error = message(reading(&bundle(&yaml, &lstm(), &[("policy/h_in", &[1, 1, HIDDEN], &[0.0, 0.5])])?));
-    ensure!(error.contains("initial.safetensors: policy/h_in: the state of an LSTM or GRU starts at 0"), "{error}");
-    Ok(())
+    let files = bundle(&yaml, &lstm(), &[("policy/h_in", &[1, 1, HIDDEN], &[0.0, 0.5])]);
+    let expected = "initial.safetensors: policy/h_in: the state of an LSTM or GRU starts at 0";
+    refused("first values", files.reading(true, ""), expected)
 }

@@ -1,10 +1,10 @@
 //! mjlab's bundles. The published one runs where `ACTQ_SHARED` names the folder of the bundles.
 
 use actq::error::{Context as _, Result, ensure};
-use actq_deploy::{Answers, Bundle, Plan, read};
+use actq_deploy::{Answers, Bundle, read};
 use std::fs;
 
-use crate::common::made::{Made, agrees, asked, message, refused, shared, shared_file};
+use crate::common::made::{Files, agrees, asked, message, refused, shared, shared_file};
 use crate::common::onnx;
 
 const NAME: &str = "bitbots_walk_mjlab";
@@ -59,13 +59,12 @@ fn metadata_alone_is_read() -> Result<()> {
         ("command_names", "twist"),
         ("run_path", "x"),
     ];
-    let made = Made::of([("policy.onnx", onnx::with_metadata(fs::read(file)?, &metadata))])?;
-    let reading = made.reading(true, "")?;
-    ensure!(asked(&reading) == ["rate_hz"], "{:?}", reading.questions);
-    let reading = made.reading(true, "rate_hz = 25.0\n")?;
+    let files = Files::default().with_file("policy.onnx", onnx::with_metadata(fs::read(file)?, &metadata));
+    assert_eq!(files.asked(true, "")?, ["rate_hz"]);
+    let reading = files.reading(true, "rate_hz = 25.0\n")?;
     ensure!(reading.questions.is_empty() && reading.unread.is_empty(), "{reading:?}");
     ensure!(reading.description.rate_hz == 25.0, "{}", reading.description.rate_hz);
-    let plan = Plan::new(&reading.description, &made.bundle()?)?;
+    let plan = files.plan(&reading.description)?;
     let inputs: Vec<(&str, usize)> = plan.inputs().iter().map(|(name, len)| (name.as_str(), *len)).collect();
     ensure!(inputs == [("joint_vel", 4), ("base_ang_vel", 3), ("command", 3)], "{inputs:?}");
     Ok(())
@@ -89,28 +88,24 @@ fn metadata(key: &str, value: &str) -> Vec<(String, String)> {
 /// Values of the terms above.
 const FRAME: usize = 3 + 3 + 3 + 2 + 2 + 2 + 3;
 
-fn files(observation: usize, actions: usize, metadata: &[(String, String)], yaml: &str) -> Result<Made> {
+fn files(observation: usize, actions: usize, metadata: &[(String, String)], yaml: &str) -> Files {
     let metadata: Vec<(&str, &str)> = metadata.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
     let (inputs, outputs) = ([("obs", observation), ("time_step", 1)], [("actions", actions), ("joint_pos", 2)]);
-    let made = Made::of([("policy.onnx", onnx::graph(&[], &[], &inputs, &outputs, &metadata))])?;
-    if !yaml.is_empty() {
-        made.write("node.yaml", yaml.as_bytes())?;
-    }
-    Ok(made)
+    let files = Files::default().with_file("policy.onnx", onnx::graph(&[], &[], &inputs, &outputs, &metadata));
+    if yaml.is_empty() { files } else { files.with_file("node.yaml", yaml) }
 }
 
 #[test]
 fn histories_are_asked_if_the_length_allows_them() -> Result<()> {
-    let three = files(3 * FRAME, 2, &metadata("", ""), "")?;
-    let asked = three.reading(true, "rate_hz = 50")?.questions;
-    ensure!(asked.len() == 1 && asked[0].key == "history.length", "{asked:?}");
+    let three = files(3 * FRAME, 2, &metadata("", ""), "");
+    assert_eq!(three.asked(true, "rate_hz = 50")?, ["history.length"]);
     let description = three.reading(true, "rate_hz = 50\nhistory.length = 3")?.description;
     let text = format!("{:?}", description.values);
     ensure!(text.matches("History(History { length: 3").count() == 7, "{text}");
     refused("two frames", three.reading(true, "rate_hz = 50\nhistory.length = 2"), &format!("takes {}", 3 * FRAME))?;
 
     // Some terms only.
-    let some = files(FRAME + 4, 2, &metadata("", ""), "")?;
+    let some = files(FRAME + 4, 2, &metadata("", ""), "");
     let error = message(some.reading(true, "rate_hz = 50"));
     ensure!(error.contains("contradicts") && error.contains("joint_pos 2"), "{error}");
     let asked = some.reading(true, "rate_hz = 50\nhistory.length = [1, 1, 1, 2, 2, 1, 1]")?.questions;
@@ -121,7 +116,7 @@ fn histories_are_asked_if_the_length_allows_them() -> Result<()> {
 #[test]
 fn unknown_terms_are_asked() -> Result<()> {
     let terms = metadata("observation_names", "joint_pos,height_scan,command");
-    let bundle = files(2 + 17 + 3, 2, &terms, "")?;
+    let bundle = files(2 + 17 + 3, 2, &terms, "");
     let asked = bundle.reading(true, "rate_hz = 50")?.questions;
     ensure!(asked.len() == 1 && asked[0].key == "raw.height_scan", "{asked:?}");
     ensure!(asked[0].meaning.contains("17 of the graph's 22 values"), "{}", asked[0].meaning);
@@ -131,13 +126,11 @@ fn unknown_terms_are_asked() -> Result<()> {
     refused("a value less", bundle.reading(true, "rate_hz = 50\nraw.height_scan = 16"), "contradicts")?;
 
     // A command that is not a twist.
-    let path = files(FRAME - 3 + 18, 2, &metadata("command_names", "path"), "")?;
-    let asked = path.reading(true, "rate_hz = 50")?.questions;
-    ensure!(asked.len() == 1 && asked[0].key == "raw.command", "{asked:?}");
+    let path = files(FRAME - 3 + 18, 2, &metadata("command_names", "path"), "");
+    assert_eq!(path.asked(true, "rate_hz = 50")?, ["raw.command"]);
     // Joints that do not move.
-    let fixed = files(FRAME - 1, 1, &metadata("", ""), "")?;
-    let asked = fixed.reading(true, "rate_hz = 50")?.questions;
-    ensure!(asked.len() == 1 && asked[0].key == "joints.moved", "{asked:?}");
+    let fixed = files(FRAME - 1, 1, &metadata("", ""), "");
+    assert_eq!(fixed.asked(true, "rate_hz = 50")?, ["joints.moved"]);
     refused("another joint", fixed.reading(true, "rate_hz = 50\njoints.moved = [\"z\"]"), "joints.moved")
 }
 
@@ -146,13 +139,13 @@ const YAML: &str = "node:\n  ros__parameters:\n    model: policy.onnx\n    joint
 
 #[test]
 fn yaml_of_the_same_order_needs_no_answer() -> Result<()> {
-    let reading = files(FRAME, 2, &metadata("", ""), YAML)?.reading(true, "")?;
+    let reading = files(FRAME, 2, &metadata("", ""), YAML).reading(true, "")?;
     ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
     ensure!(reading.description.rate_hz == 100.0, "{}", reading.description.rate_hz);
     ensure!(reading.description.constants["default"] == [0.5, -0.5001], "{:?}", reading.description.constants);
     // Signs and joints that others control.
     let yaml = YAML.replace("      kd:", "      joint_signs: [1, -1]\n      uncontrolled_joint_names: [a]\n      kd:");
-    let reading = files(FRAME, 2, &metadata("", ""), &yaml)?.reading(true, "")?;
+    let reading = files(FRAME, 2, &metadata("", ""), &yaml).reading(true, "")?;
     let target = reading.description.targets.first().context("a target")?;
     ensure!(target.joints.as_deref() == Some("sent"), "{target:?}");
     ensure!(reading.description.joints["sent"] == ["b"], "{:?}", reading.description.joints);
@@ -197,7 +190,7 @@ fn bad_bundles_are_refused() -> Result<()> {
     ];
     for (name, metadata, yaml, expected) in cases {
         let answers = if yaml.is_empty() { "rate_hz = 50" } else { "" };
-        refused(name, files(FRAME, 2, &metadata, &yaml)?.reading(true, answers), expected)?;
+        refused(name, files(FRAME, 2, &metadata, &yaml).reading(true, answers), expected)?;
     }
     Ok(())
 }

@@ -5,38 +5,31 @@ mod upstream;
 
 use actq::error::{Result, ensure};
 use actq_deploy::description::TargetKind;
-use actq_deploy::{Answers, Plan, Reading, read};
 
-use crate::common::made::{Made, message};
+use crate::common::made::{Files, refused};
 use crate::common::onnx;
 use upstream::{BASE, UPSTREAM, Upstream, WALK, raw};
 
 const TICKS: usize = 25;
+/// A line that older files do not have.
+const PRIORITY: &str = "  observations_history_priority: \"time\"  # \"time\" or \"term\" priority\n";
 
-/// Replaces parts of a text that are there one time.
-fn edited(text: &str, edits: &[(&str, &str)]) -> String {
-    edits.iter().fold(text.to_owned(), |text, (from, to)| {
-        assert_eq!(text.matches(from).count(), 1, "{from:?} must occur one time in {text}");
-        text.replace(from, to)
-    })
+/// The folder of the robot, with one policy.
+fn robot(observation: usize) -> Files {
+    Files::default()
+        .with_file("base.yaml", BASE)
+        .with_file("walk/config.yaml", WALK)
+        .with_file("walk/policy.onnx", onnx::linear(observation, 4, &[]))
 }
 
-/// Writes the folder of the robot, with one policy.
-fn robot(base: &str, config: &str, observation: usize) -> Result<Made> {
-    let made = Made::new()?;
-    made.write("base.yaml", base.as_bytes())?;
-    made.write("walk/config.yaml", config.as_bytes())?;
-    made.write("walk/policy.onnx", &onnx::linear(observation, 4, &[]))?;
-    Ok(made)
-}
-
-fn reading(made: &Made, answers: &str) -> Result<Reading> {
-    read(&made.bundle()?, true, Answers::parse(answers)?)
+/// The folder of a policy of the older layout, without its robot.
+fn alone() -> Files {
+    Files::default().with_file("config.yaml", WALK).with_file("policy.onnx", onnx::linear(63, 4, &[]))
 }
 
 /// Runs a bundle; returns the same as [`Upstream::run`].
-fn run(made: &Made, answers: &str) -> Result<Vec<Vec<f64>>> {
-    let ticks = made.run(answers, TICKS, |name, _, tick| raw(name, tick))?;
+fn run(files: &Files, answers: &str) -> Result<Vec<Vec<f64>>> {
+    let ticks = files.run(answers, TICKS, |name, _, tick| raw(name, tick))?;
     Ok(ticks.into_iter().map(|(observation, targets)| [observation, targets].concat()).collect())
 }
 
@@ -49,17 +42,17 @@ fn difference(own: &[Vec<f64>], other: &[Vec<f64>]) -> f64 {
     own.iter().zip(other).map(of).fold(0.0, f64::max)
 }
 
-fn agrees(made: &Made, answers: &str, upstream: &Upstream) -> Result<()> {
-    let difference = difference(&run(made, answers)?, &upstream.run(TICKS));
+fn agrees(files: &Files, answers: &str, upstream: &Upstream) -> Result<()> {
+    let difference = difference(&run(files, answers)?, &upstream.run(TICKS));
     ensure!(difference < 1e-5, "they differ by {difference}");
     Ok(())
 }
 
 #[test]
 fn a_robot_with_wheels_agrees_with_the_deploy_code() -> Result<()> {
-    let made = robot(BASE, WALK, 63)?;
-    agrees(&made, "", &UPSTREAM)?;
-    let description = reading(&made, "")?.description;
+    let files = robot(63);
+    agrees(&files, "", &UPSTREAM)?;
+    let description = files.reading(true, "")?.description;
     let kinds: Vec<TargetKind> = description.targets.iter().map(|target| target.kind).collect();
     ensure!(kinds == [TargetKind::Position, TargetKind::Velocity], "{kinds:?}");
     ensure!((description.rate_hz - 50.0).abs() < 1e-9, "{}", description.rate_hz);
@@ -73,23 +66,23 @@ fn a_robot_with_wheels_agrees_with_the_deploy_code() -> Result<()> {
 
 #[test]
 fn every_layout_of_the_history_agrees() -> Result<()> {
-    let with = |ids: &str, priority: &str| {
+    let with = |observation: usize, ids: &str, priority: &str| {
         let priority = format!("observations_history_priority: \"{priority}\"  #");
-        edited(WALK, &[("[0, 1, 2]", ids), ("observations_history_priority: \"time\"  #", &priority)])
+        robot(observation).with("[0, 1, 2]", ids).with("observations_history_priority: \"time\"  #", &priority)
     };
     let of =
         |ids: &'static [usize], is_term_priority| Upstream { observations_history: ids, is_term_priority, ..UPSTREAM };
     for (ids, list) in [("[0, 1, 2]", &[0, 1, 2][..]), ("[2, 1, 0]", &[2, 1, 0]), ("[0, 2, 4]", &[0, 2, 4])] {
-        agrees(&robot(BASE, &with(ids, "time"), 63)?, "", &of(list, false))?;
-        agrees(&robot(BASE, &with(ids, "term"), 63)?, "", &of(list, true))?;
+        agrees(&with(63, ids, "time"), "", &of(list, false))?;
+        agrees(&with(63, ids, "term"), "", &of(list, true))?;
     }
     for (ids, list) in [("[]", &[][..]), ("[0]", &[0])] {
-        agrees(&robot(BASE, &with(ids, "term"), 21)?, "", &of(list, true))?;
+        agrees(&with(21, ids, "term"), "", &of(list, true))?;
     }
     // Older files have no priority.
-    let older = edited(WALK, &[("  observations_history_priority: \"time\"  # \"time\" or \"term\" priority\n", "")]);
-    agrees(&robot(BASE, &older, 63)?, "", &UPSTREAM)?;
-    agrees(&robot(BASE, &older, 63)?, "history.layout = \"term\"\n", &of(&[0, 1, 2], true))
+    let older = robot(63).with(PRIORITY, "");
+    agrees(&older, "", &UPSTREAM)?;
+    agrees(&older, "history.layout = \"term\"\n", &of(&[0, 1, 2], true))
 }
 
 /// A policy of all other terms, without limits of the action and without wheels.
@@ -104,6 +97,10 @@ const DANCE: &[(&str, &str)] = &[
     ("num_observations: 21", "num_observations: 20"),
 ];
 
+fn dance() -> Files {
+    DANCE.iter().fold(robot(20), |files, (from, to)| files.with(from, to))
+}
+
 const DANCES: Upstream = Upstream {
     observations: &["lin_vel", "phase", "g1_phase", "RoboMimic_Deploy/phase", "actions", "dof_pos"],
     observations_history: &[],
@@ -114,19 +111,19 @@ const DANCES: Upstream = Upstream {
 
 #[test]
 fn phases_agree_with_the_deploy_code() -> Result<()> {
-    agrees(&robot(BASE, &edited(WALK, DANCE), 20)?, "motion_length = 18.0\n", &DANCES)
+    agrees(&dance(), "motion_length = 18.0\n", &DANCES)
 }
 
 #[test]
 fn every_rule_alone_changes_the_result() -> Result<()> {
-    let walk = robot(BASE, WALK, 63)?;
+    let walk = robot(63);
     for answer in
         ["gravity = \"xyzw\"", "last_action = \"raw\"", "history.zero = \"oldest\"", "history.fill = \"first\""]
     {
         let difference = difference(&run(&walk, &format!("{answer}\n"))?, &UPSTREAM.run(TICKS));
         ensure!(difference > 1e-3, "{answer}: {difference}");
     }
-    let dance = robot(BASE, &edited(WALK, DANCE), 20)?;
+    let dance = dance();
     let answers = [
         "lin_vel = \"input\"",
         "clock.when = \"after\"",
@@ -161,10 +158,9 @@ fn every_key_alone_changes_the_result() -> Result<()> {
         // The reverse.
         ("[2, 0, 3, 1]", "[1, 3, 0, 2]"),
     ];
-    for edit in edits {
-        let made = robot(BASE, &edited(WALK, &[edit]), 63)?;
-        let difference = difference(&run(&made, "")?, &UPSTREAM.run(TICKS));
-        ensure!(difference > 1e-3, "{edit:?}: {difference}");
+    for (from, to) in edits {
+        let difference = difference(&run(&robot(63).with(from, to), "")?, &UPSTREAM.run(TICKS));
+        ensure!(difference > 1e-3, "{to}: {difference}");
     }
     Ok(())
 }
@@ -172,45 +168,26 @@ fn every_key_alone_changes_the_result() -> Result<()> {
 /// A policy of the older layout: one file, numbers instead of lists, and both permutations.
 #[test]
 fn the_older_layout_agrees_with_its_deploy_code() -> Result<()> {
-    let config = edited(
-        WALK,
-        &[
-            (
-                "dog/walk:\n",
-                "dog_isaacgym:\n  framework: \"isaacgym\"\n  rows: 2\n  cols: 2\n  dt: 0.005\n  decimation: 4\n",
-            ),
-            (
-                "action_scale: [0.25, 0.125, 5.0, 4.0]",
-                "action_scale: 0.25\n  action_scale_wheel: 3.0\n  hip_scale_reduction: 0.5\n  hip_scale_reduction_indices: [1]",
-            ),
-            ("joint_mapping: [2, 0, 3, 1]", "state_mapping: [2, 0, 3, 1]\n  command_mapping: [1, 3, 0, 2]"),
-            ("  observations_history_priority: \"time\"  # \"time\" or \"term\" priority\n", ""),
-        ],
-    );
-    let of = |config: &str| -> Result<Made> {
-        let made = Made::new()?;
-        made.write("config.yaml", config.as_bytes())?;
-        made.write("policy.onnx", &onnx::linear(63, 4, &[]))?;
-        Ok(made)
-    };
+    let isaacgym = "dog_isaacgym:\n  framework: \"isaacgym\"\n  rows: 2\n  cols: 2\n  dt: 0.005\n  decimation: 4\n";
+    let scale =
+        "action_scale: 0.25\n  action_scale_wheel: 3.0\n  hip_scale_reduction: 0.5\n  hip_scale_reduction_indices: [1]";
+    let mappings = "state_mapping: [2, 0, 3, 1]\n  command_mapping: [1, 3, 0, 2]";
+    let older = alone()
+        .with("dog/walk:\n", isaacgym)
+        .with("action_scale: [0.25, 0.125, 5.0, 4.0]", scale)
+        .with("joint_mapping: [2, 0, 3, 1]", mappings)
+        .with(PRIORITY, "");
     let upstream =
         Upstream { action_scale: [0.25, 0.25, 3.0, 3.0], hip_scale_reduction: [1.0, 0.5, 1.0, 1.0], ..UPSTREAM };
-    agrees(&of(&config)?, "", &upstream)?;
+    agrees(&older, "", &upstream)?;
     // Names without a permutation are in the order of the policy.
-    let names = edited(
-        &config,
-        &[(
-            "state_mapping: [2, 0, 3, 1]\n  command_mapping: [1, 3, 0, 2]",
-            "joint_controller_names: [fl_leg, fr_leg, fl_foot, fr_foot]",
-        )],
-    );
-    agrees(&of(&names)?, "", &Upstream { joint_mapping: [0, 1, 2, 3], ..upstream })?;
+    let names = older.with(mappings, "joint_controller_names: [fl_leg, fr_leg, fl_foot, fr_foot]");
+    agrees(&names, "", &Upstream { joint_mapping: [0, 1, 2, 3], ..upstream })?;
     for (from, to, expected) in [
         ("[1, 3, 0, 2]", "[2, 0, 3, 1]", "command_mapping says [2, 0, 3, 1], which is not its reverse"),
         ("\"isaacgym\"", "\"isaacsim\"", "transposes its lists by rows and cols"),
     ] {
-        let error = message(reading(&of(&edited(&config, &[(from, to)]))?, ""));
-        ensure!(error.contains(expected), "{error}");
+        refused(to, older.with(from, to).reading(true, ""), expected)?;
     }
     Ok(())
 }
@@ -218,14 +195,13 @@ fn the_older_layout_agrees_with_its_deploy_code() -> Result<()> {
 /// A policy that moves some of the robot's joints: its targets have its own order.
 #[test]
 fn a_policy_may_move_some_joints() -> Result<()> {
-    let base =
-        edited(BASE, &[("\"fl_foot\"]", "\"fl_foot\", \"arm\"]"), ("\"fl_foot_c\"]", "\"fl_foot_c\", \"arm_c\"]")]);
-    let made = robot(&base, WALK, 63)?;
-    let description = reading(&made, "")?.description;
+    let files =
+        robot(63).with("\"fl_foot\"]", "\"fl_foot\", \"arm\"]").with("\"fl_foot_c\"]", "\"fl_foot_c\", \"arm_c\"]");
+    let description = files.reading(true, "")?.description;
     let orders: Vec<Option<&str>> = description.targets.iter().map(|target| target.joints.as_deref()).collect();
     ensure!(orders == [Some("policy_order"); 2], "{orders:?}");
     ensure!(description.gains.as_ref().is_some_and(|gains| gains.stiffness == [20.0, 30.0, 0.0, 0.0]), "gains");
-    let plan = Plan::new(&description, &made.bundle()?);
+    let plan = files.plan(&description);
     ensure!(plan.is_ok_and(|plan| plan.inputs().contains(&("dof_pos".to_owned(), 5))), "five joints are read");
     Ok(())
 }

@@ -1,15 +1,12 @@
 //! A pipeline of two models as LEAPP writes it, and the arithmetic of its runtime.
 
-use actq::error::{Context as _, Result, ensure};
-use actq_deploy::{Answers, Reading, read};
-use safetensors::tensor::{Dtype, TensorView, serialize};
-use sha2::{Digest as _, Sha256};
-use std::collections::BTreeMap;
+use actq::error::Result;
+use actq_testkit::f32_tensors;
 
-use super::made::Made;
+use super::made::Files;
 use super::onnx::{graph, weights};
 
-/// The YAML file, in which `HASH observe.onnx` stands for that file's hash.
+/// The YAML file.
 pub(crate) const YAML: &str = "\
 models:
   observe:
@@ -53,7 +50,7 @@ models:
       backend: onnx
       model_path: observe.onnx
       md5sum: 0
-      sha256sum: HASH observe.onnx
+      sha256sum: HASH walker/observe.onnx
       opset_version: 13
   policy:
     inputs:
@@ -103,7 +100,7 @@ models:
       backend: onnx
       model_path: policy.onnx
       md5sum: 0
-      sha256sum: HASH policy.onnx
+      sha256sum: HASH walker/policy.onnx
       tensorrt_compatible: true
 
 pipeline:
@@ -136,69 +133,25 @@ pub(crate) const SMOOTH: [f32; 4] = [0.75, -0.5, 2.0, 0.25];
 pub(crate) const KP: [f32; 4] = [25.0, 30.0, 25.0, 30.0];
 pub(crate) const KD: [f32; 4] = [0.5, 0.75, 0.5, 0.75];
 
-/// The files of a bundle, by their names in the folder `walker`.
-#[derive(Clone)]
-pub(crate) struct Files(pub(crate) BTreeMap<&'static str, Vec<u8>>);
+/// File of the first values.
+pub(crate) const INITIAL: &str = "walker/walker_initial_values.safetensors";
 
-impl Files {
-    pub(crate) fn new() -> Result<Self> {
-        let files = [
-            ("walker.yaml", YAML.as_bytes().to_vec()),
-            ("observe.onnx", observe()),
-            ("policy.onnx", policy("stiffness")),
-        ];
-        let initial = initial(&[("observe/last_action_in", [0.0; 4]), ("observe/smooth_in", SMOOTH)])?;
-        Ok(Self(files.into_iter().chain([("walker_initial_values.safetensors", initial)]).collect()))
-    }
+pub(crate) fn walker() -> Files {
+    Files::default()
+        .with_file("walker/walker.yaml", YAML)
+        .with_file("walker/observe.onnx", observe())
+        .with_file("walker/policy.onnx", policy("stiffness"))
+        .with_file(INITIAL, initial(&[("observe/last_action_in", [0.0; 4]), ("observe/smooth_in", SMOOTH)]))
+}
 
-    /// Replaces a text that occurs one time in the YAML file.
-    pub(crate) fn with(&self, from: &str, to: &str) -> Result<Self> {
-        let text = self.yaml()?;
-        ensure!(text.matches(from).count() == 1, "{from:?} must occur one time");
-        Ok(self.set("walker.yaml", text.replace(from, to).as_bytes()))
-    }
-
-    pub(crate) fn set(&self, name: &'static str, bytes: &[u8]) -> Self {
-        let mut files = self.clone();
-        files.0.insert(name, bytes.to_vec());
-        files
-    }
-
-    pub(crate) fn yaml(&self) -> Result<String> {
-        Ok(String::from_utf8(self.0.get("walker.yaml").context("a YAML file")?.clone())?)
-    }
-
-    pub(crate) fn made(&self) -> Result<Made> {
-        let made = Made::new()?;
-        let mut files = self.clone();
-        let mut text = self.yaml()?;
-        for (name, bytes) in &self.0 {
-            let hash: String = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
-            text = text.replace(&format!("HASH {name}"), &hash);
-        }
-        files.0.insert("walker.yaml", text.into_bytes());
-        files.0.iter().try_for_each(|(name, bytes)| made.write(&format!("walker/{name}"), bytes))?;
-        Ok(made)
-    }
-
-    pub(crate) fn reading(&self, accepted: bool, answers: &str) -> Result<Reading> {
-        read(&self.made()?.bundle()?, accepted, Answers::parse(answers)?)
-    }
-
-    /// Runs 20 ticks; returns the targets of each.
-    pub(crate) fn run(&self, answers: &str) -> Result<Vec<Vec<f64>>> {
-        Ok(self.made()?.run(answers, 20, raw)?.into_iter().map(|(_, targets)| targets).collect())
-    }
+/// Runs 20 ticks; returns the targets of each.
+pub(crate) fn run(files: &Files, answers: &str) -> Result<Vec<Vec<f64>>> {
+    Ok(files.run(answers, 20, raw)?.into_iter().map(|(_, targets)| targets).collect())
 }
 
 /// Returns first values of inputs, which are `[1, 4]`.
-pub(crate) fn initial(tensors: &[(&str, [f32; 4])]) -> Result<Vec<u8>> {
-    let bytes: Vec<(&str, Vec<u8>)> = tensors
-        .iter()
-        .map(|(name, values)| (*name, values.iter().flat_map(|value| value.to_le_bytes()).collect()))
-        .collect();
-    let views = bytes.iter().map(|(name, bytes)| Ok((*name, TensorView::new(Dtype::F32, vec![1, 4], bytes)?)));
-    Ok(serialize(views.collect::<Result<Vec<_>>>()?, None)?)
+pub(crate) fn initial(tensors: &[(&str, [f32; 4])]) -> Vec<u8> {
+    f32_tensors(tensors.iter().map(|(name, values)| (name, [1, 4], values)))
 }
 
 /// The model that prepares what the policy reads.

@@ -1,12 +1,9 @@
 //! Files of LeRobot's policies of states, as LeRobot writes them.
 
-use actq::error::{Context as _, Result, ensure};
-use actq_deploy::Reading;
-use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
-use std::collections::BTreeMap;
+use actq::error::Result;
+use actq_testkit::f32_tensors;
 
-use super::made::{Made, Tick};
+use super::made::{Files, Tick};
 use super::onnx;
 
 pub(crate) const CONFIG: &str = r#"{
@@ -174,113 +171,40 @@ pub(crate) const STATISTICS: [(&str, &str, &[f32]); 14] = [
     ("action", "q99", &[60.0, 5.0]),
 ];
 
-/// Returns a .safetensors file.
-pub(crate) fn tensors<'a>(all: impl IntoIterator<Item = (String, &'a [f32])>) -> Result<Vec<u8>> {
-    let bytes = all.into_iter().map(|(name, values)| {
-        (name, vec![values.len()], values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())
-    });
-    let bytes: Vec<_> = bytes.collect();
-    let views = bytes.iter().map(|(name, shape, bytes)| Ok((name, TensorView::new(Dtype::F32, shape.clone(), bytes)?)));
-    Ok(serialize(views.collect::<Result<Vec<_>>>()?, None)?)
-}
-
 pub(crate) fn statistics(feature: &str, name: &str) -> Vec<f64> {
     let found = STATISTICS.iter().find(|(of, statistic, _)| (*of, *statistic) == (feature, name));
     found.map_or(Vec::new(), |(.., values)| values.iter().map(|value| f64::from(*value)).collect())
 }
 
-/// The files of a policy.
-#[derive(Clone)]
-pub(crate) struct Files(pub(crate) BTreeMap<String, Vec<u8>>);
+/// Returns the tensors of the statistics, each of which has its feature's length.
+fn tensors<'a>(all: impl IntoIterator<Item = (String, &'a [f32])>) -> Vec<u8> {
+    f32_tensors(all.into_iter().map(|(name, values)| (name, [values.len()], values)))
+}
 
-impl Files {
-    /// Those of a policy with processors.
-    pub(crate) fn new() -> Result<Self> {
-        let all = STATISTICS.iter().map(|(feature, name, values)| (format!("{feature}.{name}"), *values));
-        let mut files = Self(BTreeMap::new());
-        for file in STATE_FILES {
-            files.set(file, &tensors(all.clone())?);
-        }
-        files.set("config.json", CONFIG.as_bytes());
-        files.set("policy_preprocessor.json", BEFORE.as_bytes());
-        files.set("policy_postprocessor.json", AFTER.as_bytes());
-        files.set("meta/info.json", INFO.as_bytes());
-        files.set("policy.onnx", &onnx::linear(3, 2, &[]));
-        Ok(files)
-    }
+fn named_statistics() -> impl Iterator<Item = (String, &'static [f32])> + Clone {
+    STATISTICS.iter().map(|(feature, name, values)| (format!("{feature}.{name}"), *values))
+}
 
-    /// Those of an older policy, whose weights have buffers.
-    pub(crate) fn older() -> Result<Self> {
-        let mut files = Self::new()?;
-        for file in STATE_FILES.into_iter().chain(["policy_preprocessor.json", "policy_postprocessor.json"]) {
-            files.0.remove(file);
-        }
-        let names = |feature: &str| if feature == "action" { "unnormalize_outputs" } else { "normalize_inputs" };
-        let all = STATISTICS.iter().filter(|(_, name, _)| !name.starts_with('q')).map(|(feature, name, values)| {
-            (format!("{}.buffer_{}.{name}", names(feature), feature.replace('.', "_")), *values)
-        });
-        files.set("model.safetensors", &tensors(all.chain([("model.weight".to_owned(), &[0.5][..])]))?);
-        Ok(files)
-    }
+/// The files of a policy with processors.
+pub(crate) fn files() -> Files {
+    let files = Files::default()
+        .with_file("config.json", CONFIG)
+        .with_file("policy_preprocessor.json", BEFORE)
+        .with_file("policy_postprocessor.json", AFTER)
+        .with_file("meta/info.json", INFO)
+        .with_file("policy.onnx", onnx::linear(3, 2, &[]));
+    STATE_FILES.iter().fold(files, |files, file| files.with_file(file, tensors(named_statistics())))
+}
 
-    pub(crate) fn set(&mut self, file: &str, bytes: &[u8]) {
-        self.0.insert(file.to_owned(), bytes.to_vec());
-    }
-
-    /// Replaces a text in all of the JSON files that have it.
-    pub(crate) fn with(&self, from: &str, to: &str) -> Result<Self> {
-        let mut files = self.clone();
-        let mut found = false;
-        for bytes in files.0.iter_mut().filter(|(name, _)| name.ends_with("json")).map(|(_, bytes)| bytes) {
-            let text = String::from_utf8_lossy(bytes).into_owned();
-            found |= text.contains(from);
-            *bytes = text.replace(from, to).into_bytes();
-        }
-        ensure!(found, "no file has {from:?}");
-        Ok(files)
-    }
-
-    /// Replaces a text in one file.
-    pub(crate) fn with_in(&self, file: &str, from: &str, to: &str) -> Result<Self> {
-        let mut files = self.clone();
-        let text = String::from_utf8_lossy(self.0.get(file).context("no such file")?).into_owned();
-        ensure!(text.contains(from), "{file} has no {from:?}");
-        files.set(file, text.replace(from, to).as_bytes());
-        Ok(files)
-    }
-
-    pub(crate) fn with_file(&self, file: &str, bytes: &[u8]) -> Self {
-        let mut files = self.clone();
-        files.set(file, bytes);
-        files
-    }
-
-    pub(crate) fn without(&self, file: &str) -> Self {
-        let mut files = self.clone();
-        files.0.remove(file);
-        files
-    }
-
-    pub(crate) fn made(&self) -> Result<Made> {
-        Made::of(&self.0)
-    }
-
-    pub(crate) fn reading(&self, accepted: bool, answers: &str) -> Result<Reading> {
-        self.made()?.reading(accepted, answers)
-    }
-
-    /// Returns the keys of the questions.
-    pub(crate) fn asked(&self, accepted: bool, answers: &str) -> Result<Vec<String>> {
-        let mut asked: Vec<String> =
-            self.reading(accepted, answers)?.questions.into_iter().map(|question| question.key).collect();
-        asked.sort();
-        Ok(asked)
-    }
-
-    /// Runs 20 ticks with the raw values of [`raw`]: the observation and the target of each.
-    pub(crate) fn run(&self, answers: &str) -> Result<Vec<Tick>> {
-        self.made()?.run(answers, 20, |_, len, tick| raw(tick, len))
-    }
+/// The files of an older policy, whose weights have buffers.
+pub(crate) fn older() -> Files {
+    let replaced = [STATE_FILES[0], STATE_FILES[1], "policy_preprocessor.json", "policy_postprocessor.json"];
+    let files = replaced.iter().fold(files(), |files, file| files.without(file));
+    let names = |feature: &str| if feature == "action" { "unnormalize_outputs" } else { "normalize_inputs" };
+    let all = STATISTICS.iter().filter(|(_, name, _)| !name.starts_with('q')).map(|(feature, name, values)| {
+        (format!("{}.buffer_{}.{name}", names(feature), feature.replace('.', "_")), *values)
+    });
+    files.with_file("model.safetensors", tensors(all.chain([("model.weight".to_owned(), &[0.5][..])])))
 }
 
 /// Raw values of a tick. The last one of a state is near its minimum, so that eps counts.
@@ -289,9 +213,13 @@ pub(crate) fn raw(tick: usize, len: usize) -> Vec<f64> {
     [0.7 * t - 5.0, (0.9 * t).sin(), 0.25 + 2e-9 * (t - 4.0)][..len].to_vec()
 }
 
-/// Replaces a statistic in one of the state files.
-pub(crate) fn with_statistic(file: &str, name: &str, values: &[f32]) -> Result<Files> {
-    let all = STATISTICS.iter().map(|(feature, statistic, values)| (format!("{feature}.{statistic}"), *values));
-    let all = all.map(|(own, old)| if own == name { (own, values) } else { (own, old) });
-    Ok(Files::new()?.with_file(file, &tensors(all.filter(|(_, values)| !values.is_empty()))?))
+/// Runs 20 ticks with these raw values.
+pub(crate) fn run(files: &Files, answers: &str) -> Result<Vec<Tick>> {
+    files.run(answers, 20, |_, len, tick| raw(tick, len))
+}
+
+/// Returns a state file with another statistic, or without it.
+pub(crate) fn statistics_with(name: &str, values: &[f32]) -> Vec<u8> {
+    let all = named_statistics().map(|(own, old)| if own == name { (own, values) } else { (own, old) });
+    tensors(all.filter(|(_, values)| !values.is_empty()))
 }

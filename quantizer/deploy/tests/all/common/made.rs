@@ -3,6 +3,8 @@
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::description::Description;
 use actq_deploy::{Answers, Bundle, Deployment, Plan, Reading, Reference, Runner, read};
+use sha2::{Digest as _, Sha256};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -66,37 +68,75 @@ pub(crate) fn asked(reading: &Reading) -> Vec<&str> {
 /// The observation of a tick, and its targets, one after the other.
 pub(crate) type Tick = (Vec<f64>, Vec<f64>);
 
-/// A bundle that a test writes.
-pub(crate) struct Made(TempDir);
+/// The files of a bundle that a test makes, by their names. In a YAML file, `HASH name` is the SHA-256 of a file.
+#[derive(Clone, Default)]
+pub(crate) struct Files(pub(crate) BTreeMap<String, Vec<u8>>);
 
-impl Made {
-    pub(crate) fn new() -> Result<Self> {
-        Ok(Self(TempDir::new()?))
+impl Files {
+    /// Adds or replaces a file.
+    pub(crate) fn with_file(&self, name: &str, bytes: impl Into<Vec<u8>>) -> Self {
+        let mut files = self.clone();
+        files.0.insert(name.to_owned(), bytes.into());
+        files
     }
 
-    /// Writes files by name.
-    pub(crate) fn of<N: AsRef<str>, B: AsRef<[u8]>>(files: impl IntoIterator<Item = (N, B)>) -> Result<Self> {
-        let made = Self::new()?;
-        for (name, bytes) in files {
-            made.write(name.as_ref(), bytes.as_ref())?;
+    pub(crate) fn without(&self, name: &str) -> Self {
+        let mut files = self.clone();
+        files.0.remove(name);
+        files
+    }
+
+    /// Replaces a text that occurs one time in the YAML files.
+    #[track_caller]
+    pub(crate) fn with(&self, from: &str, to: &str) -> Self {
+        let (files, count) = self.replaced("yaml", from, to);
+        assert_eq!(count, 1, "{from:?} must occur one time");
+        files
+    }
+
+    /// Replaces a text wherever the files have it whose names end in `ending`.
+    #[track_caller]
+    pub(crate) fn with_in(&self, ending: &str, from: &str, to: &str) -> Self {
+        let (files, count) = self.replaced(ending, from, to);
+        assert!(count > 0, "no {ending} has {from:?}");
+        files
+    }
+
+    fn replaced(&self, ending: &str, from: &str, to: &str) -> (Self, usize) {
+        let (mut files, mut count) = (self.clone(), 0);
+        for (_, bytes) in files.0.iter_mut().filter(|(name, _)| name.ends_with(ending)) {
+            let text = String::from_utf8_lossy(bytes).into_owned();
+            count += text.matches(from).count();
+            *bytes = text.replace(from, to).into_bytes();
         }
-        Ok(made)
+        (files, count)
     }
 
-    pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
-        let path = self.0.path().join(name);
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder)?;
+    /// Runs `work` with the bundle in a folder.
+    fn written<T>(&self, work: impl FnOnce(&Bundle) -> Result<T>) -> Result<T> {
+        let folder = TempDir::new()?;
+        let hash = |bytes| Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+        let hashes: Vec<_> = self.0.iter().map(|(name, bytes)| (format!("HASH {name}"), hash(bytes))).collect();
+        let files = hashes.iter().fold(self.clone(), |files, (name, hash)| files.replaced("yaml", name, hash).0);
+        for (name, bytes) in &files.0 {
+            let path = folder.path().join(name);
+            fs::create_dir_all(path.parent().context("a folder")?)?;
+            fs::write(path, bytes)?;
         }
-        Ok(fs::write(path, bytes)?)
-    }
-
-    pub(crate) fn bundle(&self) -> Result<Bundle> {
-        Bundle::open(self.0.path())
+        work(&Bundle::open(folder.path())?)
     }
 
     pub(crate) fn reading(&self, accepted: bool, answers: &str) -> Result<Reading> {
-        read(&self.bundle()?, accepted, Answers::parse(answers)?)
+        self.written(|bundle| read(bundle, accepted, Answers::parse(answers)?))
+    }
+
+    /// Returns the keys of the questions.
+    pub(crate) fn asked(&self, accepted: bool, answers: &str) -> Result<Vec<String>> {
+        Ok(asked(&self.reading(accepted, answers)?).into_iter().map(str::to_owned).collect())
+    }
+
+    pub(crate) fn plan(&self, description: &Description) -> Result<Plan> {
+        self.written(|bundle| Plan::new(description, bundle))
     }
 
     /// Runs a bundle that has no questions besides `answers`, and of which an image can be made. `raw` gives an input's values by its
@@ -109,7 +149,7 @@ impl Made {
     ) -> Result<Vec<Tick>> {
         let reading = self.reading(true, answers)?;
         ensure!(reading.questions.is_empty() && reading.unread.is_empty(), "{reading:#?}");
-        let plan = Plan::new(&reading.description, &self.bundle()?)?;
+        let plan = self.plan(&reading.description)?;
         Deployment::new("policy", 50.0, &plan).context("an image of it")?;
         let mut runner = Runner::new(plan);
         let inputs = runner.plan().inputs().to_vec();
