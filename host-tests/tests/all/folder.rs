@@ -5,10 +5,9 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use actq::data::NpzWriter;
+use actq_testkit::{Dtype, f32_tensors, safetensors};
 use anyhow::Result;
 use ndarray::{Array, Dimension};
-use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
 use serde_json::Value;
 
 /// Type, shape and bytes of a tensor.
@@ -20,19 +19,17 @@ pub(crate) fn write_policy<N: AsRef<str>>(
     json: &Value,
     tensors: impl IntoIterator<Item = (N, Vec<usize>, Vec<f32>)>,
 ) -> Result<()> {
-    let tensors = tensors.into_iter().map(|(name, shape, values)| {
-        (name, (Dtype::F32, shape, values.iter().flat_map(|value| value.to_le_bytes()).collect()))
-    });
     fs::write(folder.join("policy.json"), json.to_string())?;
-    write_tensors(folder, &tensors.collect::<Vec<_>>())
+    Ok(fs::write(folder.join("policy.safetensors"), f32_tensors(tensors))?)
 }
 
 /// Writes policy.safetensors with named tensors.
-pub(crate) fn write_tensors<N: AsRef<str>>(folder: &Path, tensors: &[(N, Tensor)]) -> Result<()> {
-    let views = tensors
-        .iter()
-        .map(|(name, (dtype, shape, bytes))| Ok((name.as_ref(), TensorView::new(*dtype, shape.clone(), bytes)?)));
-    Ok(fs::write(folder.join("policy.safetensors"), serialize(views.collect::<Result<Vec<_>>>()?, None)?)?)
+pub(crate) fn write_tensors<N: AsRef<str>>(
+    folder: &Path,
+    tensors: impl IntoIterator<Item = (N, Tensor)>,
+) -> Result<()> {
+    let tensors = tensors.into_iter().map(|(name, (dtype, shape, bytes))| (name, dtype, shape, bytes));
+    Ok(fs::write(folder.join("policy.safetensors"), safetensors(tensors))?)
 }
 
 /// Writes a recording of observations only.

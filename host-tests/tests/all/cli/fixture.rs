@@ -10,9 +10,9 @@ use actq::graph::Evaluator;
 use actq::policy::Policy;
 use actq_bench::command::{actq, run, succeeded};
 use actq_bench::golden::Random;
+use actq_testkit::Dtype;
 use anyhow::{Context, Result, ensure};
 use ndarray::Array3;
-use safetensors::Dtype;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -142,7 +142,7 @@ pub(super) fn write_json(policy: &Path, json: &Value) -> Result<()> {
 }
 
 pub(super) fn write_tensors(policy: &Path, tensors: &Tensors) -> Result<()> {
-    folder::write_tensors(policy, &tensors.clone().into_iter().collect::<Vec<_>>())
+    folder::write_tensors(policy, tensors.clone())
 }
 
 pub(super) fn draw_observations(seed: u64, width: usize) -> Array3<f32> {

@@ -10,9 +10,8 @@ use actq::pipeline;
 use actq::policy::Policy;
 use actq_bench::command::{actq, all, failed, run, succeeded};
 use actq_kernels::Width;
+use actq_testkit::{Dtype, f32_tensors};
 use anyhow::{Context, Result, ensure};
-use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
 use serde_json::{Value, json};
 
 use super::fixture::{
@@ -299,8 +298,7 @@ fn file_content_cannot_control_the_terminal() -> Result<()> {
     ensure!(format!("{:#}", refused.expect_err("a name")).contains("control characters"));
 
     // The names of tensors in a message, and those of matrices in statistics.
-    let view = TensorView::new(Dtype::F32, vec![1], &[0; 4])?;
-    fs::write(fixture.policy().join("policy.safetensors"), serialize([("w\x1b[2J", view)], None)?)?;
+    fs::write(fixture.policy().join("policy.safetensors"), f32_tensors([("w\x1b[2J", [1], [0.0])]))?;
     let output = fixture.quantize(&fixture.out("other.actq"), "")?;
     failed(&output, 1, &["the file holds w\\u{1b}[2J"])?;
     ensure!(!output.stderr.contains(&0x1b), "{:?}", String::from_utf8_lossy(&output.stderr));

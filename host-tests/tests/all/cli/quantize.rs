@@ -7,9 +7,8 @@ use actq::runtime::ImageBuffer;
 use actq_bench::command::{actq, failed, research, run, succeeded};
 use actq_bench::ur3;
 use actq_kernels::Width;
+use actq_testkit::{Dtype, safetensors};
 use anyhow::{Context, Result, ensure};
-use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -256,11 +255,8 @@ fn a_recording_may_have_any_name_and_format() -> Result<()> {
     let named = fixture.out("mine.safetensors");
     let bytes: Vec<u8> = obs.iter().flat_map(|v| f64::from(*v).to_le_bytes()).collect();
     let length: Vec<u8> = [STEPS as i32, 7, STEPS as i32].iter().flat_map(|n| n.to_le_bytes()).collect();
-    let views = [
-        ("obs", TensorView::new(Dtype::F64, vec![EPISODES, STEPS, OBS], &bytes)?),
-        ("length", TensorView::new(Dtype::I32, vec![EPISODES], &length)?),
-    ];
-    fs::write(&named, serialize(views, None)?)?;
+    let (obs, lengths) = (vec![EPISODES, STEPS, OBS], vec![EPISODES]);
+    fs::write(&named, safetensors([("obs", Dtype::F64, obs, bytes), ("length", Dtype::I32, lengths, length)]))?;
     fs::remove_file(policy.join("calib.npz"))?;
     let options = format!("--bits 3 --group 32 --calib {}", text(&named));
     let out = fixture.out("named.actq");

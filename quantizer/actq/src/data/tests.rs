@@ -1,9 +1,9 @@
 use std::fs::{self, File};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use actq_testkit::{Dtype, safetensors};
 use ndarray::{Array1, Array2, Array3, ArrayD, IxDyn, ShapeBuilder as _, s};
-use safetensors::Dtype;
-use safetensors::tensor::{TensorView, serialize};
 use tempfile::TempDir;
 
 use super::*;
@@ -16,12 +16,27 @@ use crate::testing::{dataset, lstm, mlp};
 const SIZES: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 0 };
 const RECURRENT: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 4 };
 
-/// An array of a file to be written.
-enum Array {
-    F32(ArrayD<f32>),
-    F64(ArrayD<f64>),
-    I32(ArrayD<i32>),
-    I64(ArrayD<i64>),
+/// An array of a file to be written: its type and shape, and its bytes in numpy's format and alone.
+struct Array {
+    dtype: Dtype,
+    shape: Vec<usize>,
+    npy: Vec<u8>,
+    bytes: Vec<u8>,
+}
+
+impl<T: Element> From<ArrayD<T>> for Array {
+    fn from(array: ArrayD<T>) -> Self {
+        let dtype = match T::DESCR {
+            "<f4" => Dtype::F32,
+            "<f8" => Dtype::F64,
+            "<i4" => Dtype::I32,
+            _ => Dtype::I64,
+        };
+        let (shape, mut npy) = (array.shape().to_vec(), Vec::new());
+        write_npy(&mut npy, &shape, array.iter().copied()).expect("an array");
+        let bytes = npy[npy_header(T::DESCR, &shape).len()..].to_vec();
+        Self { dtype, shape, npy, bytes }
+    }
 }
 
 /// Returns 0, 1, 2, ... in the given shape.
@@ -31,11 +46,11 @@ fn count(shape: &[usize]) -> ArrayD<f32> {
 }
 
 fn ints(values: &[i64]) -> Array {
-    Array::I64(Array1::from(values.to_vec()).into_dyn())
+    Array::from(Array1::from(values.to_vec()).into_dyn())
 }
 
 fn obs() -> Array {
-    Array::F32(count(&[2, 5, 3]))
+    Array::from(count(&[2, 5, 3]))
 }
 
 type Named = (&'static str, Array);
@@ -46,38 +61,14 @@ fn write(dir: &TempDir, name: &str, arrays: &[Named]) -> PathBuf {
     if name.ends_with(".npz") {
         let mut npz = NpzWriter::new(File::create(&path).expect("a file"));
         for (name, array) in arrays {
-            match array {
-                Array::F32(a) => npz.array(name, a.shape(), a.iter().copied()),
-                Array::F64(a) => npz.array(name, a.shape(), a.iter().copied()),
-                Array::I32(a) => npz.array(name, a.shape(), a.iter().copied()),
-                Array::I64(a) => npz.array(name, a.shape(), a.iter().copied()),
-            }
-            .expect("an array");
+            npz.begin(name).expect("an array").write_all(&array.npy).expect("an array");
         }
         npz.finish().expect("an archive");
     } else if name.ends_with(".npy") {
-        let mut file = File::create(&path).expect("a file");
-        match &arrays[0].1 {
-            Array::F32(a) => write_npy(&mut file, a.shape(), a.iter().copied()),
-            Array::F64(a) => write_npy(&mut file, a.shape(), a.iter().copied()),
-            Array::I32(a) => write_npy(&mut file, a.shape(), a.iter().copied()),
-            Array::I64(a) => write_npy(&mut file, a.shape(), a.iter().copied()),
-        }
-        .expect("an array");
+        fs::write(&path, &arrays[0].1.npy).expect("a file");
     } else {
-        let bytes = |array: &Array| -> (Dtype, Vec<usize>, Vec<u8>) {
-            match array {
-                Array::F32(a) => (Dtype::F32, a.shape().into(), a.iter().flat_map(|v| v.to_le_bytes()).collect()),
-                Array::F64(a) => (Dtype::F64, a.shape().into(), a.iter().flat_map(|v| v.to_le_bytes()).collect()),
-                Array::I32(a) => (Dtype::I32, a.shape().into(), a.iter().flat_map(|v| v.to_le_bytes()).collect()),
-                Array::I64(a) => (Dtype::I64, a.shape().into(), a.iter().flat_map(|v| v.to_le_bytes()).collect()),
-            }
-        };
-        let tensors: Vec<_> = arrays.iter().map(|(name, array)| (*name, bytes(array))).collect();
-        let views = tensors.iter().map(|(name, (dtype, shape, bytes))| {
-            (*name, TensorView::new(*dtype, shape.clone(), bytes).expect("a tensor"))
-        });
-        fs::write(&path, serialize(views, None).expect("a file")).expect("a file");
+        let tensors = arrays.iter().map(|(name, array)| (name, array.dtype, &array.shape, array.bytes.clone()));
+        fs::write(&path, safetensors(tensors)).expect("a file");
     }
     path
 }
@@ -89,9 +80,9 @@ fn folder() -> TempDir {
 #[test]
 fn formats_and_types_give_equal_recordings() {
     let dir = folder();
-    let wide = |a: ArrayD<f32>| Array::F64(a.mapv(f64::from));
-    let long = |values: &[i32]| Array::I32(Array1::from(values.to_vec()).into_dyn());
-    let narrow = || vec![("obs", obs()), ("action", Array::F32(count(&[2, 5, 2]))), ("length", ints(&[5, 2]))];
+    let wide = |a: ArrayD<f32>| Array::from(a.mapv(f64::from));
+    let long = |values: &[i32]| Array::from(Array1::from(values.to_vec()).into_dyn());
+    let narrow = || vec![("obs", obs()), ("action", Array::from(count(&[2, 5, 2]))), ("length", ints(&[5, 2]))];
     let doubles =
         || vec![("obs", wide(count(&[2, 5, 3]))), ("action", wide(count(&[2, 5, 2]))), ("length", long(&[5, 2]))];
     let mut fortran = ArrayD::zeros(IxDyn(&[2, 5, 3]).f());
@@ -104,7 +95,7 @@ fn formats_and_types_give_equal_recordings() {
         ("d.safetensors", doubles()),
         (
             "e.npz",
-            vec![("obs", Array::F32(fortran.clone())), ("action", wide(count(&[2, 5, 2]))), ("length", ints(&[5, 2]))],
+            vec![("obs", Array::from(fortran.clone())), ("action", wide(count(&[2, 5, 2]))), ("length", ints(&[5, 2]))],
         ),
     ] {
         // Unused arrays may have any name and type.
@@ -119,7 +110,7 @@ fn formats_and_types_give_equal_recordings() {
     assert_eq!(action.clone().map(|a| a.into_dyn()), Some(count(&[2, 5, 2])));
     assert_eq!((&length[..], state), (&[5, 2][..], &None));
 
-    for array in [obs(), wide(count(&[2, 5, 3])), Array::F32(fortran)] {
+    for array in [obs(), wide(count(&[2, 5, 3])), Array::from(fortran)] {
         let alone = Dataset::load(&write(&dir, "f.npy", &[("", array)]), SIZES).expect("npy");
         assert_eq!((&alone.obs, alone.action, &alone.length[..]), (obs_read, None, &[5, 5][..]));
     }
@@ -129,11 +120,12 @@ fn formats_and_types_give_equal_recordings() {
 fn two_axes_are_one_episode() {
     let dir = folder();
     for name in ["a.npy", "a.npz", "a.safetensors"] {
-        let path = write(&dir, name, &[("obs", Array::F32(count(&[7, 3])))]);
+        let path = write(&dir, name, &[("obs", Array::from(count(&[7, 3])))]);
         let dataset = Dataset::load(&path, SIZES).expect(name);
         assert_eq!((dataset.obs.dim(), &dataset.length[..]), ((1, 7, 3), &[7][..]));
     }
-    let arrays = [("obs", Array::F32(count(&[7, 3]))), ("action", Array::F32(count(&[7, 2]))), ("length", ints(&[4]))];
+    let arrays =
+        [("obs", Array::from(count(&[7, 3]))), ("action", Array::from(count(&[7, 2]))), ("length", ints(&[4]))];
     let dataset = Dataset::load(&write(&dir, "b.npz", &arrays), SIZES).expect("actions with two axes");
     assert_eq!((dataset.frames(), dataset.action_at(0, 3)), (4, Some(vec![6.0, 7.0])));
 }
@@ -141,18 +133,18 @@ fn two_axes_are_one_episode() {
 fn with(place: [usize; 3], value: f64) -> Array {
     let mut array = count(&[2, 5, 3]).mapv(f64::from);
     array[&place[..]] = value;
-    Array::F64(array)
+    Array::from(array)
 }
 
 fn with_f32(place: [usize; 3], value: f32) -> Array {
     let mut array = count(&[2, 5, 3]);
     array[&place[..]] = value;
-    Array::F32(array)
+    Array::from(array)
 }
 
 /// Lists damaged arrays, and the whole message after the file's name.
 fn spoilt() -> Vec<(Vec<Named>, &'static str)> {
-    let floats = |shape: &[usize]| Array::F32(count(shape));
+    let floats = |shape: &[usize]| Array::from(count(shape));
     vec![
         (vec![("seed", ints(&[1])), ("act", obs())], "array \"obs\" is missing; the file holds act, seed"),
         (
@@ -171,7 +163,7 @@ fn spoilt() -> Vec<(Vec<Named>, &'static str)> {
             "array \"obs\" has the shape [1]; use [episode, step, value], or [frame, value] for one episode",
         ),
         (
-            vec![("obs", Array::I32(count(&[2, 5, 3]).mapv(|v| v as i32)))],
+            vec![("obs", Array::from(count(&[2, 5, 3]).mapv(|v| v as i32)))],
             "array \"obs\" is of type int32; use float32 or float64",
         ),
         (vec![("obs", with_f32([1, 4, 2], f32::NAN))], "array \"obs\" holds NaN at episode 1, step 4, value 2"),
@@ -210,7 +202,7 @@ fn spoilt() -> Vec<(Vec<Named>, &'static str)> {
 fn spoilt_states() -> Vec<(Vec<Named>, &'static str)> {
     let mut infinite = count(&[2, 4]);
     infinite[[1, 2]] = f32::NEG_INFINITY;
-    let state = |array| vec![("obs", obs()), ("state", Array::F32(array))];
+    let state = |array| vec![("obs", obs()), ("state", Array::from(array))];
     vec![
         (
             state(count(&[2, 3])),
