@@ -1,28 +1,35 @@
-//! Operands and the hash of results, for `src/bin/functions.rs` on the target and
+//! Counted functions and their operands, for `src/bin/functions.rs` on the target and
 //! `host-tests/tests/all/on_target/functions.rs` on the host.
+
+use core::hint::black_box;
+
+#[cfg(target_os = "none")]
+use actq_firmware_support::count::region;
+use actq_kernels::math::Function;
+use actq_kernels::ops::denoise::{Coefficients, denoise};
+use actq_kernels::ops::noise::normal;
+use actq_kernels::ops::{cells, elementwise, norm};
 
 /// Number of elements.
 pub const LEN: usize = 256;
 
 /// Values near or outside f32's range, subnormal numbers, and zeros.
-pub const EXTREMES: [f32; 13] =
+const EXTREMES: [f32; 13] =
     [f32::MAX, f32::MIN, 1e38, -1e38, 1.0, -1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-40, -1e-40, 0.0, -0.0];
 
 /// A denoising step.
-#[derive(Debug)]
-pub struct Denoised {
-    /// Name of the case.
-    pub name: &'static str,
+struct Denoised {
+    name: &'static str,
     /// Factor of the limited sample; 0 for a step without a limit.
-    pub sample: f32,
+    sample: f32,
     /// Limit of the sample.
-    pub limit: f32,
+    limit: f32,
     /// `true` if noise is added.
-    pub noise: bool,
+    noise: bool,
 }
 
 /// Steps with limits that affect none, half and all of [`values`].
-pub const DENOISED: [Denoised; 8] = [
+const DENOISED: [Denoised; 8] = [
     Denoised { name: "denoise", sample: 0.0, limit: f32::INFINITY, noise: false },
     Denoised { name: "denoise with noise", sample: 0.0, limit: f32::INFINITY, noise: true },
     Denoised { name: "denoise, none limited", sample: 0.4, limit: 4.0, noise: false },
@@ -35,18 +42,18 @@ pub const DENOISED: [Denoised; 8] = [
 
 impl Denoised {
     /// Returns the step's coefficients in the image's order, with the shares of iterate and output in the sample.
-    pub fn coefficients(&self, x: f32, v: f32) -> [f32; 7] {
+    fn coefficients(&self, x: f32, v: f32) -> [f32; 7] {
         [x * self.sample, v * self.sample, 0.6, 0.2, self.sample, 0.1, 0.3]
     }
 }
 
 /// Returns values from -6 to 0, for which no function takes a shortcut.
-pub fn values<const N: usize>() -> [f32; N] {
+fn values<const N: usize>() -> [f32; N] {
     core::array::from_fn(|i| i as f32 * (6.0 / N as f32) - 6.0)
 }
 
 /// Returns values of all magnitudes with both signs.
-pub fn magnitudes<const N: usize>() -> [f32; N] {
+fn magnitudes<const N: usize>() -> [f32; N] {
     core::array::from_fn(|i| f32::from_bits(((i as u32) << 31) | (i as u32 * (0x7f80_0000 / N as u32))))
 }
 
@@ -54,4 +61,71 @@ pub fn magnitudes<const N: usize>() -> [f32; N] {
 pub fn hash(results: &[&[f32]]) -> u32 {
     let bits = |v: &f32| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() };
     results.iter().copied().flatten().map(bits).fold(0, |hash: u32, bits| hash.rotate_left(5) ^ bits)
+}
+
+/// Runs `work`; on the host, nothing counts it.
+#[cfg(not(target_os = "none"))]
+fn region<T>(work: impl FnOnce() -> T) -> T {
+    work()
+}
+
+/// Calls every function in a counted region, and reports its name and the hash of its results: the counted ones and, for
+/// functions and cells, those for values of all magnitudes. Stops when `report` returns `None`.
+pub fn each(mut report: impl FnMut(&'static str, u32) -> Option<()>) -> Option<()> {
+    let mut line = |name, results: &[&[f32]]| report(name, hash(results));
+    let constants = values::<LEN>().map(f32::to_bits);
+    for function in Function::ALL {
+        let (mut x, mut y) = (values::<LEN>(), magnitudes::<LEN>());
+        region(|| function.apply(black_box(&mut x)));
+        function.apply(&mut y);
+        line(function.name(), &[&x, &y])?;
+    }
+    let mut x = values::<LEN>();
+    region(|| norm::layer_norm(black_box(&mut x), &constants, &constants, 1e-5));
+    let mut rest = values::<13>();
+    norm::layer_norm(&mut rest, &constants, &constants, 1e-5);
+    line("layernorm", &[&x, &rest])?;
+    let mut x = values::<LEN>();
+    region(|| norm::rms_norm(black_box(&mut x), &constants, 1e-5));
+    let mut rest = values::<13>();
+    norm::rms_norm(&mut rest, &constants, 1e-5);
+    line("rmsnorm", &[&x, &rest])?;
+    let x = values::<LEN>();
+    for (name, of) in [("add", elementwise::add as fn(&[f32], &mut [f32])), ("mul", elementwise::mul)] {
+        let mut y = values::<LEN>();
+        region(|| of(black_box(&x), black_box(&mut y)));
+        let mut rest = values::<13>();
+        of(&x, &mut rest);
+        line(name, &[&y, &rest])?;
+    }
+    let mut y = [0.0; LEN];
+    region(|| elementwise::normalize(black_box(&x), &constants, &constants, 1.0, 5.0, black_box(&mut y)));
+    let [mut limited, mut free] = [EXTREMES; 2];
+    elementwise::normalize(&EXTREMES, &constants, &constants, 1e37, 5.0, &mut limited);
+    elementwise::normalize(&EXTREMES, &constants, &constants, f32::INFINITY, f32::INFINITY, &mut free);
+    line("normalize", &[&y, &limited, &free])?;
+    let z: [f32; LEN] = core::array::from_fn(|i| normal(1, 2, i as u32));
+    for case in &DENOISED {
+        let by = |x, v| Coefficients::from_array(case.coefficients(x, v));
+        let (limit, noise) = (case.limit, if case.noise { &z[..] } else { &[] });
+        let (mut next, mut y) = (EXTREMES, EXTREMES);
+        denoise(&by(10.0, -9.0), limit, &EXTREMES, noise, &mut next, &mut y);
+        let (extremes, by) = ([next, y], by(1.0, 0.5));
+        let (mut next, mut y) = (values::<LEN>(), [0.0; LEN]);
+        region(|| denoise(black_box(&by), limit, black_box(&x), noise, black_box(&mut next), black_box(&mut y)));
+        line(case.name, &[&next, &y[1..], extremes.as_flattened()])?;
+    }
+    let mut z = [0.0; LEN];
+    region(|| black_box(&mut z).iter_mut().zip(0..).for_each(|(z, i)| *z = normal(1, 2, i)));
+    line("noise", &[&z])?;
+    let (gates, mut c, mut h) = (values::<{ 4 * LEN }>(), values::<LEN>(), [0.0; LEN]);
+    region(|| cells::lstm_cell(black_box(&gates), &mut c, black_box(&mut h)));
+    let (mut all_c, mut all_h) = (values::<LEN>(), [0.0; LEN]);
+    cells::lstm_cell(&magnitudes::<{ 4 * LEN }>(), &mut all_c, &mut all_h);
+    line("lstm", &[&h, &c, &all_h, &all_c])?;
+    let (a, b, mut h) = (values::<{ 3 * LEN }>(), values::<{ 3 * LEN }>(), values::<LEN>());
+    region(|| cells::gru_cell(black_box(&a), &b, black_box(&mut h)));
+    let mut all = values::<LEN>();
+    cells::gru_cell(&magnitudes::<{ 3 * LEN }>(), &b, &mut all);
+    line("gru", &[&h, &all])
 }
