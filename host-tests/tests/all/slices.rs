@@ -4,15 +4,13 @@ use std::path::Path;
 use std::task::Poll;
 
 use actq::emit;
-use actq::graph::ops::{Add, Gru, LayerNorm, Linear, Lstm, Mul, Normalize, Pointwise, RmsNorm};
+use actq::graph::ops::Linear;
 use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::bits;
 use actq_bench::golden::Random;
-use actq_bench::networks::{Builder, with_wrong_self_test};
-use actq_kernels::image::Kind;
-use actq_kernels::math::Function;
+use actq_bench::networks::{Builder, Draw, with_wrong_self_test};
 use actq_kernels::{Head, StepError, Width};
 use anyhow::{Context, Result, ensure};
 use proptest::prelude::*;
@@ -22,55 +20,10 @@ const OBSERVATION: usize = 37;
 /// Steps of a run.
 const STEPS: usize = 7;
 
-/// A network of all operations, with random lengths: products with all widths in order and by index, cells, norms,
-/// functions.
+/// A network of all operations, with a step limit.
 fn network(seed: u64) -> Result<(Policy, Vec<Outcome>)> {
-    let mut random = Random::new(seed);
-    let mut length = |most: usize| 1 + random.below(most);
-    let (rows, hidden, out) = (length(90), length(30), length(5));
-    let (mixed, recurrent, group) = (length(2) == 1, length(3), [0, 32][length(2) - 1]);
-    let activations = [Activations::Int8, Activations::Int16][length(2) - 1];
-    let chunk = length(4);
-    let execute = length(chunk);
-    let mut builder = Builder::new(OBSERVATION);
-    let width = |row: usize| {
-        let which = if mixed { row * 7 % 5 } else { 4 * row / rows };
-        Width::ALL.get(which).copied().or((row == 0).then_some(Width::W2))
-    };
-    let mut last = builder.linear((rows, OBSERVATION), activations, width, group, seed.is_multiple_of(2))?;
-    let [mean, scale] = [builder.values(rows), builder.values(rows)];
-    last = builder.node(Normalize { mean, scale, pre_clip: 4.0, clip: 2.0 }, &[last])?;
-    let kept = last;
-    last = builder.node(Pointwise(Function::ALL[seed as usize % Function::ALL.len()]), &[last])?;
-    last = builder.node(Add, &[last, kept])?;
-    last = builder.node(Mul, &[last, kept])?;
-    let [weight, bias] = [builder.values(rows), builder.values(rows)];
-    last = builder.node(LayerNorm { weight: weight.clone(), bias, eps: 1e-3 }, &[last])?;
-    last = builder.node(RmsNorm { weight, eps: 1e-3 }, &[last])?;
-    let mut len = rows;
-    let all = |rows: usize| vec![Some(Width::W4); rows];
-    if recurrent == 1 {
-        let input = builder.matrix(4 * hidden, rows, activations, &all(4 * hidden), group)?;
-        let state = builder.matrix(4 * hidden, hidden, activations, &all(4 * hidden), group)?;
-        let bias = builder.values(4 * hidden);
-        last = builder.node(Lstm { hidden, input, state, bias }, &[last])?;
-        len = hidden;
-    } else if recurrent == 2 {
-        let input = builder.matrix(3 * hidden, rows, activations, &all(3 * hidden), group)?;
-        let state = builder.matrix(3 * hidden, hidden, activations, &all(3 * hidden), group)?;
-        let (input_bias, state_bias) = (builder.values(3 * hidden), builder.values(3 * hidden));
-        last = builder.node(Gru { hidden, input, state, input_bias, state_bias }, &[last])?;
-        len = hidden;
-    }
-    let matrix = builder.matrix(chunk * out, len, activations, &all(chunk * out), group)?;
-    let bias = builder.values(chunk * out);
-    builder.node(Linear { matrix, bias }, &[last])?;
-    let (mut policy, outcomes) = builder.finish("slices".to_owned(), false);
-    policy.act_len = out;
-    policy.chunk = chunk;
-    policy.execute = execute;
-    policy.kind = if chunk > 1 { Kind::Chunk } else { Kind::Step };
-    policy.contract.max_step = Some(vec![0.3; out]);
+    let (mut policy, outcomes) = Draw::new(seed).network(OBSERVATION)?;
+    policy.contract.max_step = Some(vec![0.3; policy.act_len]);
     Ok((policy, outcomes))
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use actq::contract::ActionContract;
 use actq::emit;
-use actq::graph::ops::{Concat, Linear, Span};
+use actq::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Mul, Normalize, Pointwise, RmsNorm, Span};
 use actq::graph::{Graph, NodeKind, ValueId, WeightMatrix};
 use actq::methods::scale::round_to_nearest;
 use actq::methods::{Activations, Outcome, Quantized};
@@ -12,7 +12,8 @@ use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_kernels::Width;
-use actq_kernels::image::{header as h, op, seal};
+use actq_kernels::image::{Kind, header as h, op, seal};
+use actq_kernels::math::Function;
 use anyhow::{Context, Result, ensure};
 
 /// A network under construction: each operation gets its own part of the observation.
@@ -116,6 +117,98 @@ impl Builder {
     pub fn node_of_part(&mut self, len: usize, kind: impl Into<NodeKind>) -> Result<ValueId> {
         let input = self.part(len)?;
         self.node(kind, &[input])
+    }
+}
+
+/// Draws networks, and what the shape of a matrix leaves open.
+#[derive(Debug)]
+pub struct Draw(Random);
+
+impl Draw {
+    /// Creates the generator of a seed.
+    pub fn new(seed: u64) -> Self {
+        Self(Random::new(seed))
+    }
+
+    /// Draws a number below `n`.
+    pub fn below(&mut self, n: usize) -> usize {
+        self.0.below(n)
+    }
+
+    /// Activations in paired lanes (for groups of 0 and 32) or in single lanes.
+    fn activations(&mut self) -> Activations {
+        [Activations::Int8, Activations::Int16][self.below(2)]
+    }
+
+    /// Draws the group size of a matrix.
+    pub fn group(&mut self) -> usize {
+        [0, 32, 64, 128][self.below(4)]
+    }
+
+    /// A width for each row: all equal, in blocks, or mixed with rows of 0 bits.
+    fn widths(&mut self, rows: usize) -> Vec<Option<Width>> {
+        let (kind, one) = (self.below(3), Width::ALL[self.below(4)]);
+        let width = |row: usize| match kind {
+            0 => Some(one),
+            1 => Some(Width::ALL[4 * row / rows]),
+            _ if row == 0 => Some(one),
+            _ => Width::ALL.get(row * 7 % 5).copied(),
+        };
+        (0..rows).map(width).collect()
+    }
+
+    /// Adds a matrix.
+    pub fn matrix(&mut self, builder: &mut Builder, rows: usize, cols: usize, group: usize) -> Result<usize> {
+        let (activations, widths) = (self.activations(), self.widths(rows));
+        builder.matrix(rows, cols, activations, &widths, group)
+    }
+
+    /// Adds a product with a value, with random biases or none.
+    pub fn linear(&mut self, builder: &mut Builder, rows: usize, input: ValueId, group: usize) -> Result<ValueId> {
+        let matrix = self.matrix(builder, rows, builder.graph.len_of(input), group)?;
+        let bias = if self.below(2) == 0 { builder.values(rows) } else { vec![0.0; rows] };
+        builder.node(Linear { matrix, bias }, &[input])
+    }
+
+    /// Returns a policy with every operation of a network, and chunks, that reads up to `observation` values.
+    pub fn network(&mut self, observation: usize) -> Result<(Policy, Vec<Outcome>)> {
+        let mut length = |most: usize| 1 + self.below(most);
+        let (rows, hidden, out, chunk) = (length(90), length(40), length(5), length(4));
+        let execute = length(chunk);
+        let group = self.group();
+        let mut builder = Builder::new(observation);
+        let read = 1 + self.below(observation);
+        let mut last = builder.part(read)?;
+        last = self.linear(&mut builder, rows, last, group)?;
+        let [mean, scale] = [builder.values(rows), builder.values(rows)];
+        last = builder.node(Normalize { mean, scale, pre_clip: 4.0, clip: 2.0 }, &[last])?;
+        let kept = last;
+        last = builder.node(Pointwise(Function::ALL[self.below(Function::ALL.len())]), &[last])?;
+        last = builder.node(Add, &[last, kept])?;
+        last = builder.node(Mul, &[last, kept])?;
+        let [weight, bias] = [builder.values(rows), builder.values(rows)];
+        last = builder.node(LayerNorm { weight: weight.clone(), bias, eps: 1e-3 }, &[last])?;
+        last = builder.node(RmsNorm { weight, eps: 1e-3 }, &[last])?;
+        match self.below(3) {
+            0 => {
+                let input = self.matrix(&mut builder, 4 * hidden, rows, group)?;
+                let state = self.matrix(&mut builder, 4 * hidden, hidden, group)?;
+                let bias = builder.values(4 * hidden);
+                last = builder.node(Lstm { hidden, input, state, bias }, &[last])?;
+            }
+            1 => {
+                let input = self.matrix(&mut builder, 3 * hidden, rows, group)?;
+                let state = self.matrix(&mut builder, 3 * hidden, hidden, group)?;
+                let (input_bias, state_bias) = (builder.values(3 * hidden), builder.values(3 * hidden));
+                last = builder.node(Gru { hidden, input, state, input_bias, state_bias }, &[last])?;
+            }
+            _ => {}
+        }
+        self.linear(&mut builder, chunk * out, last, group)?;
+        let (mut policy, outcomes) = builder.finish("network".to_owned(), false);
+        (policy.act_len, policy.chunk, policy.execute) = (out, chunk, execute);
+        policy.kind = if chunk > 1 { Kind::Chunk } else { Kind::Step };
+        Ok((policy, outcomes))
     }
 }
 

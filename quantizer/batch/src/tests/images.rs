@@ -3,14 +3,11 @@
 use actq::around::{Around, NamedPort, OUTPUT};
 use actq::contract::{ActionContract, Binarise, Ensemble, Playback};
 use actq::emit;
+use actq::graph::Denoising;
 use actq::graph::lowering::{Buffer, Lifetime, Slice, Step, StepData};
-use actq::graph::ops::{
-    Add, Concat, Gru, Iterate, LayerNorm, Linear, Lstm, Mul, Normalize, Pointwise, RmsNorm, Span, Table,
-};
-use actq::graph::{Denoising, ValueId};
+use actq::graph::ops::{Concat, Gru, Iterate, Pointwise, Span, Table};
 use actq::methods::Activations;
-use actq::random::Random;
-use actq_bench::networks::{self, Builder};
+use actq_bench::networks::{self, Builder, Draw};
 use actq_kernels::image::{Kind, OpKind};
 use actq_kernels::math::Function;
 use actq_kernels::ops::denoise::Coefficients;
@@ -23,115 +20,39 @@ const OBSERVATION: usize = 150;
 /// Largest magnitude of the raw values of [`around`].
 pub(super) const RANGE: f32 = 10.0;
 
-/// Draws what the shape of a matrix leaves open.
-struct Draw(Random);
-
-impl Draw {
-    fn below(&mut self, n: usize) -> usize {
-        self.0.below(n)
-    }
-
-    /// Activations in paired lanes (for groups of 0 and 32) or in single lanes.
-    fn activations(&mut self) -> Activations {
-        [Activations::Int8, Activations::Int16][self.below(2)]
-    }
-
-    fn group(&mut self) -> usize {
-        [0, 32, 64, 128][self.below(4)]
-    }
-
-    /// A width for each row: all equal, in blocks, or mixed with rows of 0 bits.
-    fn widths(&mut self, rows: usize) -> Vec<Option<Width>> {
-        let (kind, one) = (self.below(3), Width::ALL[self.below(4)]);
-        let width = |row: usize| match kind {
-            0 => Some(one),
-            1 => Some(Width::ALL[4 * row / rows]),
-            _ if row == 0 => Some(one),
-            _ => Width::ALL.get(row * 7 % 5).copied(),
-        };
-        (0..rows).map(width).collect()
-    }
-
-    fn matrix(&mut self, builder: &mut Builder, rows: usize, cols: usize, group: usize) -> Result<usize> {
-        let (activations, widths) = (self.activations(), self.widths(rows));
-        builder.matrix(rows, cols, activations, &widths, group)
-    }
-
-    fn linear(&mut self, builder: &mut Builder, rows: usize, input: ValueId, group: usize) -> Result<ValueId> {
-        let matrix = self.matrix(builder, rows, builder.graph.len_of(input), group)?;
-        let bias = if self.below(2) == 0 { builder.values(rows) } else { vec![0.0; rows] };
-        builder.node(Linear { matrix, bias }, &[input])
-    }
-
-    fn contract(&mut self, len: usize, chunk: usize, execute: usize) -> ActionContract {
-        let mut some = |value: f32| (self.below(2) == 0).then(|| vec![value; len]);
-        let [scale, offset, low, high] = [0.7, 0.1, -0.9, 0.8].map(&mut some);
-        let [max_step, smoothing] = [0.25, 0.6].map(&mut some);
-        let binarise = (self.below(3) == 0).then(|| Binarise {
-            on: vec![0.3; len],
-            off: vec![-0.1; len],
-            on_value: (0..len).map(|i| if i % 2 == 0 { 0.5 } else { 0.0 }).collect(),
-            off_value: vec![0.0; len],
-        });
-        let playback = match self.below(3) {
-            0 if execute == 1 => {
-                let horizon = 1 + self.below(chunk);
-                Playback { ensemble: Some(Ensemble { horizon, m: 0.1 }), ..Playback::default() }
-            }
-            1 => Playback { overlap: self.below(chunk - execute + 1), ..Playback::default() },
-            _ => Playback { deadline: Some(chunk), ..Playback::default() },
-        };
-        ActionContract { scale, offset, low, high, max_step, smoothing, binarise, playback }
-    }
+fn contract(draw: &mut Draw, len: usize, chunk: usize, execute: usize) -> ActionContract {
+    let mut some = |value: f32| (draw.below(2) == 0).then(|| vec![value; len]);
+    let [scale, offset, low, high] = [0.7, 0.1, -0.9, 0.8].map(&mut some);
+    let [max_step, smoothing] = [0.25, 0.6].map(&mut some);
+    let binarise = (draw.below(3) == 0).then(|| Binarise {
+        on: vec![0.3; len],
+        off: vec![-0.1; len],
+        on_value: (0..len).map(|i| if i % 2 == 0 { 0.5 } else { 0.0 }).collect(),
+        off_value: vec![0.0; len],
+    });
+    let playback = match draw.below(3) {
+        0 if execute == 1 => {
+            let horizon = 1 + draw.below(chunk);
+            Playback { ensemble: Some(Ensemble { horizon, m: 0.1 }), ..Playback::default() }
+        }
+        1 => Playback { overlap: draw.below(chunk - execute + 1), ..Playback::default() },
+        _ => Playback { deadline: Some(chunk), ..Playback::default() },
+    };
+    ActionContract { scale, offset, low, high, max_step, smoothing, binarise, playback }
 }
 
 /// An image with every operation inside a network, chunks and a contract.
 pub(super) fn network(seed: u64) -> Result<Vec<u8>> {
-    let mut draw = Draw(Random::new(seed));
-    let mut length = |most: usize| 1 + draw.below(most);
-    let (rows, hidden, out, chunk) = (length(90), length(40), length(5), length(4));
-    let execute = length(chunk);
-    let group = draw.group();
-    let mut builder = Builder::new(OBSERVATION);
-    let read = 1 + draw.below(OBSERVATION);
-    let mut last = builder.part(read)?;
-    last = draw.linear(&mut builder, rows, last, group)?;
-    let [mean, scale] = [builder.values(rows), builder.values(rows)];
-    last = builder.node(Normalize { mean, scale, pre_clip: 4.0, clip: 2.0 }, &[last])?;
-    let kept = last;
-    last = builder.node(Pointwise(Function::ALL[draw.below(Function::ALL.len())]), &[last])?;
-    last = builder.node(Add, &[last, kept])?;
-    last = builder.node(Mul, &[last, kept])?;
-    let [weight, bias] = [builder.values(rows), builder.values(rows)];
-    last = builder.node(LayerNorm { weight: weight.clone(), bias, eps: 1e-3 }, &[last])?;
-    last = builder.node(RmsNorm { weight, eps: 1e-3 }, &[last])?;
-    match draw.below(3) {
-        0 => {
-            let input = draw.matrix(&mut builder, 4 * hidden, rows, group)?;
-            let state = draw.matrix(&mut builder, 4 * hidden, hidden, group)?;
-            let bias = builder.values(4 * hidden);
-            last = builder.node(Lstm { hidden, input, state, bias }, &[last])?;
-        }
-        1 => {
-            let input = draw.matrix(&mut builder, 3 * hidden, rows, group)?;
-            let state = draw.matrix(&mut builder, 3 * hidden, hidden, group)?;
-            let (input_bias, state_bias) = (builder.values(3 * hidden), builder.values(3 * hidden));
-            last = builder.node(Gru { hidden, input, state, input_bias, state_bias }, &[last])?;
-        }
-        _ => {}
-    }
-    draw.linear(&mut builder, chunk * out, last, group)?;
-    let (mut policy, outcomes) = builder.finish("network".to_owned(), false);
-    (policy.act_len, policy.chunk, policy.execute) = (out, chunk, execute);
-    policy.kind = if chunk > 1 { Kind::Chunk } else { Kind::Step };
-    policy.contract = draw.contract(out, chunk, execute);
+    let mut draw = Draw::new(seed);
+    let (mut policy, outcomes) = draw.network(OBSERVATION)?;
+    policy.contract = contract(&mut draw, policy.act_len, policy.chunk, policy.execute);
     policy.check()?;
     Ok(emit::image(&policy, &outcomes)?)
 }
 
 /// An image of products of any shape, and functions.
 pub(super) fn products(seed: u64) -> Result<Vec<u8>> {
-    let mut draw = Draw(Random::new(seed));
+    let mut draw = Draw::new(seed);
     let group = draw.group();
     let mut builder = Builder::new(1 + draw.below(OBSERVATION));
     let mut last = 0;
@@ -151,7 +72,7 @@ pub(super) fn products(seed: u64) -> Result<Vec<u8>> {
 
 /// An image with a recurrent state and a largest change of the action, which fails for an observation above 90.
 pub(super) fn fragile() -> Result<Vec<u8>> {
-    let mut draw = Draw(Random::new(1));
+    let mut draw = Draw::new(1);
     let mut builder = Builder::new(5);
     let exponential = builder.node(Pointwise(Function::Exp), &[0])?;
     let [input, state] = [5, 4].map(|cols| draw.matrix(&mut builder, 12, cols, 0));
@@ -175,7 +96,7 @@ pub(super) fn accumulating() -> Result<Vec<u8>> {
 
 /// An image of a flow or diffusion policy, with noise in each step or at the start only.
 pub(super) fn denoiser(seed: u64) -> Result<Vec<u8>> {
-    let mut draw = Draw(Random::new(seed));
+    let mut draw = Draw::new(seed);
     let (len, chunk, steps) = (1 + draw.below(4), 1 + draw.below(3), 1 + draw.below(4));
     let (execute, group) = (1 + draw.below(chunk), draw.group());
     let mut builder = Builder::new(1 + draw.below(20));
@@ -205,14 +126,14 @@ pub(super) fn denoiser(seed: u64) -> Result<Vec<u8>> {
     let (mut policy, outcomes) = builder.finish("denoiser".to_owned(), false);
     (policy.act_len, policy.chunk, policy.execute) = (len, chunk, execute);
     policy.kind = [Kind::Flow, Kind::Diffusion][draw.below(2)];
-    policy.contract = draw.contract(len, chunk, execute);
+    policy.contract = contract(&mut draw, len, chunk, execute);
     policy.check()?;
     Ok(emit::image(&policy, &outcomes)?)
 }
 
 /// An image with every operation around its network.
 pub(super) fn around(seed: u64) -> Result<Vec<u8>> {
-    let mut draw = Draw(Random::new(seed));
+    let mut draw = Draw::new(seed);
     let len = 1 + draw.below(20);
     let group = draw.group();
     let mut builder = Builder::new(3 * len);
