@@ -4,6 +4,7 @@ use actq::measure::actions::actions;
 use actq_onnx::{Choice, proto};
 use anyhow::{Context as _, Result};
 use prost::Message as _;
+use prost::bytes::Bytes;
 
 use super::file::{File, Value, encoded};
 use super::styles::{OBS, begun, between, ended, found, network, ops, whole};
@@ -133,38 +134,42 @@ fn norms_of_groups_are_norms_of_rows() -> Result<()> {
     Ok(())
 }
 
-#[test]
-fn function_overloads_are_distinguished() -> Result<()> {
-    let function = |overload: &str, op: &str| {
-        let node = proto::Node {
-            op_type: Some(op.to_owned()),
-            input: vec!["x".to_owned()],
-            output: vec!["y".to_owned()],
-            ..Default::default()
-        };
-        encoded(&proto::Function {
-            name: Some("Act".to_owned()),
-            domain: Some("local".to_owned()),
-            overload: Some(overload.to_owned()),
-            input: vec!["x".to_owned()],
-            output: vec!["y".to_owned()],
-            node: vec![encoded(&node)],
-            ..Default::default()
-        })
-    };
+fn node(op: &str, inputs: &[&str], outputs: &[&str], attributes: &[proto::Attribute]) -> Bytes {
+    encoded(&proto::Node {
+        op_type: Some(op.to_owned()),
+        input: inputs.iter().map(|&name| name.to_owned()).collect(),
+        output: outputs.iter().map(|&name| name.to_owned()).collect(),
+        attribute: attributes.iter().map(encoded).collect(),
+        ..Default::default()
+    })
+}
+
+/// An overload of the function `Act`, which computes `y` from `x`.
+fn function(overload: &str, node: Vec<Bytes>, attribute_proto: Vec<Bytes>) -> Bytes {
+    encoded(&proto::Function {
+        name: Some("Act".to_owned()),
+        domain: Some("local".to_owned()),
+        overload: Some(overload.to_owned()),
+        input: vec!["x".to_owned()],
+        output: vec!["y".to_owned()],
+        attribute_proto,
+        node,
+    })
+}
+
+/// Requires that two layers with calls of functions between them agree with those with plain nodes. `between` adds the
+/// calls, or the nodes, after a value.
+fn same_as_called(functions: Vec<Bytes>, between: impl Fn(&mut File, String, bool) -> String) -> Result<()> {
     let network = |called: bool| {
         let mut file = begun();
-        let mut x = file.gemm("obs", 16, OBS);
-        for (overload, op) in [("first", "Tanh"), ("second", "Elu")] {
-            x = if called { file.call(overload, &x) } else { file.node(op, &[&x], &[]) };
-        }
+        let x = file.gemm("obs", 16, OBS);
+        let x = between(&mut file, x, called);
         let y = file.gemm(&x, 3, 16);
         file.nodes("Identity", &[&y], &["actions"], &[]);
         file.output("actions", &[1, 3]);
         file.model()
     };
     let plain = network(false).encode_to_vec();
-    let functions = vec![function("first", "Tanh"), function("second", "Elu")];
     let called = proto::Model { functions, ..network(true) }.encode_to_vec();
     let [ours, theirs] = [called, plain].map(|bytes| imported(&bytes, &Choice::default()));
     let (ours, theirs) = (ours?.1, theirs?.1);
@@ -172,18 +177,23 @@ fn function_overloads_are_distinguished() -> Result<()> {
     compare(&actions(&theirs, &observations), &actions(&ours, &observations))
 }
 
+#[test]
+fn function_overloads_are_distinguished() -> Result<()> {
+    let overloads = [("first", "Tanh"), ("second", "Elu")];
+    let functions = overloads.map(|(overload, op)| function(overload, vec![node(op, &["x"], &["y"], &[])], Vec::new()));
+    same_as_called(functions.to_vec(), |file, x, called| {
+        overloads.iter().fold(
+            x,
+            |x, (overload, op)| {
+                if called { file.call(overload, &x) } else { file.node(op, &[&x], &[]) }
+            },
+        )
+    })
+}
+
 /// An attribute of a function that a branch in it names, as torch's library of functions has them.
 #[test]
 fn attributes_of_a_function_reach_its_branches() -> Result<()> {
-    let node = |op: &str, inputs: &[&str], outputs: &[&str], attributes: &[proto::Attribute]| {
-        encoded(&proto::Node {
-            op_type: Some(op.to_owned()),
-            input: inputs.iter().map(|&name| name.to_owned()).collect(),
-            output: outputs.iter().map(|&name| name.to_owned()).collect(),
-            attribute: attributes.iter().map(encoded).collect(),
-            ..Default::default()
-        })
-    };
     let named = |name: &str| proto::Attribute { name: Some(name.to_owned()), ..Default::default() };
     let slope = proto::Attribute { ref_attr_name: Some("slope".to_owned()), ..named("alpha") };
     let output = proto::ValueInfo { name: Some("inner".to_owned()), r#type: None };
@@ -193,43 +203,15 @@ fn attributes_of_a_function_reach_its_branches() -> Result<()> {
     };
     let truth = proto::Tensor { data_type: Some(9), raw_data: Some(vec![1].into()), ..Default::default() };
     let truth = proto::Attribute { t: Some(encoded(&truth)), ..named("value") };
-    let function = encoded(&proto::Function {
-        name: Some("Act".to_owned()),
-        domain: Some("local".to_owned()),
-        overload: Some("only".to_owned()),
-        input: vec!["x".to_owned()],
-        output: vec!["y".to_owned()],
-        attribute_proto: vec![encoded(&proto::Attribute { f: Some(0.4), ..named("slope") })],
-        node: vec![
-            node("Constant", &[], &["yes"], &[truth]),
-            node(
-                "If",
-                &["yes"],
-                &["y"],
-                &[
-                    proto::Attribute { g: branch("LeakyRelu", &[slope]), ..named("then_branch") },
-                    proto::Attribute { g: branch("Tanh", &[]), ..named("else_branch") },
-                ],
-            ),
-        ],
-        ..Default::default()
-    });
-    let network = |called: bool| {
-        let mut file = begun();
-        let x = file.gemm("obs", 16, OBS);
-        let x =
-            if called { file.call("only", &x) } else { file.node("LeakyRelu", &[&x], &[("alpha", Value::Real(0.4))]) };
-        let y = file.gemm(&x, 3, 16);
-        file.nodes("Identity", &[&y], &["actions"], &[]);
-        file.output("actions", &[1, 3]);
-        file.model()
-    };
-    let plain = network(false).encode_to_vec();
-    let called = proto::Model { functions: vec![function], ..network(true) }.encode_to_vec();
-    let [ours, theirs] = [called, plain].map(|bytes| imported(&bytes, &Choice::default()));
-    let (ours, theirs) = (ours?.1, theirs?.1);
-    let observations = drawn(&ours);
-    compare(&actions(&theirs, &observations), &actions(&ours, &observations))
+    let branches = [
+        proto::Attribute { g: branch("LeakyRelu", &[slope]), ..named("then_branch") },
+        proto::Attribute { g: branch("Tanh", &[]), ..named("else_branch") },
+    ];
+    let nodes = vec![node("Constant", &[], &["yes"], &[truth]), node("If", &["yes"], &["y"], &branches)];
+    let function = function("only", nodes, vec![encoded(&proto::Attribute { f: Some(0.4), ..named("slope") })]);
+    same_as_called(vec![function], |file, x, called| {
+        if called { file.call("only", &x) } else { file.node("LeakyRelu", &[&x], &[("alpha", Value::Real(0.4))]) }
+    })
 }
 
 #[test]
