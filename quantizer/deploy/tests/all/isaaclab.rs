@@ -276,6 +276,7 @@ fn metadata_of_the_network_is_used_and_checked() -> Result<()> {
 #[test]
 fn bad_environments_are_refused() -> Result<()> {
     let own = answers(&JOINTS);
+    let scaled = "scale: 0.25\n      history_length: 3";
     let cases = [
         ("dt: 0.005", "dt: .nan", "params/env.yaml: sim.dt (line 9) must be a finite number"),
         ("dt: 0.005", "dt: 0", "params/env.yaml: sim.dt = 0"),
@@ -292,12 +293,8 @@ fn bad_environments_are_refused() -> Result<()> {
         ("- FR_.*\n    - FL_.*", "- FR_.*", "length of the action: the bundle contradicts itself"),
         ("- -2.0\n      - 0.3", "- 2.0\n      - 0.3", "actions.joint_pos.clip (line"),
         ("concatenate_terms: true\n    enable", "concatenate_terms: false\n    enable", "concatenate_terms = false"),
-        (
-            "scale: 0.25\n      history_length: 3",
-            "scale: [1, 2]\n      history_length: 3",
-            "scale has 2 values, and the term 3",
-        ),
-        ("scale: 0.25\n      history_length: 3", "scale: 0.25\n      history_length: 1e4", "at most 1000 frames"),
+        (scaled, "scale: [1, 2]\n      history_length: 3", "scale has 2 values, and the term 3"),
+        (scaled, "scale: 0.25\n      history_length: 1e4", "at most 1000 frames"),
         (
             "history_length: 3\n      flatten_history_dim: true",
             "history_length: 3\n      flatten_history_dim: false",
@@ -327,6 +324,7 @@ fn bad_environments_are_refused() -> Result<()> {
 
 #[test]
 fn bad_descriptors_are_refused() -> Result<()> {
+    let names = "joint_names: [FR_hip, FR_knee, FL_hip, FL_knee]";
     let cases = [
         ("  dt: 0.02\n", "  dt: 0.01\n", "time of a tick: the bundle contradicts itself"),
         (
@@ -336,16 +334,8 @@ fn bad_descriptors_are_refused() -> Result<()> {
         ),
         ("scale: [0.25, 0.5, 0.25, 0.5]", "scale: [0.25, .nan, 0.25, 0.5]", "actions.0.scale (line"),
         ("scale: [0.25, 0.5, 0.25, 0.5]", "scale: [0.25, 0.5]", "actions.0.scale has 2 values; 4 joints are named"),
-        (
-            "joint_names: [FR_hip, FR_knee, FL_hip, FL_knee]",
-            "joint_names: [FR_hip, FR_hip, FL_hip, FL_knee]",
-            "\"FR_hip\" occurs twice",
-        ),
-        (
-            "joint_names: [FR_hip, FR_knee, FL_hip, FL_knee]",
-            "joint_names: [FR_hip, arm, FL_hip, FL_knee]",
-            "\"arm\" is none of the joints",
-        ),
+        (names, "joint_names: [FR_hip, FR_hip, FL_hip, FL_knee]", "\"FR_hip\" occurs twice"),
+        (names, "joint_names: [FR_hip, arm, FL_hip, FL_knee]", "\"arm\" is none of the joints"),
         (
             "joint_pos_offsets: [0.1, -0.1, 0.0, -1.5]",
             "joint_pos_offsets: [0.1]",
@@ -375,6 +365,7 @@ fn bad_descriptors_are_refused() -> Result<()> {
 
 #[test]
 fn files_that_contradict_each_other_are_refused() -> Result<()> {
+    let scaled = "scale: 0.25\n      history_length: 3";
     let cases = [
         ("dt: 0.005\n  render", "dt: 0.01\n  render", "ticks a second"),
         (".*L_hip: 0.1", ".*L_hip: 0.2", "default positions"),
@@ -383,12 +374,8 @@ fn files_that_contradict_each_other_are_refused() -> Result<()> {
         (".*_knee: 0.5", ".*_knee: 0.6", "scale of \"joint_pos\""),
         ("- FR_.*\n    - FL_.*", "- FL_.*\n    - FR_.*", "joints of \"joint_pos\""),
         ("- -2.0\n      - 0.3", "- -2.0\n      - 0.4", "limits of \"joint_pos\""),
-        ("scale: 0.25\n      history_length: 3", "scale: 0.5\n      history_length: 3", "scale of \"base_ang_vel\""),
-        (
-            "scale: 0.25\n      history_length: 3",
-            "scale: 0.25\n      history_length: 2",
-            "number of frames of \"base_ang_vel\"",
-        ),
+        (scaled, "scale: 0.5\n      history_length: 3", "scale of \"base_ang_vel\""),
+        (scaled, "scale: 0.25\n      history_length: 2", "number of frames of \"base_ang_vel\""),
         (
             "- -1.0\n      - 1.0\n      scale: 0.25",
             "- -1.0\n      - 2.0\n      scale: 0.25",

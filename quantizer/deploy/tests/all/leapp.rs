@@ -281,29 +281,19 @@ fn contradictions_name_both_sources() -> Result<()> {
 
 #[test]
 fn what_an_image_cannot_do_is_refused() -> Result<()> {
+    let (backend, jit) = ("backend: onnx\n      model_path: policy.onnx", "backend: jit\n      model_path: policy.pt");
+    let names = "kind: target/joint/position\n      element_names: [[FR_hip, FR_knee, FL_hip, FL_knee]]";
     let cases = [
+        (backend, jit, "models.policy.parameters.backend = \"jit\": an image is made of ONNX files only"),
+        (backend, jit, "export_with=\"onnx\""),
+        (backend, "backend: null\n      model_path: policy.onnx", "models.policy.parameters.backend is missing"),
         (
-            "backend: onnx\n      model_path: policy.onnx",
-            "backend: jit\n      model_path: policy.pt",
-            "models.policy.parameters.backend = \"jit\": an image is made of ONNX files only",
-        ),
-        (
-            "backend: onnx\n      model_path: policy.onnx",
-            "backend: jit\n      model_path: policy.pt",
-            "export_with=\"onnx\"",
-        ),
-        (
-            "backend: onnx\n      model_path: policy.onnx",
-            "backend: null\n      model_path: policy.onnx",
-            "models.policy.parameters.backend is missing",
-        ),
-        (
-            "kind: target/joint/position\n      element_names: [[FR_hip, FR_knee, FL_hip, FL_knee]]",
+            names,
             "kind: target/joint/position\n      element_names: [__temporal_axis__, [a, b, c, d]]\n      temporal_period_ms: 20",
             "it gives values of several times",
         ),
         (
-            "kind: target/joint/position\n      element_names: [[FR_hip, FR_knee, FL_hip, FL_knee]]",
+            names,
             "kind: target/joint/position\n      axes: [{kind: time, period_ms: 20}, {kind: element, names: [a, b, c, d]}]",
             "it gives values of several times",
         ),
