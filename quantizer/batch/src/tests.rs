@@ -5,6 +5,7 @@ mod inputs;
 
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
+use actq_bench::bits;
 use actq_kernels::{Head, Image};
 use anyhow::{Result, ensure};
 use fearless_simd::Level;
@@ -42,10 +43,6 @@ fn with_heads<T>(
     let scratch = scratch.chunks_exact_mut(image.scratch_words());
     let mut heads = scratch.map(|scratch| Ok(Head::new(image, scratch)?)).collect::<Result<Vec<_>>>()?;
     work(&image, &mut heads)
-}
-
-fn bits(values: &[f32]) -> Vec<u32> {
-    values.iter().map(|value| value.to_bits()).collect()
 }
 
 /// Requires that batches on every level give the bits of single heads, over steps with random resets and seeds.

@@ -3,10 +3,11 @@
 use std::error::Error as _;
 
 use actq::random::Random;
+use actq_bench::bits;
 use actq_kernels::{ImageError, StepError};
 use anyhow::Result;
 
-use super::{bits, images, with_heads};
+use super::{images, with_heads};
 use crate::{Batch, Error};
 
 const HEADS: usize = 70;
