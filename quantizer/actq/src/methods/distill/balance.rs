@@ -56,7 +56,8 @@ const MAX_SAVED_BITS: f64 = 8.0;
 /// Returns no error for a network that its builder accepted.
 pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> Result<Graph> {
     let mut balanced = graph.clone();
-    // In reverse order: an inserted node moves only the nodes that follow it.
+    // In reverse order: an inserted node moves only the nodes that follow it, the readers of earlier values too.
+    let mut inserted: Vec<usize> = Vec::new();
     for site in sites(graph).into_iter().rev() {
         let columns = Columns::of(graph, &site, moments, outputs);
         let can_fold = can_fold(graph, &site);
@@ -79,7 +80,9 @@ pub fn balance(graph: &Graph, moments: &mut [Moments], outputs: &[Vec<f64>]) -> 
         } else {
             let [mean, scale]: [Vec<f32>; 2] = [&mean, &factors].map(|of| of.iter().map(|v| *v as f32).collect());
             let balance = Balance::of_runs(part.has_means.then_some(mean), scale, part.runs);
-            balanced.insert(balance, site.value, &site.readers)?;
+            let moved = |n: &usize| n + inserted.iter().filter(|value| n >= value).count();
+            balanced.insert(balance, site.value, &site.readers.iter().map(moved).collect::<Vec<_>>())?;
+            inserted.push(site.value);
         }
     }
     Ok(balanced)

@@ -127,6 +127,18 @@ fn own_unlimited_normalization_absorbs_the_factors() {
     assert_eq!((added(&shared), &shared.nodes[2].inputs[..]), (1, &[1, 1][..]));
 }
 
+/// The operation of the later value moves the node that reads the earlier one.
+#[test]
+fn two_values_are_balanced_by_two_operations() {
+    let mut graph = linear(|graph| graph.add(unit(5.0), &[0]).expect("it fits"));
+    let second = graph.matrices[0].clone();
+    let second = graph.add_matrix(WeightMatrix { name: "second".into(), ..second }).expect("a matrix");
+    let other = graph.add(Linear { matrix: second, bias: vec![0.1; ROWS] }, &[0]).expect("it fits");
+    graph.add(Add, &[other, other - 1]).expect("it fits");
+    let (balanced, _) = balanced(&graph);
+    assert_eq!(added(&balanced), 2);
+}
+
 #[test]
 fn balanced_or_unbalanceable_columns_are_unchanged() {
     // A balanced network gains nothing from balancing it again.
