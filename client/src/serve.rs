@@ -15,7 +15,8 @@ const REPEAT: Duration = Duration::from_millis(200);
 const ATTEMPTS: usize = 5;
 
 /// Answers the simulator until its requests end. The controller's image receives every observation. With `arm` the
-/// outputs follow its actions, and the answers are the outputs' targets. A reset disarms, which resets the head.
+/// outputs follow its actions, and the answers are the outputs' targets. A reset disarms, which resets the head. So does
+/// the end of the requests, and an error of the simulator; after a fault the controller keeps its safe action.
 ///
 /// # Errors
 ///
@@ -26,19 +27,13 @@ pub fn serve(client: &mut Client, arm: bool, mut input: impl Read, mut output: i
     let no_action = vec![NO_ACTION; usize::from(status.axes)];
     let mut armed = false;
     loop {
-        let mut command = [0];
-        match input.read_exact(&mut command) {
-            Err(e) if e.kind() == ErrorKind::UnexpectedEof => return client.disarm(),
-            other => other.context("cannot read the input")?,
-        }
-        match command {
-            [RESET] => {
+        match request(&mut input, &mut bytes) {
+            Ok(Request::End) => return client.disarm(),
+            Ok(Request::Reset) => {
                 client.disarm()?;
                 armed = false;
             }
-            [STEP] => {
-                let ended = || format!("the input ended inside an observation of {} bytes", 4 * status.observation);
-                input.read_exact(&mut bytes).with_context(ended)?;
+            Ok(Request::Step) => {
                 let (values, _) = bytes.as_chunks();
                 let observation: Vec<f32> = values.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
                 if arm && !armed {
@@ -48,10 +43,43 @@ pub fn serve(client: &mut Client, arm: bool, mut input: impl Read, mut output: i
                 }
                 let action = step(client, &observation, armed)?.unwrap_or_else(|| no_action.clone());
                 let action: Vec<u8> = action.iter().flat_map(|value| value.to_le_bytes()).collect();
-                output.write_all(&action).and_then(|()| output.flush()).context("cannot write the output")?;
+                if let Err(error) = output.write_all(&action).and_then(|()| output.flush()) {
+                    client.disarm()?;
+                    return Err(error).context("cannot write the output");
+                }
             }
-            [other] => bail!("unknown command byte 0x{other:02x}; R resets, S steps"),
+            Err(error) => {
+                client.disarm()?;
+                return Err(error);
+            }
         }
+    }
+}
+
+/// A simulator's request.
+enum Request {
+    Reset,
+    /// With an observation.
+    Step,
+    /// The input has ended.
+    End,
+}
+
+/// Reads a request, and the observation of a step into `bytes`.
+fn request(input: &mut impl Read, bytes: &mut [u8]) -> Result<Request> {
+    let mut command = [0];
+    match input.read_exact(&mut command) {
+        Err(e) if e.kind() == ErrorKind::UnexpectedEof => return Ok(Request::End),
+        other => other.context("cannot read the input")?,
+    }
+    match command {
+        [RESET] => Ok(Request::Reset),
+        [STEP] => {
+            let len = bytes.len();
+            input.read_exact(bytes).with_context(|| format!("the input ended inside an observation of {len} bytes"))?;
+            Ok(Request::Step)
+        }
+        [other] => bail!("unknown command byte 0x{other:02x}; R resets, S steps"),
     }
 }
 

@@ -45,6 +45,11 @@ pub fn run_work(work: impl FnOnce() -> Result<()>) -> ExitCode {
     let outcome = work();
     // If a signal ends the process, the signal decides the exit status.
     let _held = unfinished::hold();
+    #[cfg(unix)]
+    if let (Ok(()), Some(signal)) = (&outcome, interrupts::told()) {
+        eprintln!("actq: interrupted");
+        return ExitCode::from(128 + signal as u8);
+    }
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

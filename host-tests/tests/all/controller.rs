@@ -4,6 +4,7 @@
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
+use std::process::Stdio;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::Poll;
@@ -25,10 +26,10 @@ use actq_controller::endpoint::Facts;
 use actq_controller::slots::{Candidate, Key, Layout, Slots, Updater, Work};
 use actq_controller::{Axis, Check, Endpoint, Guard, SafeAction, Safety, Settings};
 use actq_kernels::{Head, Image, Width};
-use actq_link::code::{Refusal, ResetCause};
+use actq_link::code::{Refusal, ResetCause, State};
 use actq_link::frame;
 use actq_link::report::{BUILT_IN, Timing};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use embedded_storage::nor_flash::ReadNorFlash as _;
 use ndarray::Array3;
 use serde_json::json;
@@ -71,6 +72,8 @@ fn flow() -> Result<Vec<u8>> {
 
 struct Controller {
     port: String,
+    /// `true` while it is armed.
+    armed: Arc<AtomicBool>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<Result<()>>>,
 }
@@ -79,9 +82,10 @@ impl Controller {
     fn start(built_in: Vec<u8>, key: [u8; 32]) -> Result<Self> {
         let listener = TcpListener::bind("127.0.0.1:0")?;
         let (port, stop) = (format!("tcp:{}", listener.local_addr()?), Arc::new(AtomicBool::new(false)));
-        let stopped = stop.clone();
-        let thread = thread::spawn(move || firmware(&listener, &stopped, &built_in, &key));
-        Ok(Self { port, stop, thread: Some(thread) })
+        let armed = Arc::new(AtomicBool::new(false));
+        let (stopped, is_armed) = (stop.clone(), armed.clone());
+        let thread = thread::spawn(move || firmware(&listener, &stopped, &is_armed, &built_in, &key));
+        Ok(Self { port, armed, stop, thread: Some(thread) })
     }
 
     /// Runs a command of `actq link`.
@@ -110,7 +114,13 @@ fn test(buffer: &ImageBuffer) -> Result<(), Refusal> {
 /// The firmware's main, with a socket for a UART. It counts its time in turns of its loop, each of which waits a
 /// millisecond for bytes. The time stops some turns after the last byte, so that a machine that delays the host lets no
 /// deadline pass.
-fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u8; 32]) -> Result<()> {
+fn firmware(
+    listener: &TcpListener,
+    stop: &AtomicBool,
+    armed: &AtomicBool,
+    built_in: &[u8],
+    key: &[u8; 32],
+) -> Result<()> {
     let mut memory = vec![0; 4 * SECTOR];
     let flash = Ram::<4, SECTOR>::new(&mut memory);
     let sector = SECTOR as u32;
@@ -178,6 +188,7 @@ fn firmware(listener: &TcpListener, stop: &AtomicBool, built_in: &[u8], key: &[u
             if quiet <= DEADLINE / 4 {
                 ticks += 1;
                 safety.tick();
+                armed.store(safety.state() == State::Armed, Ordering::Relaxed);
                 sent.extend(endpoint.report(micros, &mut safety, &mut out).unwrap_or_default());
             }
             if stepping.is_none()
@@ -296,6 +307,40 @@ fn flow_observations_are_streamed_without_noise() -> Result<()> {
     let arguments = [&path("flow.actq"), &recording, "--rate", "50", "--log", &log];
     succeeded(&controller.actq("stream", &arguments)?)?;
     check_log(&log, &image)?;
+    controller.end()
+}
+
+/// A signal ends the stream and the answers to a simulator as their end does: the controller is disarmed.
+#[cfg(unix)]
+#[test]
+fn signals_disarm_the_controller() -> Result<()> {
+    let (folder, recording) = folder()?;
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    fs::write(path("image.actq"), image("image", 0)?)?;
+    let controller = Controller::start(fs::read(path("image.actq"))?, [0; 32])?;
+    let (recording, log) = (recording.display().to_string(), path("log.npz"));
+    let stream = ["link", "stream", &controller.port, &path("image.actq"), &recording, "--arm", "--rate", "5"];
+    for arguments in [&[&stream[..], &["--log", &log]].concat()[..], &["link", "serve", &controller.port, "--arm"]] {
+        let mut child = actq(&[arguments, &["--timeout", "600"]].concat())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()?;
+        let mut requests = child.stdin.take().context("no input")?;
+        requests.write_all(&[&[b'S'][..], &[0; 4 * OBS]].concat())?;
+        while !controller.armed.load(Ordering::Relaxed) {
+            ensure!(child.try_wait()?.is_none(), "{arguments:?} ended too early");
+            thread::sleep(Duration::from_millis(5));
+        }
+        std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status()?;
+        let output = child.wait_with_output()?;
+        drop(requests);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        ensure!(output.status.code() == Some(143) && stderr.ends_with("actq: interrupted\n"), "{output:?}");
+        ensure!(succeeded(&controller.actq("watch", &["--once"])?)?.contains("disarmed"), "{arguments:?}");
+    }
+    let rows = arrays(Path::new(&log))?["obs"].shape[0];
+    ensure!((5..40).contains(&rows), "the log has {rows} observations");
     controller.end()
 }
 
