@@ -3,12 +3,12 @@
 
 mod choice;
 mod files;
+mod observation;
 mod output;
 
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use actq::error::{Context as _, Result, bail, ensure};
+use actq::error::{Context as _, Error, Result};
 use actq::import::Importer;
 use actq::import::contract::JsonContract;
 use actq::import::json::PolicyJson;
@@ -18,15 +18,16 @@ use prost::bytes::Bytes;
 
 pub use self::choice::Choice;
 use self::files::{tensors, text};
+use self::observation::{Observation, named_states, observed_inputs, refuse_integers};
 use self::output::{actions, choose, refuse_batch};
 use crate::action;
 use crate::file::model::Model;
 use crate::lower::lower;
-use crate::nodes::follow::{Follower, INTEGERS};
+use crate::nodes::follow::Follower;
 use crate::patterns::simplify::simplify;
-use crate::states::{Cells, Output, refuse_lost_states};
+use crate::states::{Cells, Output};
 use crate::values::elements::value;
-use crate::values::expr::{Expr, Exprs, Id};
+use crate::values::expr::{Exprs, Id};
 use crate::values::tensor::{Element, Tensor};
 
 /// The files of an imported policy, and a summary of the import.
@@ -63,7 +64,7 @@ pub struct Imported {
 /// Imports an ONNX file. An error names the file, and the node if known.
 pub fn import(path: &Path, choice: &Choice) -> Result<Imported> {
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let imported = Model::read(path).and_then(|model| network(&model, &name, choice));
+    let imported = Model::read(path).and_then(|model| import_model(&model, &name, choice));
     imported.with_context(|| path.display().to_string())
 }
 
@@ -84,7 +85,7 @@ pub fn constant(path: &Path, output: &str) -> Result<Option<Vec<f64>>> {
 
 /// Imports a file's bytes as [`import`] does, with external tensors from `folder`.
 pub fn import_bytes(bytes: Vec<u8>, folder: &Path, name: &str, choice: &Choice) -> Result<Imported> {
-    network(&Model::parse(Bytes::from(bytes), folder)?, name, choice)
+    import_model(&Model::parse(Bytes::from(bytes), folder)?, name, choice)
 }
 
 /// Importer of ONNX files, without choices.
@@ -107,8 +108,74 @@ impl Importer for Onnx {
     }
 }
 
-fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
+/// Imports the network of a model; `name` becomes the policy's.
+fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
     choice.check(&model.graph)?;
+    let Followed { mut exprs, outputs, errors } = follow_outputs(model, choice)?;
+    let cells = Cells::find(model, &mut exprs, &outputs, &choice.states);
+    let output = &outputs[choose(&exprs, &cells, &outputs, errors, choice)?];
+    let root = action_root(&mut exprs, &cells, output)?;
+    let live = exprs.needed_instead(&[root], &cells.instead);
+    refuse_integers(model, &exprs, &live)?;
+    let pairs = cells.pairs(model, &exprs, &live, &outputs)?;
+    let observed = observed_inputs(model, &exprs, &live, (&pairs, &outputs), &output.name, choice)?;
+    let observation = Observation::of(model, &exprs, &live, &observed);
+    let states = named_states(model, &pairs, &outputs);
+
+    let values = exprs.len_of(root);
+    let (chunk, act_len) = if choice.is_fed {
+        (1, values)
+    } else {
+        refuse_batch(model, &observed, &output.value.shape)?;
+        actions(&output.value.shape, values)?
+    };
+    let (root, contract) = action::contract(&exprs, root, act_len);
+    let last = contract.iter().flat_map(keys).collect();
+    let (contract, bounded) = action::bounded(&exprs, root, contract, act_len);
+    let root = simplify(&mut exprs, root, &cells.instead);
+    let lowered = lower(&exprs, root, &observation.offsets, observation.len)
+        .map_err(|(id, error)| at_node(model, &exprs, id, error))?;
+
+    let json = PolicyJson {
+        name: printable(name).chars().take(50).collect(),
+        kind: (chunk > 1).then(|| "chunk".to_owned()),
+        chunk: (chunk > 1).then_some(chunk),
+        obs_dim: observation.len,
+        act_dim: act_len,
+        // Without a contract, the actions of a chunk would be limited to -1 .. 1.
+        action: contract.or_else(|| (chunk > 1).then(JsonContract::default)),
+        ops: Vec::new(),
+        ..PolicyJson::default()
+    };
+    let source = format!("ONNX by {}", model.producer);
+    let action = printable(&output.name).into_owned();
+    Ok(Imported {
+        json: text(json, &lowered, &observation.inputs, &states, &source)?,
+        weights: tensors(&lowered)?,
+        producer: model.producer.clone(),
+        ops: lowered.ops.iter().map(|op| op.op.clone()).collect(),
+        cut_inputs: cut_inputs(model, &observation, &states),
+        cut_outputs: cut_outputs(model, &action, &states),
+        inputs: observation.inputs,
+        integers: observation.integers,
+        states,
+        output: (action, values),
+        nodes: model.graph.nodes.len(),
+        contract: last,
+        bounded,
+    })
+}
+
+/// The outputs of a graph as expressions.
+struct Followed {
+    exprs: Exprs,
+    outputs: Vec<Output>,
+    /// Outputs that cannot be converted, with the reason.
+    errors: Vec<(String, Error)>,
+}
+
+/// Converts the graph's outputs, and the value that the caller chooses, to expressions.
+fn follow_outputs(model: &Model, choice: &Choice) -> Result<Followed> {
     let mut follower = Follower::new(model);
     let mut outputs = Vec::new();
     let mut errors = Vec::new();
@@ -124,115 +191,35 @@ fn network(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
         let value = follower.value(inner).with_context(|| format!("output {:?}", printable(inner)))?;
         outputs.push(Output { name: inner.clone(), value });
     }
-    let mut exprs = follower.exprs;
-    let cells = Cells::find(model, &mut exprs, &outputs, &choice.states);
-    let chosen = choose(&exprs, &cells, &outputs, errors, choice)?;
-    let (action, act_shape) = (outputs[chosen].name.clone(), outputs[chosen].value.shape.clone());
+    Ok(Followed { exprs: follower.exprs, outputs, errors })
+}
 
-    let values = Tensor::of_elements(act_shape.clone(), cells.elements(&outputs[chosen].value)).elements();
-    // A constant value becomes another value times 0, plus an offset.
-    let first = values.iter().find_map(value).with_context(|| {
-        format!("output {:?} depends on no input; choose another by --output NAME", printable(&action))
+/// Makes one expression of an output's elements. A constant element becomes another one times 0, plus an offset.
+fn action_root(exprs: &mut Exprs, cells: &Cells, output: &Output) -> Result<Id> {
+    let elements = Tensor::of_elements(output.value.shape.clone(), cells.elements(&output.value)).elements();
+    let first = elements.iter().find_map(value).with_context(|| {
+        format!("output {:?} depends on no input; choose another by --output NAME", printable(&output.name))
     })?;
-    let open: Vec<(Id, usize)> = values.iter().map(|element| value(element).unwrap_or(first)).collect();
-    let parts = |e: &Element| if let Element::Known(v) = e { (0.0, *v) } else { (1.0, 0.0) };
-    let (scale, offset) = values.iter().map(parts).unzip();
+    let open: Vec<(Id, usize)> = elements.iter().map(|element| value(element).unwrap_or(first)).collect();
+    let affine = |element: &Element| if let Element::Known(number) = element { (0.0, *number) } else { (1.0, 0.0) };
+    let (scale, offset) = elements.iter().map(affine).unzip();
     let root = exprs.vector(&open);
-    let root = exprs.affine(root, scale, offset);
-    let live = exprs.needed_instead(&[root], &cells.instead);
-    if let Some(i) = live.iter().find_map(|&id| if let Expr::Integers(i) = exprs.get(id) { Some(*i) } else { None }) {
-        bail!(
-            "the action is computed with the integers of the input {:?}, and an observation is float32; cast the input to float32 \
-             first",
-            printable(&model.graph.inputs[i].name)
-        );
-    }
-    let pairs = cells.pairs(model, &exprs, &live, &outputs)?;
-    let mut read: Vec<usize> =
-        live.iter().filter_map(|&id| if let Expr::Input(i) = exprs.get(id) { Some(*i) } else { None }).collect();
-    read.sort_unstable();
-    if !choice.is_fed {
-        refuse_lost_states(model, &read, &pairs, &outputs, &action, &choice.states)?;
-    }
-    read.retain(|i| !pairs.iter().any(|(state, _)| state == i));
-    ensure!(!read.is_empty(), "output {:?} depends on no input; choose another by --output NAME", printable(&action));
+    Ok(exprs.affine(root, scale, offset))
+}
 
-    let len_of = |exprs: &Exprs, i: usize| {
-        live.iter().find(|&&id| *exprs.get(id) == Expr::Input(i)).map_or(0, |&id| exprs.len_of(id))
+/// Names the inputs without a default that are neither observed nor states.
+fn cut_inputs(model: &Model, observation: &Observation, states: &[(String, String, usize)]) -> Vec<String> {
+    let given = model.graph.inputs.iter().filter(|port| !model.graph.initializers.contains_key(&port.name));
+    let is_used = |name: &String| {
+        observation.inputs.iter().any(|(input, _)| input == name) || states.iter().any(|(state, ..)| state == name)
     };
-    let mut offsets = HashMap::new();
-    let mut inputs = Vec::new();
-    let mut integers = Vec::new();
-    let mut obs_len = 0;
-    for &i in &read {
-        let len = len_of(&exprs, i);
-        offsets.insert(i, obs_len);
-        obs_len += len;
-        let port = &model.graph.inputs[i];
-        inputs.push((printable(&port.name).into_owned(), len));
-        integers.extend(INTEGERS.contains(&port.kind).then(|| printable(&port.name).into_owned()));
-    }
-    let states: Vec<(String, String, usize)> = pairs
-        .iter()
-        .map(|&(i, o)| {
-            let names = [&model.graph.inputs[i].name, &outputs[o].name].map(|name| printable(name).into_owned());
-            let [from, to] = names;
-            (from, to, outputs[o].value.len())
-        })
-        .collect();
+    given.map(|port| printable(&port.name).into_owned()).filter(|name| !is_used(name)).collect()
+}
 
-    let (chunk, act_len) = if choice.is_fed {
-        (1, open.len())
-    } else {
-        refuse_batch(model, &read, &act_shape)?;
-        actions(&act_shape, open.len())?
-    };
-    let (root, contract) = action::contract(&exprs, root, act_len);
-    let last = contract.iter().flat_map(keys).collect();
-    let (contract, bounded) = action::bounded(&exprs, root, contract, act_len);
-    let root = simplify(&mut exprs, root, &cells.instead);
-    let lowered = lower(&exprs, root, &offsets, obs_len).map_err(|(id, error)| at_node(model, &exprs, id, error))?;
-    let used = |name: &str| inputs.iter().any(|(n, _)| n == name) || states.iter().any(|(n, ..)| n == name);
-    let shown = |name: &String| printable(name).into_owned();
-    let cut_inputs: Vec<String> = model
-        .graph
-        .inputs
-        .iter()
-        .filter(|port| !model.graph.initializers.contains_key(&port.name))
-        .map(|port| shown(&port.name))
-        .filter(|name| !used(name))
-        .collect();
-    let is_cut = |name: &String| *name != shown(&action) && !states.iter().any(|(_, to, _)| to == name);
-    let cut_outputs = model.graph.outputs.iter().map(|port| shown(&port.name)).filter(is_cut).collect();
-    let json = PolicyJson {
-        name: printable(name).chars().take(50).collect(),
-        kind: (chunk > 1).then(|| "chunk".to_owned()),
-        chunk: (chunk > 1).then_some(chunk),
-        obs_dim: obs_len,
-        act_dim: act_len,
-        // Without a contract, the actions of a chunk would be limited to -1 .. 1.
-        action: contract.or_else(|| (chunk > 1).then(JsonContract::default)),
-        ops: Vec::new(),
-        ..PolicyJson::default()
-    };
-    let ops = lowered.ops.iter().map(|op| op.op.clone()).collect();
-    let source = format!("ONNX by {}", model.producer);
-    let json = text(json, &lowered, &inputs, &states, &source)?;
-    Ok(Imported {
-        json,
-        weights: tensors(&lowered)?,
-        producer: model.producer.clone(),
-        inputs,
-        integers,
-        states,
-        output: (shown(&action), open.len()),
-        ops,
-        cut_inputs,
-        cut_outputs,
-        nodes: model.graph.nodes.len(),
-        contract: last,
-        bounded,
-    })
+/// Names the outputs that are neither the action nor the next values of states.
+fn cut_outputs(model: &Model, action: &str, states: &[(String, String, usize)]) -> Vec<String> {
+    let outputs = model.graph.outputs.iter().map(|port| printable(&port.name).into_owned());
+    outputs.filter(|name| *name != action && !states.iter().any(|(_, next, _)| next == name)).collect()
 }
 
 fn keys(contract: &JsonContract) -> Vec<&'static str> {
@@ -241,7 +228,7 @@ fn keys(contract: &JsonContract) -> Vec<&'static str> {
     all.into_iter().filter(|(_, values)| values.is_some()).map(|(name, _)| name).collect()
 }
 
-fn at_node(model: &Model, exprs: &Exprs, id: Id, error: actq::error::Error) -> actq::error::Error {
+fn at_node(model: &Model, exprs: &Exprs, id: Id, error: Error) -> Error {
     let at = exprs.origin(id);
     match model.graph.nodes.get(at) {
         Some(node) => error.context(format!("node {at} {:?} ({})", node.name, node.op)),
