@@ -45,19 +45,8 @@ impl Family for Limx {
         let key = |path: &str| format!("PointfootCfg.{path}");
         let joints = yaml.texts(&key("joint_names"))?;
         let n = joints.len();
-        let initial: Vec<f64> = joints
-            .iter()
-            .map(|joint| yaml.number(&key(&format!("init_state.default_joint_angle.{joint}"))))
-            .collect::<Result<_>>()?;
-        for axis in ["roll", "pitch", "yaw"] {
-            let path = key(&format!("imu_orientation_offset.{axis}"));
-            let offset = yaml.number(&path)?;
-            ensure!(
-                offset == 0.0,
-                "{} = {offset}: a rotated IMU is not supported; rotate its values first and set 0",
-                yaml.at(&path)
-            );
-        }
+        let initial = initial_pose(yaml, &joints)?;
+        refuse_rotated_imu(yaml)?;
         let decimation = yaml.number(&key("control.decimation"))?;
         let rate = yaml.number(&key("loop_frequency"))? / decimation;
         let mut parts = Parts::new("policy", rate);
@@ -73,43 +62,52 @@ impl Family for Limx {
         facts.note("joint order", facts.source("isaaclab.order"));
         self.frame(&mut parts, yaml, n, &order, rate, facts)?;
         self.act(&mut parts, yaml, &order, facts)?;
-
-        let size = |name: &str| yaml.need(&key(&format!("size.{name}")), "a number of values", count);
-        let (frame, length) = (size("observations_size")?, size("obs_history_length")?);
-        let ours = 3 + 3 + 3 * n + 2 + 4;
-        ensure!(
-            frame == ours,
-            "{} = {frame}, but a frame of this family with {n} joints has {ours} values",
-            yaml.at(&key("size.observations_size"))
-        );
-        for (name, expected) in [("actions_size", n), ("commands_size", 3)] {
-            let given = size(name)?;
-            ensure!(
-                given == expected,
-                "{} = {given}, but {expected} are known",
-                yaml.at(&key(&format!("size.{name}")))
-            );
-        }
-        yaml.get(&key("size.encoder_output_size"));
-        let histories = Histories::of(facts)?;
-        ensure!(!histories.by_term, "history.layout = \"term\": only \"frame\" is known for this family");
-        let clip = yaml.number(&key("normalization.clip_scales.clip_observations"))?;
-        parts.value("clipped_frame", "frame", vec![clip_to(clip)]);
-        facts.note("clipped_frame", yaml.at(&key("normalization.clip_scales.clip_observations")));
-        facts.note("frame", "profile limx (controllers/PointfootController.py:311-319)");
-        facts.note("policy_input", "profile limx (controllers/PointfootController.py:357)");
-        let of = if facts.get::<bool>("history.clipped")? { "clipped_frame" } else { "frame" };
-        parts.value("history", of, vec![Op::History(histories.spec(length))]);
-        facts.note(
-            "history",
-            format!("{}; {}", yaml.at(&key("size.obs_history_length")), facts.source("history.first")),
-        );
+        self.history(&mut parts, yaml, history_length(yaml, n)?, facts)?;
         let latent = parts.network_of("encoder", &port(bundle, encoder)?, encoder, "history");
         parts.values("policy_input", &[&latent, "clipped_frame", "scaled_commands"]);
+        facts.note("policy_input", "profile limx (controllers/PointfootController.py:357)");
         let action = parts.network_of("policy", &port(bundle, policy)?, policy, "policy_input");
         parts.act(&action);
         Ok(parts.finish())
     }
+}
+
+/// Returns the initial position of each joint.
+fn initial_pose(yaml: &Document, joints: &[String]) -> Result<Vec<f64>> {
+    let path = |joint: &String| format!("PointfootCfg.init_state.default_joint_angle.{joint}");
+    joints.iter().map(|joint| yaml.number(&path(joint))).collect()
+}
+
+fn refuse_rotated_imu(yaml: &Document) -> Result<()> {
+    for axis in ["roll", "pitch", "yaw"] {
+        let path = format!("PointfootCfg.imu_orientation_offset.{axis}");
+        let offset = yaml.number(&path)?;
+        ensure!(
+            offset == 0.0,
+            "{} = {offset}: a rotated IMU is not supported; rotate its values first and set 0",
+            yaml.at(&path)
+        );
+    }
+    Ok(())
+}
+
+/// Returns the number of frames of the history. Refuses other lengths of frames, actions and commands than this reader's.
+fn history_length(yaml: &Document, joints: usize) -> Result<usize> {
+    let path = |name: &str| format!("PointfootCfg.size.{name}");
+    let size = |name: &str| yaml.need(&path(name), "a number of values", count);
+    let (frame, length) = (size("observations_size")?, size("obs_history_length")?);
+    let ours = 3 + 3 + 3 * joints + 2 + 4;
+    ensure!(
+        frame == ours,
+        "{} = {frame}, but a frame of this family with {joints} joints has {ours} values",
+        yaml.at(&path("observations_size"))
+    );
+    for (name, expected) in [("actions_size", joints), ("commands_size", 3)] {
+        let given = size(name)?;
+        ensure!(given == expected, "{} = {given}; it must be {expected}", yaml.at(&path(name)));
+    }
+    yaml.get(&path("encoder_output_size"));
+    Ok(length)
 }
 
 impl Limx {
@@ -172,6 +170,21 @@ impl Limx {
         Ok(())
     }
 
+    /// Adds the history of `length` frames, and the clipped frame.
+    fn history(&self, parts: &mut Parts, yaml: &Document, length: usize, facts: &mut Facts) -> Result<()> {
+        let histories = Histories::of(facts)?;
+        ensure!(!histories.by_term, "history.layout = \"term\": this family has only \"frame\"");
+        let limit = "PointfootCfg.normalization.clip_scales.clip_observations";
+        parts.value("clipped_frame", "frame", vec![clip_to(yaml.number(limit)?)]);
+        facts.note("clipped_frame", yaml.at(limit));
+        facts.note("frame", "profile limx (controllers/PointfootController.py:311-319)");
+        let of = if facts.get::<bool>("history.clipped")? { "clipped_frame" } else { "frame" };
+        parts.value("history", of, vec![Op::History(histories.spec(length))]);
+        let length = yaml.at("PointfootCfg.size.obs_history_length");
+        facts.note("history", format!("{length}; {}", facts.source("history.first")));
+        Ok(())
+    }
+
     /// Adds the limits of the action by torque, and the target.
     fn act(&self, parts: &mut Parts, yaml: &Document, order: &[usize], facts: &mut Facts) -> Result<()> {
         let control = |name: &str| yaml.number(&format!("PointfootCfg.control.{name}"));
@@ -229,7 +242,11 @@ fn port(bundle: &Bundle, file: &str) -> Result<(String, String)> {
     match (&signature.inputs[..], &signature.outputs[..]) {
         ([(input, _)], [(output, _)]) => Ok((input.clone(), output.clone())),
         (inputs, outputs) => {
-            bail!("{file}: it has {} inputs and {} outputs; one each is known", inputs.len(), outputs.len())
+            bail!(
+                "{file}: {} inputs and {} outputs; one input and one output are supported",
+                inputs.len(),
+                outputs.len()
+            )
         }
     }
 }

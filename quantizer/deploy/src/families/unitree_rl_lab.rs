@@ -43,110 +43,168 @@ impl Family for UnitreeRlLab {
         let mut parts = Parts::new("policy", 1.0 / yaml.number("step_dt")?);
         facts.note("rate_hz", yaml.at("step_dt"));
 
-        let map: Vec<usize> = yaml.need("joint_ids_map", "a list of motor numbers", |node| {
-            node.numbers()?.iter().map(|n| place(*n)).collect()
-        })?;
-        let joints = map.len();
-        let motors = map.iter().max().map_or(0, |most| most + 1);
-        let mut sorted = map.clone();
-        sorted.sort_unstable();
-        sorted.dedup();
-        ensure!(sorted.len() == joints, "{}: a motor occurs twice", yaml.at("joint_ids_map"));
-        ensure!(
-            motors == joints,
-            "{}: it has {joints} joints of {motors} motors, and a target of some motors is not supported",
-            yaml.at("joint_ids_map")
-        );
-        let default = yaml.numbers("default_joint_pos")?;
-        ensure!(
-            default.len() == joints,
-            "{} has {} values, but joint_ids_map {joints}",
-            yaml.at("default_joint_pos"),
-            default.len()
-        );
-        parts.constant("default", default);
-        let select = Op::Select(Order::Places(map.clone()));
-
-        let histories = Histories::of(facts)?;
-        let clip_first: bool = facts.get("clip_first")?;
-        for term in yaml.keys("observations") {
-            let path = format!("observations.{term}");
-            let ops = match term {
-                "base_ang_vel" => parts.input(term, 3, "rad/s"),
-                "projected_gravity" => gravity(&mut parts, "gravity", facts)?,
-                "velocity_commands" => self.commands(&mut parts, yaml, facts)?,
-                "joint_pos_rel" | "joint_pos" => {
-                    let mut ops = parts.input_as(term, "joint_pos", joints, "rad");
-                    ops.push(select.clone());
-                    if term == "joint_pos_rel" {
-                        ops.push(Op::Subtract(Operand::Name("default".to_owned())));
-                    }
-                    ops.extend(chosen_joints(yaml, &path, joints)?);
-                    ops
-                }
-                "joint_vel_rel" | "joint_vel" => {
-                    let mut ops = parts.input_as(term, "joint_vel", joints, "rad/s");
-                    ops.push(select.clone());
-                    ops.extend(chosen_joints(yaml, &path, joints)?);
-                    ops
-                }
-                "last_action" => {
-                    let processed = facts.chooses("last_action", "processed")?;
-                    parts.state(term, joints, if processed { "processed" } else { "policy.ACTION" })
-                }
-                other => {
-                    // What it is only the application's code says, so it is an input under its own name.
-                    let len =
-                        yaml.maybe(&format!("{path}.scale"), "a list of numbers", Node::numbers)?.map(|s| s.len());
-                    let Some(len) = len else {
-                        bail!(
-                            "{}: term {other:?} is unknown, and it has no scale that tells its length",
-                            yaml.at(&path)
-                        );
-                    };
-                    facts.of_application(
-                        &format!("raw.{other}"),
-                        &format!("term {other:?} is not known to this reader; does the application compute it (true)?"),
-                    )?;
-                    parts.input(other, len, "")
-                }
-            };
-            let mut ops = ops;
-            let clip = yaml.maybe(&format!("{path}.clip"), "two numbers", Node::pair)?;
-            let clip = clip.map(|[low, high]| Op::Clip([Operand::Number(low), Operand::Number(high)]));
-            let scale = yaml.maybe(&format!("{path}.scale"), "numbers", Node::one_or_several)?;
-            let scale = scale.map(|scale| Op::Scale(Operand::List(scale)));
-            let both = if clip_first { [clip, scale] } else { [scale, clip] };
-            ops.extend(both.into_iter().flatten());
-            let length =
-                yaml.maybe(&format!("{path}.history_length"), "a number of frames", count)?.unwrap_or(1).max(1);
-            let name = parts.term(ops, length);
-            facts.note(&name, yaml.at(&path));
-        }
-        parts.observe(&histories)?;
+        let motors = motors(yaml)?;
+        let joints = motors.len();
+        parts.constant("default", default_pose(yaml, joints)?);
+        let mut terms = Terms { yaml, motors: &motors, clip_first: false, parts: &mut parts, facts };
+        terms.observe()?;
 
         let ([(input, _)], [(output, _)]) = (&signature.inputs[..], &signature.outputs[..]) else {
             bail!(
-                "{file}: it has {} inputs and {} outputs; one each is known",
+                "{file}: {} inputs and {} outputs; one input and one output are supported",
                 signature.inputs.len(),
                 signature.outputs.len()
             );
         };
         parts.network(file, input, output);
-        self.target(&mut parts, yaml, &map, facts)?;
-        let order: String = facts.get("gains.order")?;
-        let (stiffness, damping) = (yaml.numbers("stiffness")?, yaml.numbers("damping")?);
-        let in_motors = |gains: Vec<f64>| -> Result<Vec<f64>> {
-            ensure!(gains.len() == joints, "{}: {} gains for {joints} joints", yaml.file, gains.len());
-            let mut placed = gains.clone();
-            if order == "policy" {
-                map.iter().zip(&gains).for_each(|(motor, gain)| placed[*motor] = *gain);
-            }
-            Ok(placed)
-        };
-        parts.gains(Gains { joints: None, stiffness: in_motors(stiffness)?, damping: in_motors(damping)? });
+        target(&mut parts, yaml, &motors, facts)?;
+        parts.gains(gains(yaml, &motors, facts)?);
         facts.note("gains", format!("{}; {}", yaml.at("stiffness"), facts.source("gains.order")));
         Ok(parts.finish())
+    }
+}
+
+/// Returns the motor of each joint.
+fn motors(yaml: &Document) -> Result<Vec<usize>> {
+    let key = "joint_ids_map";
+    let motors: Vec<usize> = yaml
+        .need(key, "a list of motor numbers", |node| node.numbers()?.iter().map(|number| place(*number)).collect())?;
+    let joints = motors.len();
+    let count = motors.iter().max().map_or(0, |most| most + 1);
+    let mut sorted = motors.clone();
+    sorted.sort_unstable();
+    sorted.dedup();
+    ensure!(sorted.len() == joints, "{}: a motor occurs twice", yaml.at(key));
+    ensure!(
+        count == joints,
+        "{}: it has {joints} joints of {count} motors, and a target of some motors is not supported",
+        yaml.at(key)
+    );
+    Ok(motors)
+}
+
+fn default_pose(yaml: &Document, joints: usize) -> Result<Vec<f64>> {
+    let key = "default_joint_pos";
+    let default = yaml.numbers(key)?;
+    ensure!(default.len() == joints, "{} has {} values, but joint_ids_map {joints}", yaml.at(key), default.len());
+    Ok(default)
+}
+
+/// Returns the gains in the order of the motors.
+fn gains(yaml: &Document, motors: &[usize], facts: &mut Facts) -> Result<Gains> {
+    let order: String = facts.get("gains.order")?;
+    let (stiffness, damping) = (yaml.numbers("stiffness")?, yaml.numbers("damping")?);
+    let in_motors = |gains: Vec<f64>| -> Result<Vec<f64>> {
+        ensure!(gains.len() == motors.len(), "{}: {} gains for {} joints", yaml.file, gains.len(), motors.len());
+        let mut placed = gains.clone();
+        if order == "policy" {
+            motors.iter().zip(&gains).for_each(|(motor, gain)| placed[*motor] = *gain);
+        }
+        Ok(placed)
+    };
+    Ok(Gains { joints: None, stiffness: in_motors(stiffness)?, damping: in_motors(damping)? })
+}
+
+/// The terms of the observation under construction.
+struct Terms<'a> {
+    yaml: &'a Document,
+    /// Motor of each joint.
+    motors: &'a [usize],
+    /// `true` if a term is clipped before it is scaled.
+    clip_first: bool,
+    parts: &'a mut Parts,
+    facts: &'a mut Facts,
+}
+
+impl Terms<'_> {
+    /// Adds all terms, and the observation.
+    fn observe(&mut self) -> Result<()> {
+        let histories = Histories::of(self.facts)?;
+        self.clip_first = self.facts.get("clip_first")?;
+        for name in self.yaml.keys("observations") {
+            self.add(name)?;
+        }
+        self.parts.observe(&histories)
+    }
+
+    /// Adds a term with its clip, scale and history.
+    fn add(&mut self, name: &str) -> Result<()> {
+        let yaml = self.yaml;
+        let path = format!("observations.{name}");
+        let mut ops = self.begin(name, &path)?;
+        let clip = yaml.maybe(&format!("{path}.clip"), "two numbers", Node::pair)?;
+        let clip = clip.map(|[low, high]| Op::Clip([Operand::Number(low), Operand::Number(high)]));
+        let scale = yaml.maybe(&format!("{path}.scale"), "numbers", Node::one_or_several)?;
+        let scale = scale.map(|scale| Op::Scale(Operand::List(scale)));
+        let both = if self.clip_first { [clip, scale] } else { [scale, clip] };
+        ops.extend(both.into_iter().flatten());
+        let length = yaml.maybe(&format!("{path}.history_length"), "a number of frames", count)?.unwrap_or(1).max(1);
+        let value = self.parts.term(ops, length);
+        self.facts.note(&value, yaml.at(&path));
+        Ok(())
+    }
+
+    /// Begins a term; returns the operations on its raw input.
+    fn begin(&mut self, name: &str, path: &str) -> Result<Vec<Op>> {
+        let joints = self.motors.len();
+        let select = || Op::Select(Order::Places(self.motors.to_vec()));
+        Ok(match name {
+            "base_ang_vel" => self.parts.input(name, 3, "rad/s"),
+            "projected_gravity" => gravity(self.parts, "gravity", self.facts)?,
+            "velocity_commands" => self.commands()?,
+            "joint_pos_rel" | "joint_pos" => {
+                let mut ops = self.parts.input_as(name, "joint_pos", joints, "rad");
+                ops.push(select());
+                if name == "joint_pos_rel" {
+                    ops.push(Op::Subtract(Operand::Name("default".to_owned())));
+                }
+                ops.extend(chosen_joints(self.yaml, path, joints)?);
+                ops
+            }
+            "joint_vel_rel" | "joint_vel" => {
+                let mut ops = self.parts.input_as(name, "joint_vel", joints, "rad/s");
+                ops.push(select());
+                ops.extend(chosen_joints(self.yaml, path, joints)?);
+                ops
+            }
+            "last_action" => {
+                let processed = self.facts.chooses("last_action", "processed")?;
+                self.parts.state(name, joints, if processed { "processed" } else { "policy.ACTION" })
+            }
+            other => self.unknown(other, path)?,
+        })
+    }
+
+    /// Begins a term of another name. Only the application knows this term, so it becomes a raw input.
+    fn unknown(&mut self, name: &str, path: &str) -> Result<Vec<Op>> {
+        let scale = self.yaml.maybe(&format!("{path}.scale"), "a list of numbers", Node::numbers)?;
+        let Some(scale) = scale else {
+            bail!(
+                "{}: term {name:?} is unknown; give it a scale with one number for each of its values",
+                self.yaml.at(path)
+            );
+        };
+        self.facts.of_application(
+            &format!("raw.{name}"),
+            &format!("term {name:?} is not known to this reader; does the application compute it (true)?"),
+        )?;
+        Ok(self.parts.input(name, scale.len(), ""))
+    }
+
+    fn commands(&mut self) -> Result<Vec<Op>> {
+        let yaml = self.yaml;
+        let mut ops = self.parts.input("velocity_commands", 3, "m/s, m/s, rad/s");
+        let path = "commands.base_velocity.ranges";
+        if self.facts.get::<bool>("clamp_commands")? {
+            let ranges = ["lin_vel_x", "lin_vel_y", "ang_vel_z"]
+                .map(|axis| yaml.need(&format!("{path}.{axis}"), "two numbers", Node::pair));
+            let ranges = ranges.into_iter().collect::<Result<Vec<_>>>()?;
+            let of = |i: usize| Operand::List(ranges.iter().map(|range| range[i]).collect());
+            ops.push(Op::Clip([of(0), of(1)]));
+        } else {
+            yaml.get(path);
+        }
+        Ok(ops)
     }
 }
 
@@ -165,53 +223,36 @@ fn chosen_joints(yaml: &Document, path: &str, joints: usize) -> Result<Option<Op
     Ok(Some(Op::Select(Order::Places(places))))
 }
 
-impl UnitreeRlLab {
-    fn commands(&self, parts: &mut Parts, yaml: &Document, facts: &mut Facts) -> Result<Vec<Op>> {
-        let mut ops = parts.input("velocity_commands", 3, "m/s, m/s, rad/s");
-        let path = "commands.base_velocity.ranges";
-        if facts.get::<bool>("clamp_commands")? {
-            let ranges = ["lin_vel_x", "lin_vel_y", "ang_vel_z"]
-                .map(|axis| yaml.need(&format!("{path}.{axis}"), "two numbers", Node::pair));
-            let ranges = ranges.into_iter().collect::<Result<Vec<_>>>()?;
-            let of = |i: usize| Operand::List(ranges.iter().map(|range| range[i]).collect());
-            ops.push(Op::Clip([of(0), of(1)]));
-        } else {
-            yaml.get(path);
+/// Adds the target: the action, scaled and offset, at the motors.
+fn target(parts: &mut Parts, yaml: &Document, motors: &[usize], facts: &mut Facts) -> Result<()> {
+    let actions = yaml.keys("actions");
+    let [action] = actions[..] else {
+        bail!("{} has {} actions; one is supported", yaml.at("actions"), actions.len());
+    };
+    let kind = match action {
+        "JointPositionAction" => TargetKind::Position,
+        "JointVelocityAction" => TargetKind::Velocity,
+        other => bail!("{}: action {other:?} is not known", yaml.at("actions")),
+    };
+    let path = |key: &str| format!("actions.{action}.{key}");
+    let mut ops = Vec::new();
+    for (key, op) in [("scale", Op::Scale as fn(Operand) -> Op), ("offset", Op::Add)] {
+        if let Some(list) = yaml.maybe(&path(key), "numbers", Node::one_or_several)? {
+            ops.push(op(Operand::List(list)));
         }
-        Ok(ops)
     }
-
-    /// Adds the target: the action, scaled and offset, at the motors.
-    fn target(&self, parts: &mut Parts, yaml: &Document, map: &[usize], facts: &mut Facts) -> Result<()> {
-        let actions = yaml.keys("actions");
-        let [action] = actions[..] else {
-            bail!("{} has {} actions; one is known", yaml.at("actions"), actions.len());
-        };
-        let kind = match action {
-            "JointPositionAction" => TargetKind::Position,
-            "JointVelocityAction" => TargetKind::Velocity,
-            other => bail!("{}: action {other:?} is not known", yaml.at("actions")),
-        };
-        let path = |key: &str| format!("actions.{action}.{key}");
-        let mut ops = Vec::new();
-        for (key, op) in [("scale", Op::Scale as fn(Operand) -> Op), ("offset", Op::Add)] {
-            if let Some(list) = yaml.maybe(&path(key), "numbers", Node::one_or_several)? {
-                ops.push(op(Operand::List(list)));
-            }
-        }
-        if let Some(clip) = yaml.get(&path("clip")) {
-            let pairs: Option<Vec<[f64; 2]>> = clip.items().iter().map(Node::pair).collect();
-            let pairs = pairs.filter(|pairs| !pairs.is_empty());
-            let pairs = pairs.with_context(|| format!("{} must be pairs of numbers", yaml.at(&path("clip"))))?;
-            let of = |i: usize| Operand::List(pairs.iter().map(|pair| pair[i]).collect());
-            ops.push(Op::Clip([of(0), of(1)]));
-        }
-        parts.value("processed", "policy.ACTION", ops);
-        parts.value("target", "processed", vec![Op::Place(Order::Places(map.to_vec()))]);
-        facts.note("processed", yaml.at(&format!("actions.{action}")));
-        facts.note("observation", facts.source("history.layout"));
-        facts.note("target", format!("{}; {}", yaml.at(&format!("actions.{action}")), yaml.at("joint_ids_map")));
-        parts.target(kind, "target");
-        Ok(())
+    if let Some(clip) = yaml.get(&path("clip")) {
+        let pairs: Option<Vec<[f64; 2]>> = clip.items().iter().map(Node::pair).collect();
+        let pairs = pairs.filter(|pairs| !pairs.is_empty());
+        let pairs = pairs.with_context(|| format!("{} must be pairs of numbers", yaml.at(&path("clip"))))?;
+        let of = |i: usize| Operand::List(pairs.iter().map(|pair| pair[i]).collect());
+        ops.push(Op::Clip([of(0), of(1)]));
     }
+    parts.value("processed", "policy.ACTION", ops);
+    parts.value("target", "processed", vec![Op::Place(Order::Places(motors.to_vec()))]);
+    facts.note("processed", yaml.at(&format!("actions.{action}")));
+    facts.note("observation", facts.source("history.layout"));
+    facts.note("target", format!("{}; {}", yaml.at(&format!("actions.{action}")), yaml.at("joint_ids_map")));
+    parts.target(kind, "target");
+    Ok(())
 }

@@ -21,90 +21,136 @@ pub(super) fn inputs(
 ) -> Result<Network> {
     let mut network =
         Network { name: "policy".to_owned(), file: graph.file.clone(), inputs: [].into(), states: [].into() };
+    let mut inputs = Inputs { parts, graph, outputs, period, meta, facts };
     for (input, len) in &graph.inputs {
-        let (name, len) = (base(input), *len);
-        let at = format!("{}: input {input:?}", graph.file);
-        let needed = match name {
-            "x_vel" | "y_vel" | "rot" | "t" | "timestamp" => Some(1),
-            "vector_command" | "projected_gravity" | "imu_ang_vel" | "imu_euler_xyz" | "imu_lin_acc" => Some(3),
-            "dof_pos" | "dof_vel" | "prev_actions" => Some(n),
-            _ => None,
-        };
-        if let Some(needed) = needed {
-            ensure!(len == needed, "{at} has {len} values, and {needed} are known with {n} joints");
+        let len = *len;
+        if let Some(expected) = expected_len(base(input), n) {
+            let at = inputs.at(input);
+            ensure!(len == expected, "{at} has {len} values; with {n} joints, {expected} are needed");
         }
-        let mut source = at.clone();
-        let value = match name {
-            "x_vel" | "y_vel" => raw(parts, name, len, "m/s"),
-            "rot" | "imu_ang_vel" => raw(parts, name, len, "rad/s"),
-            "vector_command" => raw(parts, name, len, "m/s, m/s, rad/s"),
-            "imu_euler_xyz" => raw(parts, name, len, "rad"),
-            "imu_lin_acc" => raw(parts, name, len, "m/s2"),
-            "t" | "timestamp" => {
-                let is_raw = facts.chooses("clock", "raw")?;
-                source = format!("{}; {}", meta.at("sim_dt"), facts.source("clock"));
-                if is_raw {
-                    raw(parts, name, 1, "s")
-                } else {
-                    parts.clock(Clock::from_zero(name, period, When::After));
-                    name.to_owned()
-                }
-            }
-            "dof_pos" => {
-                parts.raw_joints(name, "robot", "rad");
-                let relative: bool = facts.get("dof_pos.relative")?;
-                source = format!("{at}; {}", facts.source("dof_pos.relative"));
-                if relative {
-                    parts.value("relative_dof_pos", name, vec![Op::Subtract(Operand::Name("default".to_owned()))]);
-                    "relative_dof_pos".to_owned()
-                } else {
-                    name.to_owned()
-                }
-            }
-            "dof_vel" => {
-                parts.raw_joints(name, "robot", "rad/s");
-                name.to_owned()
-            }
-            "projected_gravity" => {
-                let (value, from) = gravity(parts, facts)?;
-                source = format!("{at}; {from}");
-                value
-            }
-            "prev_actions" => {
-                facts.note(name, facts.source("states.prev_actions"));
-                state(parts, &mut network, (input, len), &outputs.action, facts)?;
-                continue;
-            }
-            _ if BUFFERS.contains(&name) => {
-                let given = meta.maybe("num_observations", "a number", Node::number)?;
-                if let Some(given) = given.filter(|given| *given != len as f64) {
-                    return Err(Facts::contradiction(
-                        "length of the history",
-                        (&meta.at("num_observations"), &given.to_string()),
-                        (&at, &len.to_string()),
-                    ));
-                }
-                let next = outputs.buffer.clone().unwrap_or_default();
-                facts.note(name, format!("output {next:?} by {}", facts.source("states.buffer")));
-                state(parts, &mut network, (input, len), &next, facts)?;
-                continue;
-            }
-            _ => {
-                // What it is only the application's code says, so it is an input under its own name.
-                facts.of_application(
-                    &format!("raw.{name}"),
-                    &format!("the input {input:?} is not known to this reader; does the application compute its {len} values (true)?"),
-                )?;
-                raw(parts, &name.replace('.', "_"), len, "")
-            }
-        };
-        facts.note(name, source);
-        network.inputs.insert(input.clone(), value);
+        if !inputs.add_state(&mut network, input, len)? {
+            let value = inputs.value(input, len)?;
+            network.inputs.insert(input.clone(), value);
+        }
     }
     if !BUFFERS.iter().any(|name| graph.has_input(name)) {
         meta.get("num_observations");
     }
     Ok(network)
+}
+
+/// Returns the length that an input must have, for `n` joints; `None` if it may have any.
+fn expected_len(name: &str, n: usize) -> Option<usize> {
+    match name {
+        "x_vel" | "y_vel" | "rot" | "t" | "timestamp" => Some(1),
+        "vector_command" | "projected_gravity" | "imu_ang_vel" | "imu_euler_xyz" | "imu_lin_acc" => Some(3),
+        "dof_pos" | "dof_vel" | "prev_actions" => Some(n),
+        _ => None,
+    }
+}
+
+/// The graph's inputs under construction.
+struct Inputs<'a> {
+    parts: &'a mut Parts,
+    graph: &'a Graph,
+    outputs: &'a Outputs,
+    /// Seconds of a tick.
+    period: f64,
+    meta: &'a Document,
+    facts: &'a mut Facts,
+}
+
+impl Inputs<'_> {
+    /// Names an input, for reports and errors.
+    fn at(&self, input: &str) -> String {
+        format!("{}: input {input:?}", self.graph.file)
+    }
+
+    /// Makes an input a state if it reads an output of the tick before; returns `true` if it does.
+    fn add_state(&mut self, network: &mut Network, input: &str, len: usize) -> Result<bool> {
+        let name = base(input);
+        if name == "prev_actions" {
+            self.facts.note(name, self.facts.source("states.prev_actions"));
+            state(self.parts, network, (input, len), &self.outputs.action, self.facts)?;
+            return Ok(true);
+        }
+        if !BUFFERS.contains(&name) {
+            return Ok(false);
+        }
+        let given = self.meta.maybe("num_observations", "a number", Node::number)?;
+        if let Some(given) = given.filter(|given| *given != len as f64) {
+            return Err(Facts::contradiction(
+                "length of the history",
+                (&self.meta.at("num_observations"), &given.to_string()),
+                (&self.at(input), &len.to_string()),
+            ));
+        }
+        let next = self.outputs.buffer.clone().unwrap_or_default();
+        self.facts.note(name, format!("output {next:?} by {}", self.facts.source("states.buffer")));
+        state(self.parts, network, (input, len), &next, self.facts)?;
+        Ok(true)
+    }
+
+    /// Adds the value that an input reads; returns its name.
+    fn value(&mut self, input: &str, len: usize) -> Result<String> {
+        let name = base(input);
+        let mut source = self.at(input);
+        let value = match name {
+            "x_vel" | "y_vel" => raw(self.parts, name, len, "m/s"),
+            "rot" | "imu_ang_vel" => raw(self.parts, name, len, "rad/s"),
+            "vector_command" => raw(self.parts, name, len, "m/s, m/s, rad/s"),
+            "imu_euler_xyz" => raw(self.parts, name, len, "rad"),
+            "imu_lin_acc" => raw(self.parts, name, len, "m/s2"),
+            "t" | "timestamp" => {
+                let value = self.time(name)?;
+                source = format!("{}; {}", self.meta.at("sim_dt"), self.facts.source("clock"));
+                value
+            }
+            "dof_pos" => {
+                let value = self.position(name)?;
+                source = format!("{source}; {}", self.facts.source("dof_pos.relative"));
+                value
+            }
+            "dof_vel" => {
+                self.parts.raw_joints(name, "robot", "rad/s");
+                name.to_owned()
+            }
+            "projected_gravity" => {
+                let (value, from) = gravity(self.parts, self.facts)?;
+                source = format!("{source}; {from}");
+                value
+            }
+            // Only the application knows this term, so it becomes a raw input.
+            _ => {
+                self.facts.of_application(
+                    &format!("raw.{name}"),
+                    &format!("the input {input:?} is not known to this reader; does the application compute its {len} values (true)?"),
+                )?;
+                raw(self.parts, &name.replace('.', "_"), len, "")
+            }
+        };
+        self.facts.note(name, source);
+        Ok(value)
+    }
+
+    /// Adds the time, as a raw input or a clock; returns the name of its value.
+    fn time(&mut self, name: &str) -> Result<String> {
+        if self.facts.chooses("clock", "raw")? {
+            return Ok(raw(self.parts, name, 1, "s"));
+        }
+        self.parts.clock(Clock::from_zero(name, self.period, When::After));
+        Ok(name.to_owned())
+    }
+
+    /// Adds the joints' positions; returns the name of their value, which may be relative to the default.
+    fn position(&mut self, name: &str) -> Result<String> {
+        self.parts.raw_joints(name, "robot", "rad");
+        if !self.facts.get::<bool>("dof_pos.relative")? {
+            return Ok(name.to_owned());
+        }
+        self.parts.value("relative_dof_pos", name, vec![Op::Subtract(Operand::Name("default".to_owned()))]);
+        Ok("relative_dof_pos".to_owned())
+    }
 }
 
 /// Adds a raw input; returns its name.

@@ -1,4 +1,4 @@
-//! Joints with their numbers.
+//! Joint orders, defaults, scales and gains.
 
 use actq::error::{Context as _, Result, ensure};
 use actq::text::printable;
@@ -11,7 +11,10 @@ use crate::document::Document;
 use crate::facts::Facts;
 use crate::yaml::Node;
 
-/// Joints with their numbers, in the policy's order.
+/// Key of the joints' names in the metadata.
+const NAMES: &str = "joint_names";
+
+/// Joint orders, defaults, scales and gains.
 pub(super) struct Robot {
     /// Names of all joints in the order of the raw inputs.
     pub(super) raw: Vec<String>,
@@ -35,104 +38,37 @@ pub(super) struct Robot {
 
 impl Robot {
     pub(super) fn of(meta: &Document, ros: Option<&Ros<'_>>, graph: &Graph, facts: &mut Facts) -> Result<Self> {
-        let key = "joint_names";
-        let raw = names(meta, key)?;
-        let mut source = meta.at(key);
-        let mut observed = raw.clone();
-        let mut listed = Vec::new();
-        if let Some(ros) = ros {
-            let path = ros.path(&format!("joints.{ROS_KEY}"));
-            listed = ros.yaml.texts(&path)?;
-            (observed, source) = order(&raw, &meta.at(key), &listed, &ros.yaml.at(&path), facts)?;
-        }
-        let moved = if observed.len() == graph.actions {
-            observed.clone()
-        } else {
-            if graph.actions > observed.len() {
-                return Err(Facts::contradiction(
-                    "number of joints",
-                    (&source, &format!("{} joints", observed.len())),
-                    (&graph.file, &format!("output {:?} has {} values", printable(&graph.output), graph.actions)),
-                ));
-            }
-            let key = "joints.moved";
-            let meaning = format!(
-                "the policy observes {} joints and moves {}; which ones, in the order of the joints: {}?",
-                observed.len(),
-                graph.actions,
-                observed.join(", ")
-            );
-            let moved: Option<Vec<String>> = facts.missing(key, &meaning)?;
-            let moved = moved.unwrap_or_else(|| observed[..graph.actions].to_vec());
-            ensure!(
-                moved.len() == graph.actions && moved.iter().all(|joint| observed.contains(joint)),
-                "{key}: give {} of the joints {}",
-                graph.actions,
-                observed.join(", ")
-            );
-            moved
+        let raw = names(meta, NAMES)?;
+        let listed = match ros {
+            Some(ros) => ros.yaml.texts(&ros.path(&format!("joints.{ROS_KEY}")))?,
+            None => Vec::new(),
         };
-
-        // The metadata's numbers.
-        let by_name = |key: &str, one: bool| -> Result<Option<ByJoint>> {
-            let Some(list) = numbers(meta, key)? else { return Ok(None) };
-            let all = match list.len() {
-                1 if one => raw.iter().map(|joint| (joint.clone(), list[0])).collect(),
-                len if len == raw.len() => raw.iter().cloned().zip(list).collect(),
-                len if len == moved.len() => moved.iter().cloned().zip(list).collect(),
-                len => {
-                    return Err(Facts::contradiction(
-                        "number of joints",
-                        (&meta.at(key), &format!("{len} values")),
-                        (&meta.at("joint_names"), &format!("{} joints, of which {} move", raw.len(), moved.len())),
-                    ));
-                }
-            };
-            Ok(Some((all, meta.at(key))))
-        };
-        // The YAML file's numbers.
-        let of_ros = |key: &str| -> Result<Option<ByJoint>> {
-            let Some(ros) = ros else { return Ok(None) };
-            let list = ros.numbers(key, listed.len())?;
-            let at = ros.yaml.at(&ros.path(&format!("joints.{key}")));
-            Ok(list.map(|list| (listed.iter().cloned().zip(list).collect(), at)))
-        };
-        let pair = |own: &str, yaml: &str, one: bool| -> Result<_> { Ok((by_name(own, one)?, of_ros(yaml)?)) };
+        let (observed, source) = observed_joints(meta, ros, &raw, &listed, facts)?;
+        let moved = moved_joints(&observed, &source, graph, facts)?;
+        let given = Given { meta, ros, raw: &raw, moved: &moved, listed: &listed };
         let (default, default_source) =
-            agreed(pair("default_joint_pos", "walkready_state", false)?, "default_pose", &observed, facts)?
+            agreed(given.pair("default_joint_pos", "walkready_state", false)?, "default_pose", &observed, facts)?
                 .with_context(|| format!("{} is missing", meta.at("default_joint_pos")))?;
         let (scale, scale_source) =
-            agreed(pair("action_scale", "action_scales", true)?, "action_scale", &moved, facts)?
+            agreed(given.pair("action_scale", "action_scales", true)?, "action_scale", &moved, facts)?
                 .with_context(|| format!("{} is missing", meta.at("action_scale")))?;
-        let stiffness = agreed(pair("joint_stiffness", "kp", false)?, "stiffness", &moved, facts)?;
-        let damping = agreed(pair("joint_damping", "kd", false)?, "damping", &moved, facts)?;
+        let stiffness = agreed(given.pair("joint_stiffness", "kp", false)?, "stiffness", &moved, facts)?;
+        let damping = agreed(given.pair("joint_damping", "kd", false)?, "damping", &moved, facts)?;
         let (gains, gains_source) = match (stiffness, damping) {
             (Some((stiffness, first)), Some((damping, second))) => {
                 (Some([stiffness, damping]), format!("{first}; {second}"))
             }
             _ => (None, String::new()),
         };
-
-        let signs = of_ros("joint_signs")?;
-        let signs = signs.map(|(signs, at)| -> Result<Vec<f64>> {
-            let signs: Vec<f64> = observed.iter().filter_map(|joint| signs.get(joint).copied()).collect();
-            ensure!(signs.iter().all(|sign| sign.abs() == 1.0), "{at}: give 1 or -1 for each joint");
-            Ok(signs)
-        });
-        let mut left = Vec::new();
-        if let Some(ros) = ros {
-            let path = ros.path("joints.uncontrolled_joint_names");
-            left = ros.yaml.maybe(&path, "a list of names", Node::texts)?.unwrap_or_default();
-        }
-        let sent: Vec<String> = moved.iter().filter(|joint| !left.contains(joint)).cloned().collect();
-        ensure!(!sent.is_empty(), "uncontrolled_joint_names names all joints that the policy moves");
+        let signs = given.signs(&observed)?;
+        let sent = sent_joints(ros, &moved)?;
         Ok(Self {
             raw,
             observed,
             moved,
             sent,
             default,
-            signs: signs.transpose()?,
+            signs,
             scale,
             gains,
             source,
@@ -197,5 +133,110 @@ impl Robot {
         let mut ops: Vec<Op> = (self.observed != self.raw).then(select).into_iter().collect();
         ops.extend(self.signs.is_some().then(|| Op::Scale(Operand::Name("signs".to_owned()))));
         ops
+    }
+}
+
+/// Returns the joints that the policy observes, in its order, and where they are. `listed` are those of the YAML file.
+fn observed_joints(
+    meta: &Document,
+    ros: Option<&Ros<'_>>,
+    raw: &[String],
+    listed: &[String],
+    facts: &mut Facts,
+) -> Result<(Vec<String>, String)> {
+    let at = meta.at(NAMES);
+    let Some(ros) = ros else { return Ok((raw.to_vec(), at)) };
+    order(raw, &at, listed, &ros.yaml.at(&ros.path(&format!("joints.{ROS_KEY}"))), facts)
+}
+
+/// Returns the joints that the policy moves: all that it observes, or as many as the graph has actions.
+fn moved_joints(observed: &[String], source: &str, graph: &Graph, facts: &mut Facts) -> Result<Vec<String>> {
+    if observed.len() == graph.actions {
+        return Ok(observed.to_vec());
+    }
+    if graph.actions > observed.len() {
+        return Err(Facts::contradiction(
+            "number of joints",
+            (source, &format!("{} joints", observed.len())),
+            (&graph.file, &format!("output {:?} has {} values", printable(&graph.output), graph.actions)),
+        ));
+    }
+    let key = "joints.moved";
+    let meaning = format!(
+        "the policy observes {} joints and moves {}; which ones, in the order of the joints: {}?",
+        observed.len(),
+        graph.actions,
+        observed.join(", ")
+    );
+    let moved: Option<Vec<String>> = facts.missing(key, &meaning)?;
+    let moved = moved.unwrap_or_else(|| observed[..graph.actions].to_vec());
+    ensure!(
+        moved.len() == graph.actions && moved.iter().all(|joint| observed.contains(joint)),
+        "{key}: give {} of the joints {}",
+        graph.actions,
+        observed.join(", ")
+    );
+    Ok(moved)
+}
+
+/// Returns the joints whose targets are sent: those that the policy moves and the ROS 2 node controls.
+fn sent_joints(ros: Option<&Ros<'_>>, moved: &[String]) -> Result<Vec<String>> {
+    let mut uncontrolled = Vec::new();
+    if let Some(ros) = ros {
+        let path = ros.path("joints.uncontrolled_joint_names");
+        uncontrolled = ros.yaml.maybe(&path, "a list of names", Node::texts)?.unwrap_or_default();
+    }
+    let sent: Vec<String> = moved.iter().filter(|joint| !uncontrolled.contains(joint)).cloned().collect();
+    ensure!(!sent.is_empty(), "uncontrolled_joint_names names all joints that the policy moves");
+    Ok(sent)
+}
+
+/// The files that give numbers of joints, and the joints that their lists are of.
+struct Given<'a> {
+    meta: &'a Document,
+    ros: Option<&'a Ros<'a>>,
+    raw: &'a [String],
+    moved: &'a [String],
+    /// Joints of the YAML file.
+    listed: &'a [String],
+}
+
+impl Given<'_> {
+    /// Returns numbers by joint of the metadata, and of the YAML file. With `one`, a single number is that of all joints.
+    fn pair(&self, own: &str, yaml: &str, one: bool) -> Result<(Option<ByJoint>, Option<ByJoint>)> {
+        Ok((self.of_metadata(own, one)?, self.of_ros(yaml)?))
+    }
+
+    fn of_metadata(&self, key: &str, one: bool) -> Result<Option<ByJoint>> {
+        let Some(list) = numbers(self.meta, key)? else { return Ok(None) };
+        let (raw, moved) = (self.raw, self.moved);
+        let all = match list.len() {
+            1 if one => raw.iter().map(|joint| (joint.clone(), list[0])).collect(),
+            len if len == raw.len() => raw.iter().cloned().zip(list).collect(),
+            len if len == moved.len() => moved.iter().cloned().zip(list).collect(),
+            len => {
+                return Err(Facts::contradiction(
+                    "number of joints",
+                    (&self.meta.at(key), &format!("{len} values")),
+                    (&self.meta.at(NAMES), &format!("{} joints, of which {} move", raw.len(), moved.len())),
+                ));
+            }
+        };
+        Ok(Some((all, self.meta.at(key))))
+    }
+
+    fn of_ros(&self, key: &str) -> Result<Option<ByJoint>> {
+        let Some(ros) = self.ros else { return Ok(None) };
+        let list = ros.numbers(key, self.listed.len())?;
+        let at = ros.yaml.at(&ros.path(&format!("joints.{key}")));
+        Ok(list.map(|list| (self.listed.iter().cloned().zip(list).collect(), at)))
+    }
+
+    /// Returns the signs of the observed joints, if the YAML file has signs.
+    fn signs(&self, observed: &[String]) -> Result<Option<Vec<f64>>> {
+        let Some((signs, at)) = self.of_ros("joint_signs")? else { return Ok(None) };
+        let signs: Vec<f64> = observed.iter().filter_map(|joint| signs.get(joint).copied()).collect();
+        ensure!(signs.iter().all(|sign| sign.abs() == 1.0), "{at}: give 1 or -1 for each joint");
+        Ok(Some(signs))
     }
 }

@@ -11,7 +11,11 @@ use crate::document::Document;
 use crate::facts::Facts;
 use crate::yaml::Node;
 
-/// What a term is.
+/// Key of the terms' names in the metadata.
+const NAMES: &str = "observation_names";
+
+/// Kind of a term.
+#[derive(Clone, Copy)]
 enum Term {
     /// A raw input of a length and a unit, by its name with the ROS 2 node.
     Raw(usize, &'static str, &'static str),
@@ -20,6 +24,37 @@ enum Term {
     Velocity,
     Action,
     Unknown,
+}
+
+impl Term {
+    /// Recognizes a term by its name. `command` is the length and unit of the command, if known.
+    fn of(name: &str, command: Option<(usize, &'static str)>) -> Self {
+        match name {
+            "base_lin_vel" => Self::Raw(3, "m/s", "linear_velocity"),
+            "base_ang_vel" | "imu_ang_vel" => Self::Raw(3, "rad/s", "angular_velocity"),
+            "projected_gravity" => Self::Gravity,
+            "joint_pos" | "joint_pos_rel" => Self::Position,
+            "joint_vel" | "joint_vel_rel" => Self::Velocity,
+            "actions" | "last_action" | "prev_actions" => Self::Action,
+            "command" | "velocity_commands" | "commands" => {
+                command.map_or(Self::Unknown, |(len, unit)| Self::Raw(len, unit, "cmd_vel"))
+            }
+            "motion_anchor_pos_b" => Self::Raw(3, "m", "motion_anchor_pos_b"),
+            "motion_anchor_ori_b" => Self::Raw(6, "", "motion_anchor_ori_b"),
+            _ => Self::Unknown,
+        }
+    }
+
+    /// Returns the number of values, if known.
+    fn len(self, robot: &Robot) -> Option<usize> {
+        match self {
+            Self::Raw(len, ..) => Some(len),
+            Self::Gravity => Some(3),
+            Self::Position | Self::Velocity => Some(robot.observed.len()),
+            Self::Action => Some(robot.moved.len()),
+            Self::Unknown => None,
+        }
+    }
 }
 
 /// Adds the terms of the observation.
@@ -31,101 +66,25 @@ pub(super) fn terms(
     graph: &Graph,
     facts: &mut Facts,
 ) -> Result<()> {
-    let key = "observation_names";
-    let listed = names(meta, key)?;
-    let commands = command(meta, robot)?;
-    let (joints, moved) = (robot.observed.len(), robot.moved.len());
-    let of = |term: &str| match term {
-        "base_lin_vel" => Term::Raw(3, "m/s", "linear_velocity"),
-        "base_ang_vel" | "imu_ang_vel" => Term::Raw(3, "rad/s", "angular_velocity"),
-        "projected_gravity" => Term::Gravity,
-        "joint_pos" | "joint_pos_rel" => Term::Position,
-        "joint_vel" | "joint_vel_rel" => Term::Velocity,
-        "actions" | "last_action" | "prev_actions" => Term::Action,
-        "command" | "velocity_commands" | "commands" => {
-            commands.map_or(Term::Unknown, |(len, unit)| Term::Raw(len, unit, "cmd_vel"))
-        }
-        "motion_anchor_pos_b" => Term::Raw(3, "m", "motion_anchor_pos_b"),
-        "motion_anchor_ori_b" => Term::Raw(6, "", "motion_anchor_ori_b"),
-        _ => Term::Unknown,
-    };
-    let known = |term: &Term| match term {
-        Term::Raw(len, ..) => Some(*len),
-        Term::Gravity => Some(3),
-        Term::Position | Term::Velocity => Some(joints),
-        Term::Action => Some(moved),
-        Term::Unknown => None,
-    };
+    let names = names(meta, NAMES)?;
+    let command = command(meta, robot)?;
+    let terms: Vec<(&str, Term)> = names.iter().map(|name| (name.as_str(), Term::of(name, command))).collect();
     // Lengths first: those that nothing states are questions.
-    let mut lens = Vec::new();
-    let sum: usize = listed.iter().filter_map(|term| known(&of(term))).sum();
-    let unknown = listed.iter().filter(|term| known(&of(term)).is_none()).count();
-    let mut open = false;
-    for term in &listed {
-        lens.push(match known(&of(term)) {
-            Some(len) => len,
-            None => {
-                let rest = graph.input_len.saturating_sub(sum);
-                let meaning = format!(
-                    "the length of term {term:?} is not known to this reader; how many values of it does the application give? ({rest} of the graph's {} values are left for {unknown} such terms, without histories)",
-                    graph.input_len
-                );
-                let len: Option<usize> = facts.missing(&format!("raw.{term}"), &meaning)?;
-                open |= len.is_none();
-                let len = len.unwrap_or_else(|| (rest / unknown.max(1)).max(1));
-                ensure!((1..=MOST).contains(&len), "raw.{term} = {len}: give 1 to {MOST}");
-                len
-            }
-        });
-    }
-    let frames = frames(meta, graph, &listed, &lens, open, facts)?;
+    let (lens, open) = lengths(&terms, robot, graph, facts)?;
+    let frames = frames(meta, graph, &names, &lens, open, facts)?;
 
     let plain: Option<bool> = facts.find("terms.plain")?;
     let relative: bool = facts.get("joint_pos.relative")?;
-    let (position, velocity) = if ros.is_some() { ("position", "velocity") } else { ("joint_pos", "joint_vel") };
-    if facts.chooses("target.base", "current")? || listed.iter().any(|term| matches!(of(term), Term::Position)) {
-        parts.raw_joints(position, "robot", "rad");
-    }
-    if listed.iter().any(|term| matches!(of(term), Term::Velocity)) {
-        parts.raw_joints(velocity, "robot", "rad/s");
-    }
-    for ((term, len), length) in listed.iter().zip(&lens).zip(&frames) {
-        let mut source = meta.at(key);
-        let mut ops = match of(term) {
-            Term::Raw(len, unit, name) => parts.input_as(term, if ros.is_some() { name } else { term }, len, unit),
-            Term::Gravity => {
-                let rule = if ros.is_some() { "ros.gravity" } else { "gravity" };
-                let ops = gravity(parts, rule, facts)?;
-                source = format!("{source}; {}", facts.source(rule));
-                ops
-            }
-            Term::Position => {
-                parts.begin(term, position);
-                let mut ops = robot.select();
-                ops.extend(relative.then(|| Op::Subtract(Operand::Name("default".to_owned()))));
-                source = format!("{source}; {}", facts.source("joint_pos.relative"));
-                ops
-            }
-            Term::Velocity => {
-                parts.begin(term, velocity);
-                robot.select()
-            }
-            Term::Action => {
-                let is_processed = facts.chooses("last_action", "processed")?;
-                source = format!("{source}; {}", facts.source("last_action"));
-                parts.state(term, *len, if is_processed { "processed" } else { ACTION })
-            }
-            Term::Unknown => parts.input(term, *len, ""),
-        };
+    let has_ros = ros.is_some();
+    let mut builder = Builder { parts, meta, robot, has_ros, relative, facts };
+    builder.joint_inputs(&terms)?;
+    for ((&(name, term), &len), &length) in terms.iter().zip(&lens).zip(&frames) {
+        let (mut ops, mut source) = builder.begin(name, term, len)?;
         if plain == Some(false) {
-            let name = format!("scale.{term}");
-            let scale: Option<f64> =
-                facts.missing(&name, &format!("by which number is the term {term:?} multiplied?"))?;
-            ops.push(Op::Scale(Operand::Number(scale.unwrap_or(1.0))));
-            source = format!("{source}; {}", facts.source(&name));
+            ops.push(builder.scale(name, &mut source)?);
         }
-        facts.note(term, source);
-        parts.term(ops, *length);
+        builder.facts.note(name, source);
+        builder.parts.term(ops, length);
     }
     facts.note("scales of terms", facts.source("terms.plain"));
     let histories = if frames.iter().any(|length| *length > 1) {
@@ -134,6 +93,106 @@ pub(super) fn terms(
         Histories { by_term: false, first: Default::default(), fill: Default::default(), stride: 1 }
     };
     parts.observe(&histories)
+}
+
+/// Returns the length of each term. `true` if one is still a question; a guess is in its place then.
+fn lengths(terms: &[(&str, Term)], robot: &Robot, graph: &Graph, facts: &mut Facts) -> Result<(Vec<usize>, bool)> {
+    let known = |(_, term): &(&str, Term)| term.len(robot);
+    let unknown = terms.iter().filter(|term| known(term).is_none()).count();
+    let rest = graph.input_len.saturating_sub(terms.iter().filter_map(known).sum());
+    let (mut lens, mut open) = (Vec::new(), false);
+    for term in terms {
+        lens.push(match known(term) {
+            Some(len) => len,
+            None => {
+                let name = term.0;
+                let meaning = format!(
+                    "term {name:?}: unknown length; how many values does the application give? (the graph has {rest} values for {unknown} such terms)"
+                );
+                let len: Option<usize> = facts.missing(&format!("raw.{name}"), &meaning)?;
+                open |= len.is_none();
+                let len = len.unwrap_or_else(|| (rest / unknown.max(1)).max(1));
+                ensure!((1..=MOST).contains(&len), "raw.{name} = {len}: give 1 to {MOST}");
+                len
+            }
+        });
+    }
+    Ok((lens, open))
+}
+
+/// The terms under construction.
+struct Builder<'a> {
+    parts: &'a mut Parts,
+    meta: &'a Document,
+    robot: &'a Robot,
+    /// `true` if the values are those of the ROS 2 node.
+    has_ros: bool,
+    /// `true` if the default is subtracted from the joints' positions.
+    relative: bool,
+    facts: &'a mut Facts,
+}
+
+impl Builder<'_> {
+    /// Returns the names of the raw inputs of the joints' positions and velocities.
+    fn joint_names(&self) -> (&'static str, &'static str) {
+        if self.has_ros { ("position", "velocity") } else { ("joint_pos", "joint_vel") }
+    }
+
+    /// Adds the raw inputs of the joints that terms or the target read.
+    fn joint_inputs(&mut self, terms: &[(&str, Term)]) -> Result<()> {
+        let (position, velocity) = self.joint_names();
+        let has = |is_read: fn(&Term) -> bool| terms.iter().any(|(_, term)| is_read(term));
+        if self.facts.chooses("target.base", "current")? || has(|term| matches!(term, Term::Position)) {
+            self.parts.raw_joints(position, "robot", "rad");
+        }
+        if has(|term| matches!(term, Term::Velocity)) {
+            self.parts.raw_joints(velocity, "robot", "rad/s");
+        }
+        Ok(())
+    }
+
+    /// Begins a term; returns the operations on its raw input, and where they come from.
+    fn begin(&mut self, name: &str, term: Term, len: usize) -> Result<(Vec<Op>, String)> {
+        let (position, velocity) = self.joint_names();
+        let listed = self.meta.at(NAMES);
+        let by_rule = |facts: &Facts, rule: &str| format!("{listed}; {}", facts.source(rule));
+        Ok(match term {
+            Term::Raw(len, unit, of_ros) => {
+                let input = if self.has_ros { of_ros } else { name };
+                (self.parts.input_as(name, input, len, unit), listed)
+            }
+            Term::Gravity => {
+                let rule = if self.has_ros { "ros.gravity" } else { "gravity" };
+                let ops = gravity(self.parts, rule, self.facts)?;
+                (ops, by_rule(self.facts, rule))
+            }
+            Term::Position => {
+                self.parts.begin(name, position);
+                let mut ops = self.robot.select();
+                ops.extend(self.relative.then(|| Op::Subtract(Operand::Name("default".to_owned()))));
+                (ops, by_rule(self.facts, "joint_pos.relative"))
+            }
+            Term::Velocity => {
+                self.parts.begin(name, velocity);
+                (self.robot.select(), listed)
+            }
+            Term::Action => {
+                let is_processed = self.facts.chooses("last_action", "processed")?;
+                let ops = self.parts.state(name, len, if is_processed { "processed" } else { ACTION });
+                (ops, by_rule(self.facts, "last_action"))
+            }
+            Term::Unknown => (self.parts.input(name, len, ""), listed),
+        })
+    }
+
+    /// Asks for the scale of a term, and adds its source.
+    fn scale(&mut self, name: &str, source: &mut String) -> Result<Op> {
+        let key = format!("scale.{name}");
+        let meaning = format!("by which number is the term {name:?} multiplied?");
+        let scale: Option<f64> = self.facts.missing(&key, &meaning)?;
+        *source = format!("{source}; {}", self.facts.source(&key));
+        Ok(Op::Scale(Operand::Number(scale.unwrap_or(1.0))))
+    }
 }
 
 /// Returns the length and unit of the command by its name, or nothing if it is another command.
