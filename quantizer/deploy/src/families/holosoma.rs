@@ -75,37 +75,18 @@ impl Family for Holosoma {
         let file = found.networks.first().context("there is no ONNX file")?;
         let metadata = found.documents.first().context("there are no metadata")?;
         let signature = Signature::read(&bundle.path(file)?)?;
-        let joints = metadata.texts("dof_names")?;
-        let (kp, kd) = (metadata.numbers("kp")?, metadata.numbers("kd")?);
+        let joints = joint_names(metadata)?;
+        let gains = gains(metadata, joints.len())?;
         let n = joints.len();
-        ensure!(n > 0, "{} is empty", metadata.at("dof_names"));
-        ensure!(joints.iter().collect::<BTreeSet<_>>().len() == n, "{}: a name occurs twice", metadata.at("dof_names"));
-        for (key, list) in [("kp", &kp), ("kd", &kd)] {
-            if list.len() != n {
-                return Err(Facts::contradiction(
-                    "number of joints",
-                    (&metadata.at("dof_names"), &format!("{n} names")),
-                    (&metadata.at(key), &format!("{} gains", list.len())),
-                ));
-            }
-        }
         let kind = if signature.inputs.iter().any(|(name, _)| name == "time_step") { TRACKING } else { LOCOMOTION };
-        let ports = |named: &[&str], ports: &[(String, Option<usize>)]| match ports {
-            [one] => Some(one.clone()),
-            several => several.iter().find(|(name, _)| named.contains(&name.as_str())).cloned(),
-        };
-        // A tracking policy's file has inputs and outputs of the motion, which its action does not depend on.
-        let input = ports(&["actor_obs", "obs"], &signature.inputs);
-        let output = ports(&["action", "actions"], &signature.outputs);
-        let (input, seen) = input.with_context(|| format!("{file}: it has no input actor_obs or obs"))?;
-        let (output, acts) = output.with_context(|| format!("{file}: it has no output action or actions"))?;
-        // A graph whose axes are all dynamic does not tell its lengths.
-        let acts = acts.filter(|acts| *acts > 1).unwrap_or(n);
-        if acts > n {
+        let ports = Ports::find(file, &signature)?;
+        // A graph whose axes are all dynamic has no fixed lengths.
+        let action_len = ports.action_len.filter(|len| *len > 1).unwrap_or(n);
+        if action_len > n {
             return Err(Facts::contradiction(
                 "length of the action",
                 (&metadata.at("dof_names"), &format!("{n} names")),
-                (&format!("{file}, output {output:?}"), &format!("{acts} values")),
+                (&format!("{file}, output {:?}", ports.output), &format!("{action_len} values")),
             ));
         }
 
@@ -118,26 +99,74 @@ impl Family for Holosoma {
             default.len(),
             metadata.at("dof_names")
         );
-        let mut reader = Reader { parts: Parts::new("policy", rate), facts, n, acts, rate, has_clock: false };
+        let mut reader = Reader { parts: Parts::new("policy", rate), facts, n, action_len, rate, has_clock: false };
         reader.parts.joints("robot", joints);
         reader.parts.constant("default", default);
         let len = reader.observe(&kind)?;
         let source = reader.facts.source(kind.rule);
-        if let Some(seen) = seen.filter(|seen| *seen > 1 && *seen != len)
+        if let Some(fixed) = ports.observation_len.filter(|fixed| *fixed > 1 && *fixed != len)
             && source != QUESTION
         {
             return Err(Facts::contradiction(
                 "length of the observation",
-                (&format!("{file}, input {input:?}"), &format!("{seen} values")),
+                (&format!("{file}, input {:?}", ports.input), &format!("{fixed} values")),
                 (&format!("{} ({source})", kind.rule), &format!("{len} values of {n} joints")),
             ));
         }
-        reader.parts.network(file, &input, &output);
+        reader.parts.network(file, &ports.input, &ports.output);
         reader.act(metadata)?;
-        reader.parts.gains(Gains { joints: Some("robot".to_owned()), stiffness: kp, damping: kd });
+        reader.parts.gains(gains);
         reader.facts.note("gains", metadata.at("kp"));
         reader.facts.note("joints.robot", metadata.at("dof_names"));
         Ok(reader.parts.finish())
+    }
+}
+
+/// Reads the joints' names, which must differ.
+fn joint_names(metadata: &Document) -> Result<Vec<String>> {
+    let joints = metadata.texts("dof_names")?;
+    let distinct = joints.iter().collect::<BTreeSet<_>>().len();
+    ensure!(!joints.is_empty(), "{} is empty", metadata.at("dof_names"));
+    ensure!(distinct == joints.len(), "{}: a name occurs twice", metadata.at("dof_names"));
+    Ok(joints)
+}
+
+/// Reads the gains of `n` joints.
+fn gains(metadata: &Document, n: usize) -> Result<Gains> {
+    let (stiffness, damping) = (metadata.numbers("kp")?, metadata.numbers("kd")?);
+    for (key, list) in [("kp", &stiffness), ("kd", &damping)] {
+        if list.len() != n {
+            return Err(Facts::contradiction(
+                "number of joints",
+                (&metadata.at("dof_names"), &format!("{n} names")),
+                (&metadata.at(key), &format!("{} gains", list.len())),
+            ));
+        }
+    }
+    Ok(Gains { joints: Some("robot".to_owned()), stiffness, damping })
+}
+
+/// The observation's input and the action's output, with their lengths if known.
+///
+/// A tracking policy's file also has inputs and outputs of the motion, which its action does not depend on.
+struct Ports {
+    input: String,
+    output: String,
+    observation_len: Option<usize>,
+    action_len: Option<usize>,
+}
+
+impl Ports {
+    fn find(file: &str, signature: &Signature) -> Result<Self> {
+        let find = |names: [&str; 2], ports: &[(String, Option<usize>)]| match ports {
+            [one] => Some(one.clone()),
+            several => several.iter().find(|(name, _)| names.contains(&name.as_str())).cloned(),
+        };
+        let input = find(["actor_obs", "obs"], &signature.inputs);
+        let output = find(["action", "actions"], &signature.outputs);
+        let (input, observation_len) = input.with_context(|| format!("{file}: it has no input actor_obs or obs"))?;
+        let (output, action_len) = output.with_context(|| format!("{file}: it has no output action or actions"))?;
+        Ok(Self { input, output, observation_len, action_len })
     }
 }
 
@@ -164,7 +193,7 @@ struct Reader<'a> {
     /// Number of joints.
     n: usize,
     /// Length of the action.
-    acts: usize,
+    action_len: usize,
     rate: f64,
     has_clock: bool,
 }
@@ -233,8 +262,8 @@ impl Reader<'_> {
             }
             "projected_gravity" => self.gravity()?,
             "actions" => {
-                fed_back(&mut self.parts, self.acts, self.facts)?;
-                ("last_action".to_owned(), Vec::new(), self.acts)
+                fed_back(&mut self.parts, self.action_len, self.facts)?;
+                ("last_action".to_owned(), Vec::new(), self.action_len)
             }
             "sin_phase" => ("leg_phases".to_owned(), vec![Op::Sin], self.clock()?),
             "cos_phase" => ("leg_phases".to_owned(), vec![Op::Cos], self.clock()?),
@@ -295,7 +324,7 @@ impl Reader<'_> {
 
     /// Adds the target: the default and the scaled action; 0 for the first joints of an action that is shorter.
     fn act(&mut self, metadata: &Document) -> Result<()> {
-        let (n, acts) = (self.n, self.acts);
+        let (n, action_len) = (self.n, self.action_len);
         clip(&mut self.parts, self.facts)?;
         let (scale, source) = match metadata.maybe("action_scale", "a finite number, or several", numbers)? {
             Some(scale) => (scale, metadata.at("action_scale")),
@@ -306,15 +335,15 @@ impl Reader<'_> {
         };
         ensure!(
             scale.len() == 1 || scale.len() == n,
-            "{} has {} values; 1 or {n} are known",
+            "{} has {} values; 1 or {n} are needed",
             metadata.at("action_scale"),
             scale.len()
         );
         let mut ops = Vec::new();
         let mut from = "clipped";
-        if acts < n {
+        if action_len < n {
             let first: bool = self.facts.find("action.last_joints")?.unwrap_or(true);
-            let moved = if first { n - acts..n } else { 0..acts };
+            let moved = if first { n - action_len..n } else { 0..action_len };
             add_zero(&mut self.parts, "clipped");
             self.facts.note("clipped_and_zero", self.facts.source("action.last_joints"));
             ops.push(padded(n, moved));

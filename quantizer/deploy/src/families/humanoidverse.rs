@@ -66,33 +66,16 @@ impl Family for Humanoidverse {
             yaml.file
         );
         let file = network(yaml, &found.networks, facts)?;
-        let signature = Signature::read(&bundle.path(&file)?)?;
-        let port = match &signature.inputs[..] {
-            [one] => Some(one),
-            several => several.iter().find(|(name, _)| name == "actor_obs"),
-        };
-        let (input, seen) = port.with_context(|| format!("{file}: it has no input actor_obs"))?;
-        // The deploy code reads the first output only.
-        let (output, acts) = signature.outputs.first().with_context(|| format!("{file}: it has no output"))?;
-        // A graph whose axes are all dynamic does not tell its lengths.
-        let told = |len: &Option<usize>| len.filter(|len| *len > 1);
-
-        let rate = match yaml.maybe("rl_rate", "a number of ticks a second", Node::number)? {
-            Some(rate) => {
-                facts.note("rate_hz", yaml.at("rl_rate"));
-                rate
-            }
-            None => facts.find("rate_hz")?.unwrap_or(1.0),
-        };
-        ensure!(rate > 0.0, "rate_hz = {rate}: give a number above 0");
+        let ports = Ports::read(bundle, &file)?;
+        let rate = rate(yaml, facts)?;
         let mut reader = Reader {
             yaml,
             parts: Parts::new("policy", rate),
             facts,
             rate,
             dims: "obs_dims".to_owned(),
-            acts: told(acts),
-            acts_from: format!("{file}, output {output:?}"),
+            action_len: ports.action_len,
+            action_len_from: format!("{file}, output {:?}", ports.output),
             robot,
             active: None,
             motion: None,
@@ -102,21 +85,62 @@ impl Family for Humanoidverse {
         if reader.robot.by_name {
             reader.parts.joints("robot", reader.robot.names.clone());
         }
-        let len = if asap { reader.asap(&file, told(seen))? } else { reader.falcon()? };
-        if let Some(seen) = told(seen)
-            && seen != len
-        {
+        let len = if asap { reader.asap(&file, ports.observation_len)? } else { reader.falcon()? };
+        if let Some(fixed) = ports.observation_len.filter(|fixed| *fixed != len) {
             return Err(Facts::contradiction(
                 "length of the observation",
                 (&yaml.file, &format!("{len} values, by its terms, dimensions and histories")),
-                (&format!("{file}, input {input:?}"), &format!("{seen} values")),
+                (&format!("{file}, input {:?}", ports.input), &format!("{fixed} values")),
             ));
         }
-        reader.parts.network(&file, input, output);
+        reader.parts.network(&file, &ports.input, &ports.output);
         reader.act()?;
         reader.gains()?;
         Ok(reader.parts.finish())
     }
+}
+
+/// The input and the output of a network, with their lengths if these are fixed.
+struct Ports {
+    input: String,
+    output: String,
+    observation_len: Option<usize>,
+    action_len: Option<usize>,
+}
+
+impl Ports {
+    fn read(bundle: &Bundle, file: &str) -> Result<Self> {
+        let signature = Signature::read(&bundle.path(file)?)?;
+        let input = match &signature.inputs[..] {
+            [one] => Some(one),
+            several => several.iter().find(|(name, _)| name == "actor_obs"),
+        };
+        let (input, observation_len) = input.with_context(|| format!("{file}: it has no input actor_obs"))?;
+        // The deploy code reads the first output only.
+        let output = signature.outputs.first();
+        let (output, action_len) = output.with_context(|| format!("{file}: it has no output"))?;
+        // A graph whose axes are all dynamic has no fixed lengths.
+        let fixed_len = |len: &Option<usize>| len.filter(|len| *len > 1);
+        Ok(Self {
+            input: input.clone(),
+            output: output.clone(),
+            observation_len: fixed_len(observation_len),
+            action_len: fixed_len(action_len),
+        })
+    }
+}
+
+/// Returns the ticks a second.
+fn rate(yaml: &Document, facts: &mut Facts) -> Result<f64> {
+    let rate = match yaml.maybe("rl_rate", "a number of ticks a second", Node::number)? {
+        Some(rate) => {
+            facts.note("rate_hz", yaml.at("rl_rate"));
+            rate
+        }
+        None => facts.find("rate_hz")?.unwrap_or(1.0),
+    };
+    ensure!(rate > 0.0, "rate_hz = {rate}: give a number above 0");
+    Ok(rate)
 }
 
 /// Returns the network: the file that model_path names, the only one, or the answer.

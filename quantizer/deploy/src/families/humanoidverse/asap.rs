@@ -24,8 +24,8 @@ pub(super) fn is_one(yaml: &Document) -> bool {
 
 impl Reader<'_> {
     /// Adds the observation of ASAP; returns its length.
-    pub(super) fn asap(&mut self, file: &str, seen: Option<usize>) -> Result<usize> {
-        let [policy, histories, dims, scale] = self.asap_policy(file, seen)?;
+    pub(super) fn asap(&mut self, file: &str, observation_len: Option<usize>) -> Result<usize> {
+        let [policy, histories, dims, scale] = self.asap_policy(file, observation_len)?;
         self.dims = dims.to_owned();
         let yaml = self.yaml;
         if policy == "mimic" {
@@ -36,10 +36,10 @@ impl Reader<'_> {
             self.motion = yaml.maybe(&format!("motion_length_s.{skill}"), "a number of s", Node::number)?;
             self.facts.note("joints of the policy", yaml.at(&format!("robot_dofs.{kind}")));
         }
-        if self.acts.is_none() {
-            self.acts_from = yaml.at(&format!("{dims}.actions"));
+        if self.action_len.is_none() {
+            self.action_len_from = yaml.at(&format!("{dims}.actions"));
             let len = self.dim("actions")?;
-            self.acts = Some(self.active.as_ref().map_or(len, Vec::len));
+            self.action_len = Some(self.active.as_ref().map_or(len, Vec::len));
         }
         let flag = if policy == "mimic" { "USE_HISTORY_MIMIC" } else { "USE_HISTORY_LOCO" };
         let with_history = yaml.maybe(flag, "True or False", Node::truth)?.unwrap_or(false);
@@ -82,7 +82,7 @@ impl Reader<'_> {
     }
 
     /// Returns which of ASAP's policies a network is: by its folder, by its length, or by the answer.
-    fn asap_policy(&mut self, file: &str, seen: Option<usize>) -> Result<[&'static str; 4]> {
+    fn asap_policy(&mut self, file: &str, observation_len: Option<usize>) -> Result<[&'static str; 4]> {
         // The order of the terms is the same for all; it is asked for here, since nothing else states it.
         let listed: bool = self.facts.find("asap.terms")?.unwrap_or(true);
         ensure!(listed, "asap.terms = false: write the terms of the observation in deploy.toml");
@@ -95,7 +95,7 @@ impl Reader<'_> {
             .any(|part| part == "mimic" || skills.contains(&part));
         let fits = |policy: &[&str; 4]| {
             let mimic = policy[0] == "mimic";
-            mimic == is_mimic && (mimic || seen.is_none_or(|seen| self.asap_len(policy) == Some(seen)))
+            mimic == is_mimic && (mimic || observation_len.is_none_or(|len| self.asap_len(policy) == Some(len)))
         };
         let fitting: Vec<[&str; 4]> = there.iter().filter(|policy| fits(policy)).copied().collect();
         if let [one] = fitting[..] {

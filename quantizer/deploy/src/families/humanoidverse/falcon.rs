@@ -21,9 +21,9 @@ impl Reader<'_> {
         let histories = Histories::of(self.facts)?;
         let rules = ["terms.order", "history.layout"].map(|rule| self.facts.source(rule)).join("; ");
         self.facts.note("observation", format!("{}; {}; {rules}", yaml.at(listed), yaml.at(lengths)));
-        if self.acts.is_none() && terms.iter().any(|term| term == "actions") {
-            self.acts_from = yaml.at("obs_dims.actions");
-            self.acts = Some(self.dim("actions")?);
+        if self.action_len.is_none() && terms.iter().any(|term| term == "actions") {
+            self.action_len_from = yaml.at("obs_dims.actions");
+            self.action_len = Some(self.dim("actions")?);
         }
         let mut all = 0;
         for (i, name) in terms.iter().enumerate() {

@@ -26,9 +26,9 @@ pub(super) struct Reader<'a> {
     pub(super) rate: f64,
     /// Key of the terms' lengths.
     pub(super) dims: String,
-    /// Length of the action, if known, and what says so.
-    pub(super) acts: Option<usize>,
-    pub(super) acts_from: String,
+    /// Length of the action, if known, and its source.
+    pub(super) action_len: Option<usize>,
+    pub(super) action_len_from: String,
     pub(super) robot: Robot,
     /// Places of the joints that the policy reads and moves; none for all.
     pub(super) active: Option<Vec<usize>>,

@@ -15,18 +15,18 @@ impl Reader<'_> {
         clip(&mut self.parts, self.facts)?;
         let scale: f64 = self.facts.get("action_scale")?;
         let scaled = || Op::Scale(Operand::Number(scale));
-        let acts = self.acts.unwrap_or(n);
+        let action_len = self.action_len.unwrap_or(n);
         let mut source = self.facts.source("action_scale");
         let mut ops = Vec::new();
         let from = if let Some(active) = self.active.clone() {
-            if active.len() != acts {
-                return Err(self.wrong_action(acts, active.len(), "robot_dofs"));
+            if active.len() != action_len {
+                return Err(self.wrong_action(action_len, active.len(), "robot_dofs"));
             }
-            let places = (0..n).map(|i| active.iter().position(|place| *place == i).unwrap_or(acts)).collect();
+            let places = (0..n).map(|i| active.iter().position(|place| *place == i).unwrap_or(action_len)).collect();
             add_zero(&mut self.parts, "clipped");
             ops.extend([Op::Select(Order::Places(places)), scaled()]);
             "clipped_and_zero".to_owned()
-        } else if acts == n {
+        } else if action_len == n {
             ops.push(scaled());
             let key = "residual_upper_body_action";
             if yaml.maybe(key, "True or False", Node::truth)?.unwrap_or(false) {
@@ -35,10 +35,10 @@ impl Reader<'_> {
                 source = format!("{source}; {}; {}", yaml.at(key), self.facts.source("residual"));
             }
             "clipped".to_owned()
-        } else if acts < n {
-            self.short(acts, scaled())?
+        } else if action_len < n {
+            self.short(action_len, scaled())?
         } else {
-            return Err(self.wrong_action(acts, n, "DEFAULT_DOF_ANGLES"));
+            return Err(self.wrong_action(action_len, n, "DEFAULT_DOF_ANGLES"));
         };
         ops.push(Op::Add(Operand::Name("default".to_owned())));
         let limits = ["motor_pos_lower_limit_list", "motor_pos_upper_limit_list"];
@@ -65,10 +65,10 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn wrong_action(&self, acts: usize, expected: usize, key: &str) -> actq::error::Error {
+    fn wrong_action(&self, action_len: usize, expected: usize, key: &str) -> actq::error::Error {
         Facts::contradiction(
             "length of the action",
-            (&self.acts_from, &format!("{acts} values")),
+            (&self.action_len_from, &format!("{action_len} values")),
             (&self.yaml.at(key), &format!("{expected} joints")),
         )
     }
@@ -97,25 +97,25 @@ impl Reader<'_> {
     }
 
     /// Makes values for all joints of an action that has fewer; returns their name.
-    fn short(&mut self, acts: usize, scaled: Op) -> Result<String> {
+    fn short(&mut self, action_len: usize, scaled: Op) -> Result<String> {
         let n = self.robot.len();
         self.parts.value("scaled", "clipped", vec![scaled]);
         match self.facts.find::<String>("target.short")?.as_deref() {
             Some(fill @ ("zeros_first" | "zeros_last")) => {
                 add_zero(&mut self.parts, "scaled");
-                let moved = if fill == "zeros_first" { n - acts..n } else { 0..acts };
+                let moved = if fill == "zeros_first" { n - action_len..n } else { 0..action_len };
                 self.parts.value("all", "scaled_and_zero", vec![padded(n, moved)]);
                 Ok("all".to_owned())
             }
             _ => {
                 let upper = self.robot.upper.len();
-                if acts + upper != n {
+                if action_len + upper != n {
                     let key = if self.yaml.look("dof_names_upper_body").is_some() {
                         "dof_names_upper_body"
                     } else {
                         "NUM_UPPER_BODY_JOINTS"
                     };
-                    return Err(self.wrong_action(acts, n - upper, key));
+                    return Err(self.wrong_action(action_len, n - upper, key));
                 }
                 self.parts.raw("ref_upper_dof_pos", upper, "rad");
                 self.parts.values("all", &["scaled", "ref_upper_dof_pos"]);

@@ -20,7 +20,7 @@ impl Reader<'_> {
         let mut term = self.content(name, dim)?;
         if term.stated != dim {
             let what = match name {
-                "actions" => self.acts_from.clone(),
+                "actions" => self.action_len_from.clone(),
                 "ref_upper_dof_pos" => yaml.at("dof_names_upper_body"),
                 _ => format!("the deploy code, for {n} joints"),
             };
@@ -69,11 +69,11 @@ impl Reader<'_> {
                 Term { stated: n, ..from(name, ops, len) }
             }
             "actions" => {
-                let acts = self.acts.unwrap_or(dim);
-                fed_back(&mut self.parts, acts, self.facts)?;
+                let action_len = self.action_len.unwrap_or(dim);
+                fed_back(&mut self.parts, action_len, self.facts)?;
                 // The file states the number of all joints for a policy that moves a selection of them.
-                let stated = if self.active.is_some() { n } else { acts };
-                Term { stated, ..from("last_action", Vec::new(), acts) }
+                let stated = if self.active.is_some() { n } else { action_len };
+                Term { stated, ..from("last_action", Vec::new(), action_len) }
             }
             "phase_time" => from(&self.phase()?, Vec::new(), 1),
             "sin_phase" => from(&self.phase()?, vec![Op::Scale(Operand::Number(TAU)), Op::Sin], 1),

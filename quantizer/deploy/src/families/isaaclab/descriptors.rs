@@ -129,69 +129,97 @@ fn terms(yaml: &Document, group: &str, joints: &Joints, actions: &[Action]) -> R
             yaml.get(&other);
         }
     }
+    let total = actions.iter().map(|action| action.joints.len()).sum();
     let mut terms: Vec<Term> = Vec::new();
     for item in yaml.keys(&group) {
-        let path = format!("{group}.{item}");
-        let of = |key: &str| format!("{path}.{key}");
-        let name = yaml.need(&of("name"), "a name", Node::text)?;
-        plain(name, &yaml.at(&of("name")))?;
-        let function = yaml.need(&of("full_path"), "a function", Node::text)?.to_owned();
-        let len = yaml.need(&of("shape"), "the number of values, as a list", one)?;
-        let total = actions.iter().map(|action| action.joints.len()).sum::<usize>();
-        let mut why = format!("the function of term {name:?}, {}, is not known to this reader", printable(&function));
-        let mut found = match observation(&function) {
-            Some("generated_commands") => Some((What::Command(name.to_owned(), len, None), false)),
-            Some("last_action") if len == total => Some((What::LastAction(None), false)),
-            Some("last_action") => {
-                why = format!("term {name:?} is a part of the last action, and only env.yaml says which");
-                None
-            }
-            _ => known(&function),
-        };
-        let modifiers = yaml.get(&of("extras.modifiers"));
-        if modifiers.is_some_and(|node| !node.items().is_empty() || !node.entries().is_empty()) {
-            why = format!("term {name:?} has modifiers, which this reader does not know");
-            found = None;
-        }
-        let (what, relative) = found.unwrap_or((What::Unknown(why, Some(len)), false));
-        let (mut places, mut offset) = (Vec::new(), Vec::new());
-        if let What::Joints(input, _) = what {
-            let names = yaml.texts(&of("joint_names"))?;
-            places = joints.places(&names, &yaml.at(&of("joint_names")))?;
-            if relative {
-                let key = if input == "joint_pos" { "joint_pos_offsets" } else { "joint_vel_offsets" };
-                offset = yaml.numbers(&of(key))?;
-                ensure!(
-                    offset.len() == places.len(),
-                    "{} has {} values, but joint_names {}",
-                    yaml.at(&of(key)),
-                    offset.len(),
-                    places.len()
-                );
-            }
-        }
-        // Names are those of functions, which several terms may share.
-        let same = terms.iter().filter(|term| term.function == function).count();
-        let name = if same == 0 { name.to_owned() } else { format!("{name}_{}", same + 1) };
-        let term = Term {
-            what: match what {
-                What::Command(_, len, ranges) => What::Command(name.clone(), len, ranges),
-                other => other,
-            },
-            name,
-            function,
-            joints: places,
-            offset,
-            clip: yaml.maybe(&of("overloads.clip"), "two numbers", bounds)?,
-            scale: yaml.maybe(&of("overloads.scale"), "finite numbers", numbers)?,
-            frames: history(yaml, &of("overloads"))?,
-            from: yaml.at(&path),
-        };
-        let own = term.len(total).unwrap_or(len);
-        ensure!(own == len, "{} = [{len}], but the term has {own} values", yaml.at(&of("shape")));
+        let term = term(yaml, &format!("{group}.{item}"), joints, total, &terms)?;
         terms.push(term);
     }
     Ok(terms)
+}
+
+/// Reads a term. `total` is the length of the action, and `before` are the terms before this one.
+fn term(yaml: &Document, path: &str, joints: &Joints, total: usize, before: &[Term]) -> Result<Term> {
+    let of = |key: &str| format!("{path}.{key}");
+    let name = yaml.need(&of("name"), "a name", Node::text)?;
+    plain(name, &yaml.at(&of("name")))?;
+    let function = yaml.need(&of("full_path"), "a function", Node::text)?.to_owned();
+    let len = yaml.need(&of("shape"), "the number of values, as a list", one)?;
+    let (what, relative) = match content(name, &function, len, total) {
+        _ if has_modifiers(yaml, path) => {
+            let why = format!("term {name:?} has modifiers, which this reader does not know");
+            (What::Unknown(why, Some(len)), false)
+        }
+        Ok(known) => known,
+        Err(why) => (What::Unknown(why, Some(len)), false),
+    };
+    let (places, offset) = match what {
+        What::Joints(input, _) => observed_joints(yaml, path, joints, relative.then_some(input))?,
+        _ => (Vec::new(), Vec::new()),
+    };
+    // Names are those of functions, which several terms may share.
+    let same = before.iter().filter(|term| term.function == function).count();
+    let name = if same == 0 { name.to_owned() } else { format!("{name}_{}", same + 1) };
+    let term = Term {
+        what: match what {
+            What::Command(_, len, ranges) => What::Command(name.clone(), len, ranges),
+            other => other,
+        },
+        name,
+        function,
+        joints: places,
+        offset,
+        clip: yaml.maybe(&of("overloads.clip"), "two numbers", bounds)?,
+        scale: yaml.maybe(&of("overloads.scale"), "finite numbers", numbers)?,
+        frames: history(yaml, &of("overloads"))?,
+        from: yaml.at(path),
+    };
+    let own = term.len(total).unwrap_or(len);
+    ensure!(own == len, "{} = [{len}], but the term has {own} values", yaml.at(&of("shape")));
+    Ok(term)
+}
+
+/// Returns a term's content by its function, and `true` if a default is subtracted from it.
+///
+/// # Errors
+///
+/// The reason why only the application can compute it.
+fn content(name: &str, function: &str, len: usize, total: usize) -> Result<(What, bool), String> {
+    match observation(function) {
+        Some("generated_commands") => Ok((What::Command(name.to_owned(), len, None), false)),
+        Some("last_action") if len == total => Ok((What::LastAction(None), false)),
+        Some("last_action") => Err(format!("term {name:?} is a part of the last action, and only env.yaml says which")),
+        _ => known(function).ok_or_else(|| {
+            format!("the function of term {name:?}, {}, is not known to this reader", printable(function))
+        }),
+    }
+}
+
+fn has_modifiers(yaml: &Document, path: &str) -> bool {
+    let modifiers = yaml.get(&format!("{path}.extras.modifiers"));
+    modifiers.is_some_and(|node| !node.items().is_empty() || !node.entries().is_empty())
+}
+
+/// Returns the places of a term's joints, and the offsets that are subtracted from the values of its raw input.
+fn observed_joints(
+    yaml: &Document,
+    path: &str,
+    joints: &Joints,
+    relative: Option<&str>,
+) -> Result<(Vec<usize>, Vec<f64>)> {
+    let of = |key: &str| format!("{path}.{key}");
+    let places = joints.places(&yaml.texts(&of("joint_names"))?, &yaml.at(&of("joint_names")))?;
+    let Some(input) = relative else { return Ok((places, Vec::new())) };
+    let key = if input == "joint_pos" { "joint_pos_offsets" } else { "joint_vel_offsets" };
+    let offset = yaml.numbers(&of(key))?;
+    ensure!(
+        offset.len() == places.len(),
+        "{} has {} values, but joint_names {}",
+        yaml.at(&of(key)),
+        offset.len(),
+        places.len()
+    );
+    Ok((places, offset))
 }
 
 /// Reads the only axis of a shape.

@@ -192,66 +192,76 @@ impl Environment<'_> {
         Ok(Some(found.into_iter().map(|pair| pair.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])).collect()))
     }
 
-    fn terms(&self, actions: &[Action], default: &Given, default_velocity: &Given) -> Result<Vec<Term>> {
-        let (yaml, group) = (self.yaml, format!("observations.{}", self.group));
-        let in_group = |key: &str| format!("{group}.{key}");
+    /// Refuses a group that is missing, or whose terms are read one by one. Other groups are not read.
+    fn check_group(&self, group: &str) -> Result<()> {
+        let yaml = self.yaml;
         ensure!(
-            yaml.look(&group).is_some_and(|node| !node.is_null()),
+            yaml.look(group).is_some_and(|node| !node.is_null()),
             "{} is missing; answer group with one of {}",
-            yaml.at(&group),
+            yaml.at(group),
             yaml.keys("observations").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
         );
         for other in yaml.keys("observations").into_iter().filter(|other| *other != self.group) {
             yaml.get(&format!("observations.{other}"));
         }
-        let joined = yaml.maybe(&in_group("concatenate_terms"), "true or false", Node::truth)?.unwrap_or(true);
-        ensure!(
-            joined,
-            "{} = false: the policy reads each term by itself, which is not supported",
-            yaml.at(&in_group("concatenate_terms"))
-        );
-        let of_group = yaml.maybe(&in_group("history_length"), "a number of frames", count)?;
+        let path = format!("{group}.concatenate_terms");
+        let joined = yaml.maybe(&path, "true or false", Node::truth)?.unwrap_or(true);
+        ensure!(joined, "{} = false: the policy reads each term by itself, which is not supported", yaml.at(&path));
+        Ok(())
+    }
+
+    /// Reads the terms of the group that the policy reads.
+    fn terms(&self, actions: &[Action], default: &Given, default_velocity: &Given) -> Result<Vec<Term>> {
+        let (yaml, group) = (self.yaml, format!("observations.{}", self.group));
+        let in_group = |key: &str| format!("{group}.{key}");
+        self.check_group(&group)?;
+        let has_history = yaml.maybe(&in_group("history_length"), "a number of frames", count)?.is_some();
         let mut terms = Vec::new();
         for name in yaml.keys(&group).into_iter().filter(|name| !SETTINGS.contains(name)) {
             let path = in_group(name);
-            let of = |key: &str| format!("{path}.{key}");
             if yaml.look(&path).is_some_and(Node::is_null) {
                 yaml.get(&path);
                 continue;
             }
-            plain(name, &yaml.at(&path))?;
-            let function = yaml.need(&of("func"), "a function", Node::text)?.replace(':', ".");
-            let (what, relative) = self.what(name, &function, &path, actions)?;
-            let joints =
-                if matches!(what, What::Joints(..)) { self.observed(&of("params.asset_cfg"))? } else { Vec::new() };
-            yaml.get(&of("params"));
-            let offset = match what {
-                What::Joints("joint_pos", _) if relative => default,
-                What::Joints(..) if relative => default_velocity,
-                _ => &Given { numbers: Vec::new(), from: String::new() },
-            };
-            let offset =
-                if relative { joints.iter().map(|place| offset.numbers[*place]).collect() } else { Vec::new() };
-            let settings = if of_group.is_some() { &group } else { &path };
-            let frames = history(yaml, settings)?;
+            let mut term = self.term(name, &path, actions, [default, default_velocity])?;
             // A group's settings replace those of its terms.
+            term.frames = history(yaml, if has_history { &group } else { &path })?;
             for key in ["history_length", "flatten_history_dim"] {
-                yaml.get(&of(key));
+                yaml.get(&format!("{path}.{key}"));
             }
-            terms.push(Term {
-                name: name.to_owned(),
-                function,
-                what,
-                joints,
-                offset,
-                clip: yaml.maybe(&of("clip"), "two numbers", bounds)?,
-                scale: yaml.maybe(&of("scale"), "finite numbers", numbers)?,
-                frames,
-                from: yaml.at(&path),
-            });
+            terms.push(term);
         }
         yaml.get(&in_group("flatten_history_dim"));
         Ok(terms)
+    }
+
+    /// Reads a term without its history. `defaults` are the positions and velocities of all joints.
+    fn term(&self, name: &str, path: &str, actions: &[Action], defaults: [&Given; 2]) -> Result<Term> {
+        let yaml = self.yaml;
+        let of = |key: &str| format!("{path}.{key}");
+        plain(name, &yaml.at(path))?;
+        let function = yaml.need(&of("func"), "a function", Node::text)?.replace(':', ".");
+        let (what, relative) = self.what(name, &function, path, actions)?;
+        let joints =
+            if matches!(what, What::Joints(..)) { self.observed(&of("params.asset_cfg"))? } else { Vec::new() };
+        yaml.get(&of("params"));
+        let [default, default_velocity] = defaults;
+        let offset = match what {
+            What::Joints("joint_pos", _) if relative => joints.iter().map(|place| default.numbers[*place]).collect(),
+            What::Joints(..) if relative => joints.iter().map(|place| default_velocity.numbers[*place]).collect(),
+            _ => Vec::new(),
+        };
+        Ok(Term {
+            name: name.to_owned(),
+            function,
+            what,
+            joints,
+            offset,
+            clip: yaml.maybe(&of("clip"), "two numbers", bounds)?,
+            scale: yaml.maybe(&of("scale"), "finite numbers", numbers)?,
+            frames: 1,
+            from: yaml.at(path),
+        })
     }
 
     /// Returns what a term is, and whether a default is subtracted from it.
