@@ -41,23 +41,23 @@ impl Document {
     /// Returns the keys of a map at a path of keys with points between them; the empty path is the whole file. Nothing
     /// counts as read.
     pub(crate) fn keys(&self, path: &str) -> Vec<&str> {
-        self.look(path).map_or(&[][..], Node::entries).iter().map(|(key, _)| key.as_str()).collect()
+        self.peek(path).map_or(&[][..], Node::entries).iter().map(|(key, _)| key.as_str()).collect()
     }
 
     /// Returns the value at a path without counting it as read.
-    pub(crate) fn look(&self, path: &str) -> Option<&Node> {
+    pub(crate) fn peek(&self, path: &str) -> Option<&Node> {
         if path.is_empty() { Some(&self.root) } else { find(&self.root, path) }
     }
 
     /// Returns the value at a path, or `None` if it is missing or null.
-    pub(crate) fn get(&self, path: &str) -> Option<&Node> {
-        let node = self.look(path)?;
+    pub(crate) fn node(&self, path: &str) -> Option<&Node> {
+        let node = self.peek(path)?;
         self.read.borrow_mut().insert(path.to_owned());
         (!node.is_null()).then_some(node)
     }
 
     /// Names a path, for reports and errors.
-    pub(crate) fn at(&self, path: &str) -> String {
+    pub(crate) fn location(&self, path: &str) -> String {
         format!("{}: {}", self.file, printable(path))
     }
 
@@ -66,9 +66,14 @@ impl Document {
     /// # Errors
     ///
     /// If it is missing, or `as_type` does not accept it.
-    pub(crate) fn need<'a, T>(&'a self, path: &str, what: &str, as_type: impl Fn(&'a Node) -> Option<T>) -> Result<T> {
-        let value = self.maybe(path, what, as_type)?;
-        value.with_context(|| format!("{} is missing; it must be {what}", self.at(path)))
+    pub(crate) fn required<'a, T>(
+        &'a self,
+        path: &str,
+        what: &str,
+        as_type: impl Fn(&'a Node) -> Option<T>,
+    ) -> Result<T> {
+        let value = self.optional(path, what, as_type)?;
+        value.with_context(|| format!("{} is missing; it must be {what}", self.location(path)))
     }
 
     /// Returns a value, or `None` if it is missing or null.
@@ -76,14 +81,15 @@ impl Document {
     /// # Errors
     ///
     /// If it is there and `as_type` does not accept it.
-    pub(crate) fn maybe<'a, T>(
+    pub(crate) fn optional<'a, T>(
         &'a self,
         path: &str,
         what: &str,
         as_type: impl Fn(&'a Node) -> Option<T>,
     ) -> Result<Option<T>> {
-        let Some(node) = self.get(path) else { return Ok(None) };
-        let value = as_type(node).with_context(|| format!("{} (line {}) must be {what}", self.at(path), node.line))?;
+        let Some(node) = self.node(path) else { return Ok(None) };
+        let value =
+            as_type(node).with_context(|| format!("{} (line {}) must be {what}", self.location(path), node.line))?;
         Ok(Some(value))
     }
 
@@ -91,27 +97,27 @@ impl Document {
     ///
     /// # Errors
     ///
-    /// As [`Self::need`].
+    /// As [`Self::required`].
     pub(crate) fn number(&self, path: &str) -> Result<f64> {
-        self.need(path, "a finite number", Node::number)
+        self.required(path, "a finite number", Node::number)
     }
 
     /// Returns a list of finite numbers.
     ///
     /// # Errors
     ///
-    /// As [`Self::need`].
+    /// As [`Self::required`].
     pub(crate) fn numbers(&self, path: &str) -> Result<Vec<f64>> {
-        self.need(path, "a list of finite numbers", Node::numbers)
+        self.required(path, "a list of finite numbers", Node::numbers)
     }
 
     /// Returns a list of texts.
     ///
     /// # Errors
     ///
-    /// As [`Self::need`].
+    /// As [`Self::required`].
     pub(crate) fn texts(&self, path: &str) -> Result<Vec<String>> {
-        self.need(path, "a list of texts", Node::texts)
+        self.required(path, "a list of texts", Node::texts)
     }
 
     /// Lists the keys that nothing has read and that no pattern of `ignored` names.
@@ -127,7 +133,7 @@ impl Document {
             return;
         }
         if node.entries().is_empty() {
-            unread.push(self.at(path));
+            unread.push(self.location(path));
         }
         for (key, inner) in node.entries() {
             let inner_path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };

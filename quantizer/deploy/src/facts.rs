@@ -151,16 +151,16 @@ impl Facts {
     /// # Errors
     ///
     /// If the answer has another type, or the profile has no such rule.
-    pub(crate) fn get<T: DeserializeOwned + Default>(&mut self, key: &str) -> Result<T> {
-        Ok(self.find(key)?.unwrap_or_default())
+    pub(crate) fn value_or_default<T: DeserializeOwned + Default>(&mut self, key: &str) -> Result<T> {
+        Ok(self.value(key)?.unwrap_or_default())
     }
 
-    /// As [`Self::get`], but `None` while it is a question.
+    /// As [`Self::value_or_default`], but `None` while it is a question.
     ///
     /// # Errors
     ///
-    /// As [`Self::get`].
-    pub(crate) fn find<T: DeserializeOwned>(&mut self, key: &str) -> Result<Option<T>> {
+    /// As [`Self::value_or_default`].
+    pub(crate) fn value<T: DeserializeOwned>(&mut self, key: &str) -> Result<Option<T>> {
         let rule = self.profile.rules.iter().find(|rule| rule.key == key);
         let rule = rule.with_context(|| format!("profile {}: there is no rule {key}", self.profile.family))?.clone();
         if let Some(answer) = self.answers.0.get(key) {
@@ -193,18 +193,18 @@ impl Facts {
     ///
     /// # Errors
     ///
-    /// As [`Self::get`].
-    pub(crate) fn chooses(&mut self, key: &str, choice: &str) -> Result<bool> {
-        Ok(self.find::<String>(key)?.as_deref() == Some(choice))
+    /// As [`Self::value_or_default`].
+    pub(crate) fn is_choice(&mut self, key: &str, choice: &str) -> Result<bool> {
+        Ok(self.value::<String>(key)?.as_deref() == Some(choice))
     }
 
     /// Returns a number above 0 by its rule; 1 while it is a question.
     ///
     /// # Errors
     ///
-    /// As [`Self::get`], or if it is another number.
+    /// As [`Self::value_or_default`], or if it is another number.
     pub(crate) fn positive(&mut self, key: &str) -> Result<f64> {
-        let number = self.find(key)?.unwrap_or(1.0);
+        let number = self.value(key)?.unwrap_or(1.0);
         ensure!(number > 0.0, "{key} = {number}: give a number above 0");
         Ok(number)
     }
@@ -213,9 +213,9 @@ impl Facts {
     ///
     /// # Errors
     ///
-    /// As [`Self::get`], or if there is none of this name.
-    pub(crate) fn named(&mut self, key: &str, there: &[&str]) -> Result<String> {
-        let name = self.find(key)?.or_else(|| there.first().map(|&name| name.to_owned())).unwrap_or_default();
+    /// As [`Self::value_or_default`], or if there is none of this name.
+    pub(crate) fn choose_one_of(&mut self, key: &str, there: &[&str]) -> Result<String> {
+        let name = self.value(key)?.or_else(|| there.first().map(|&name| name.to_owned())).unwrap_or_default();
         ensure!(there.contains(&name.as_str()), "{key} = {name:?}: there are {}", there.join(", "));
         Ok(name)
     }

@@ -85,19 +85,19 @@ impl Family for Holosoma {
         if action_len > n {
             return Err(Facts::contradiction(
                 "length of the action",
-                (&metadata.at("dof_names"), &format!("{n} names")),
+                (&metadata.location("dof_names"), &format!("{n} names")),
                 (&format!("{file}, output {:?}", ports.output), &format!("{action_len} values")),
             ));
         }
 
         let rate = facts.positive("rate_hz")?;
-        let default: Option<Vec<f64>> = facts.find("default")?;
+        let default: Option<Vec<f64>> = facts.value("default")?;
         let default = default.unwrap_or_else(|| vec![0.0; n]);
         ensure!(
             default.len() == n,
             "default has {} values, but {} has {n} names",
             default.len(),
-            metadata.at("dof_names")
+            metadata.location("dof_names")
         );
         let mut reader = Reader { parts: Parts::new("policy", rate), facts, n, action_len, rate, has_clock: false };
         reader.parts.joints("robot", joints);
@@ -116,8 +116,8 @@ impl Family for Holosoma {
         reader.parts.network(file, &ports.input, &ports.output);
         reader.act(metadata)?;
         reader.parts.gains(gains);
-        reader.facts.note("gains", metadata.at("kp"));
-        reader.facts.note("joints.robot", metadata.at("dof_names"));
+        reader.facts.note("gains", metadata.location("kp"));
+        reader.facts.note("joints.robot", metadata.location("dof_names"));
         Ok(reader.parts.finish())
     }
 }
@@ -126,8 +126,8 @@ impl Family for Holosoma {
 fn joint_names(metadata: &Document) -> Result<Vec<String>> {
     let joints = metadata.texts("dof_names")?;
     let distinct = joints.iter().collect::<BTreeSet<_>>().len();
-    ensure!(!joints.is_empty(), "{} is empty", metadata.at("dof_names"));
-    ensure!(distinct == joints.len(), "{}: a name occurs twice", metadata.at("dof_names"));
+    ensure!(!joints.is_empty(), "{} is empty", metadata.location("dof_names"));
+    ensure!(distinct == joints.len(), "{}: a name occurs twice", metadata.location("dof_names"));
     Ok(joints)
 }
 
@@ -138,8 +138,8 @@ fn gains(metadata: &Document, n: usize) -> Result<Gains> {
         if list.len() != n {
             return Err(Facts::contradiction(
                 "number of joints",
-                (&metadata.at("dof_names"), &format!("{n} names")),
-                (&metadata.at(key), &format!("{} gains", list.len())),
+                (&metadata.location("dof_names"), &format!("{n} names")),
+                (&metadata.location(key), &format!("{} gains", list.len())),
             ));
         }
     }
@@ -202,12 +202,12 @@ impl Reader<'_> {
     /// Adds the observation; returns its length.
     fn observe(&mut self, kind: &Kind) -> Result<usize> {
         let key = kind.rule;
-        let terms: Option<Vec<String>> = self.facts.find(key)?;
+        let terms: Option<Vec<String>> = self.facts.value(key)?;
         let mut terms = terms.unwrap_or_else(|| kind.terms.iter().map(|&term| term.to_owned()).collect());
-        if !self.facts.chooses("order", "listed")? {
+        if !self.facts.is_choice("order", "listed")? {
             terms.sort();
         }
-        let length: usize = self.facts.find("history.length")?.unwrap_or(1);
+        let length: usize = self.facts.value("history.length")?.unwrap_or(1);
         ensure!((1..=1000).contains(&length), "history.length = {length}: give 1 to 1000");
         let histories = if length > 1 {
             Histories::of(self.facts)?
@@ -220,9 +220,9 @@ impl Reader<'_> {
             let (from, mut ops, len) = self.term(name)?;
             let scale = format!("scales.{name}");
             let by: f64 = if SCALED.contains(&name.as_str()) {
-                self.facts.find(&scale)?.unwrap_or(1.0)
+                self.facts.value(&scale)?.unwrap_or(1.0)
             } else {
-                self.facts.find("scales.other")?.unwrap_or(1.0)
+                self.facts.value("scales.other")?.unwrap_or(1.0)
             };
             ops.push(Op::Scale(Operand::Number(by)));
             let rule = if SCALED.contains(&name.as_str()) { scale.as_str() } else { "scales.other" };
@@ -290,7 +290,7 @@ impl Reader<'_> {
 
     /// Adds the phases of the legs, unless they are there; returns their number.
     fn clock(&mut self) -> Result<usize> {
-        let start: Option<Vec<f64>> = self.facts.find("clock.start")?;
+        let start: Option<Vec<f64>> = self.facts.value("clock.start")?;
         let start = start.unwrap_or_else(|| vec![0.0, PI]);
         let legs = start.len();
         if self.has_clock {
@@ -298,8 +298,8 @@ impl Reader<'_> {
         }
         self.has_clock = true;
         let period = self.facts.positive("gait_period")?;
-        let below: f64 = self.facts.get("clock.standing_below")?;
-        let at: Option<Vec<f64>> = self.facts.find("clock.standing_at")?;
+        let below: f64 = self.facts.value_or_default("clock.standing_below")?;
+        let at: Option<Vec<f64>> = self.facts.value("clock.standing_at")?;
         let of = [("command_lin_vel", 2, "m/s"), ("command_ang_vel", 1, "rad/s")];
         for (name, len, unit) in of {
             self.parts.raw(name, len, unit);
@@ -308,7 +308,7 @@ impl Reader<'_> {
             name: "leg_phases".to_owned(),
             start,
             advance: TAU / (self.rate * period),
-            when: self.facts.find("clock.when")?.unwrap_or(When::Before),
+            when: self.facts.value("clock.when")?.unwrap_or(When::Before),
             wrap: Some([-PI, PI]),
             restart_above: None,
             standing: Some(Standing {
@@ -326,23 +326,23 @@ impl Reader<'_> {
     fn act(&mut self, metadata: &Document) -> Result<()> {
         let (n, action_len) = (self.n, self.action_len);
         clip(&mut self.parts, self.facts)?;
-        let (scale, source) = match metadata.maybe("action_scale", "a finite number, or several", numbers)? {
-            Some(scale) => (scale, metadata.at("action_scale")),
+        let (scale, source) = match metadata.optional("action_scale", "a finite number, or several", numbers)? {
+            Some(scale) => (scale, metadata.location("action_scale")),
             None => {
-                let scale: f64 = self.facts.get("action_scale")?;
+                let scale: f64 = self.facts.value_or_default("action_scale")?;
                 (vec![scale], self.facts.source("action_scale"))
             }
         };
         ensure!(
             scale.len() == 1 || scale.len() == n,
             "{} has {} values; 1 or {n} are needed",
-            metadata.at("action_scale"),
+            metadata.location("action_scale"),
             scale.len()
         );
         let mut ops = Vec::new();
         let mut from = "clipped";
         if action_len < n {
-            let first: bool = self.facts.find("action.last_joints")?.unwrap_or(true);
+            let first: bool = self.facts.value("action.last_joints")?.unwrap_or(true);
             let moved = if first { n - action_len..n } else { 0..action_len };
             add_zero(&mut self.parts, "clipped");
             self.facts.note("clipped_and_zero", self.facts.source("action.last_joints"));

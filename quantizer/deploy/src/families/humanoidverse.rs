@@ -42,7 +42,7 @@ impl Family for Humanoidverse {
             // Other YAML files of a folder decide nothing, even if they are damaged.
             if bundle.text(file).is_ok_and(|text| KEYS.iter().all(|key| text.contains(key))) {
                 let document = Document::read(bundle, file)?;
-                if KEYS.iter().all(|key| document.look(key).is_some()) {
+                if KEYS.iter().all(|key| document.peek(key).is_some()) {
                     documents.push(document);
                 }
             }
@@ -59,7 +59,7 @@ impl Family for Humanoidverse {
     fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
         let yaml = found.documents.first().context("there is no YAML file")?;
         let robot = Robot::read(yaml, facts)?;
-        let asap = yaml.look("obs_dict").is_none() && yaml.look("obs_list").is_none();
+        let asap = yaml.peek("obs_dict").is_none() && yaml.peek("obs_list").is_none();
         ensure!(
             !asap || asap::is_one(yaml),
             "{}: it has neither obs_dict (FALCON) nor history_loco_config or history_mimic_config (ASAP)",
@@ -132,12 +132,12 @@ impl Ports {
 
 /// Returns the ticks a second.
 fn rate(yaml: &Document, facts: &mut Facts) -> Result<f64> {
-    let rate = match yaml.maybe("rl_rate", "a number of ticks a second", Node::number)? {
+    let rate = match yaml.optional("rl_rate", "a number of ticks a second", Node::number)? {
         Some(rate) => {
-            facts.note("rate_hz", yaml.at("rl_rate"));
+            facts.note("rate_hz", yaml.location("rl_rate"));
             rate
         }
-        None => facts.find("rate_hz")?.unwrap_or(1.0),
+        None => facts.value("rate_hz")?.unwrap_or(1.0),
     };
     ensure!(rate > 0.0, "rate_hz = {rate}: give a number above 0");
     Ok(rate)
@@ -145,22 +145,22 @@ fn rate(yaml: &Document, facts: &mut Facts) -> Result<f64> {
 
 /// Returns the network: the file that model_path names, the only one, or the answer.
 fn network(yaml: &Document, networks: &[String], facts: &mut Facts) -> Result<String> {
-    let path = yaml.maybe("model_path", "a path", Node::text)?.map(|path| path.trim_start_matches("./"));
+    let path = yaml.optional("model_path", "a path", Node::text)?.map(|path| path.trim_start_matches("./"));
     let named = |path: &str| {
         let mut found = networks.iter().filter(|file| !path.is_empty() && Path::new(file).ends_with(path));
         found.next().filter(|_| found.next().is_none())
     };
     if let Some(file) = path.and_then(named) {
-        facts.note("network", yaml.at("model_path"));
+        facts.note("network", yaml.location("model_path"));
         return Ok(file.clone());
     }
     match networks {
         [] => bail!("{}: there is no ONNX file with it", yaml.file),
         [only] => {
-            let other = path.map_or(String::new(), |path| format!("; {} names {path:?}", yaml.at("model_path")));
+            let other = path.map_or(String::new(), |path| format!("; {} names {path:?}", yaml.location("model_path")));
             facts.note("network", format!("the only ONNX file{other}"));
             Ok(only.clone())
         }
-        _ => facts.named("network", &networks.iter().map(String::as_str).collect::<Vec<_>>()),
+        _ => facts.choose_one_of("network", &networks.iter().map(String::as_str).collect::<Vec<_>>()),
     }
 }

@@ -82,15 +82,15 @@ impl Family for IsaacLab {
         let graph = Graph::of(file, &signature)?;
         let find = |is_one: fn(&Document) -> bool| found.documents.iter().find(|document| is_one(document));
         let (exported, environment) = (find(descriptors::is_one), find(environment::is_one));
-        let meta = find(|document| document.look(JOINT_NAMES).is_some());
-        let asset = facts.find("asset")?.unwrap_or_else(|| "robot".to_owned());
+        let meta = find(|document| document.peek(JOINT_NAMES).is_some());
+        let asset = facts.value("asset")?.unwrap_or_else(|| "robot".to_owned());
         let agent = environment.map(|yaml| Agent::beside(bundle, yaml)).transpose()?.unwrap_or_default();
         let group = match &agent.group {
             Some((group, at)) => {
                 facts.note("group", at.clone());
                 group.clone()
             }
-            None => facts.find("group")?.unwrap_or_else(|| "policy".to_owned()),
+            None => facts.value("group")?.unwrap_or_else(|| "policy".to_owned()),
         };
 
         let mut orders = Vec::new();
@@ -98,14 +98,14 @@ impl Family for IsaacLab {
             orders.push(descriptors::joints(yaml, &asset)?);
         }
         if let Some(meta) = meta {
-            orders.push(Joints::new(names(meta, JOINT_NAMES)?, meta.at(JOINT_NAMES))?);
+            orders.push(Joints::new(names(meta, JOINT_NAMES)?, meta.location(JOINT_NAMES))?);
         }
         if let [first, second] = &orders[..] {
             agree::orders(first, second)?;
         }
         let joints = match orders.into_iter().next() {
             Some(joints) => joints,
-            None => match facts.find::<Vec<String>>("joints")? {
+            None => match facts.value::<Vec<String>>("joints")? {
                 Some(names) => Joints::new(names, "answer joints".to_owned())?,
                 None => Joints::placeholders(graph.actions),
             },

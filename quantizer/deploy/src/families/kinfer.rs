@@ -76,7 +76,7 @@ impl Family for Kinfer {
             meta.file
         );
         let mut parts = Parts::new("policy", rounded(1.0 / period));
-        facts.note("rate_hz", format!("{}; {}", meta.at("sim_dt"), meta.at("sim_decimation")));
+        facts.note("rate_hz", format!("{}; {}", meta.location("sim_dt"), meta.location("sim_decimation")));
 
         let outputs = Outputs::of(&graph, facts)?;
         let n = graph.output(&outputs.action)?;
@@ -84,7 +84,7 @@ impl Family for Kinfer {
         if given != n as f64 {
             return Err(Facts::contradiction(
                 "number of actions",
-                (&meta.at("num_actions"), &given.to_string()),
+                (&meta.location("num_actions"), &given.to_string()),
                 (&format!("{file}: output {:?}", outputs.action), &n.to_string()),
             ));
         }
@@ -98,7 +98,7 @@ impl Family for Kinfer {
         parts.wired(network);
         parts.act(&format!("policy.{}", outputs.action));
 
-        let relative: bool = facts.get("target.relative")?;
+        let relative: bool = facts.value_or_default("target.relative")?;
         let offset = || Op::Add(Operand::Name("default".to_owned()));
         parts.value("target", &format!("policy.{}", outputs.scaled), relative.then(offset).into_iter().collect());
         let scaled = graph.output(&outputs.scaled)?;

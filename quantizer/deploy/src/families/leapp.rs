@@ -37,7 +37,7 @@ impl Family for Leapp {
             let Some(text) = bundle.text(file).ok().filter(has_keys) else { continue };
             let root = Node::parse(&text).context(file.to_owned())?;
             let document = Document::of(file, root.numbered());
-            if KEYS.iter().all(|key| document.look(key).is_some()) {
+            if KEYS.iter().all(|key| document.peek(key).is_some()) {
                 documents.push(document);
             }
         }

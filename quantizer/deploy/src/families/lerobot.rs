@@ -80,7 +80,7 @@ impl Family for Lerobot {
         let history = match frames {
             1 => None,
             _ => {
-                let (first, fill) = (facts.get("history.first")?, facts.get("history.fill")?);
+                let (first, fill) = (facts.value_or_default("history.first")?, facts.value_or_default("history.fill")?);
                 Some(History { length: frames, stride: 1, first, fill, current: true })
             }
         };
@@ -99,7 +99,7 @@ impl Family for Lerobot {
             let mut source = normalizer.source.clone();
             if let Some(history) = history {
                 ops.push(Op::History(history));
-                source += &format!("; {}; {}", config.at("n_obs_steps"), facts.source("history.fill"));
+                source += &format!("; {}; {}", config.location("n_obs_steps"), facts.source("history.fill"));
             }
             let value = format!("{name}_normalized");
             parts.value(&value, &name, ops);
@@ -118,36 +118,36 @@ impl Family for Lerobot {
 
 /// Checks that an image can run the policy; returns the number of observations that it reads.
 fn check_policy(config: &Document, facts: &mut Facts) -> Result<usize> {
-    let kind = config.need("type", "a type of policies", Node::text)?;
-    let plain: Option<Vec<String>> = facts.find("types")?;
+    let kind = config.required("type", "a type of policies", Node::text)?;
+    let plain: Option<Vec<String>> = facts.value("types")?;
     if plain.is_some_and(|plain| plain.iter().all(|plain| plain != kind)) {
-        let complete: Option<bool> = facts.find("graph.complete")?;
+        let complete: Option<bool> = facts.value("graph.complete")?;
         ensure!(
             complete != Some(false),
             "graph.complete = false: {} = {:?} cannot run as one network; export one that gives the action",
-            config.at("type"),
+            config.location("type"),
             printable(kind)
         );
     }
     let key = "temporal_ensemble_coeff";
     ensure!(
-        config.get(key).is_none(),
+        config.node(key).is_none(),
         "{}: an image cannot average the actions of several chunks; set it to null",
-        config.at(key)
+        config.location(key)
     );
     let key = "n_action_steps";
-    let actions = config.maybe(key, "a number of actions above 0", |node| count(node).filter(|n| *n > 0))?;
+    let actions = config.optional(key, "a number of actions above 0", |node| count(node).filter(|n| *n > 0))?;
     if actions.is_some_and(|actions| actions > 1) {
-        let replan: Option<bool> = facts.find("replan")?;
+        let replan: Option<bool> = facts.value("replan")?;
         ensure!(
             replan != Some(false),
             "replan = false: {} = {}, and an image cannot give several actions of a chunk; deploy with replan = true",
-            config.at(key),
+            config.location(key),
             actions.unwrap_or_default()
         );
     }
     let key = "n_obs_steps";
-    let frames = config.maybe(key, "a number of observations from 1 to 1000", |node| {
+    let frames = config.optional(key, "a number of observations from 1 to 1000", |node| {
         count(node).filter(|n| (1..=MOST_FRAMES).contains(n))
     })?;
     Ok(frames.unwrap_or(1))
@@ -163,7 +163,7 @@ fn targets(parts: &mut Parts, action: &Feature, names: Option<(Vec<String>, Stri
         kinds.push(match name.rsplit_once('.') {
             Some((_, "pos")) => TargetKind::Position,
             Some((_, "vel")) => TargetKind::Velocity,
-            _ => facts.find("target.kind")?.unwrap_or(TargetKind::Position),
+            _ => facts.value("target.kind")?.unwrap_or(TargetKind::Position),
         });
     }
     if let Some(at) = at {

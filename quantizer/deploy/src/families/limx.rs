@@ -26,7 +26,7 @@ impl Family for Limx {
     fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
         let Some(file) = bundle.find("params.yaml")? else { return Ok(None) };
         let document = Document::read(bundle, file)?;
-        if document.look("PointfootCfg.joint_names").is_none() {
+        if document.peek("PointfootCfg.joint_names").is_none() {
             return Ok(None);
         }
         let networks: Vec<String> = bundle.with_ending("onnx").map(str::to_owned).collect();
@@ -50,12 +50,12 @@ impl Family for Limx {
         let decimation = yaml.number(&key("control.decimation"))?;
         let rate = yaml.number(&key("loop_frequency"))? / decimation;
         let mut parts = Parts::new("policy", rate);
-        facts.note("rate_hz", format!("{} / decimation", yaml.at(&key("loop_frequency"))));
+        facts.note("rate_hz", format!("{} / decimation", yaml.location(&key("loop_frequency"))));
         parts.joints("robot", joints);
         parts.constant("initial", initial);
 
         let order: Vec<usize> = match variant.as_str() {
-            "isaaclab" => facts.find("isaaclab.order")?.unwrap_or_else(|| (0..n).collect()),
+            "isaaclab" => facts.value("isaaclab.order")?.unwrap_or_else(|| (0..n).collect()),
             _ => (0..n).collect(),
         };
         ensure!(order.len() == n, "isaaclab.order has {} places, and the file {n} joints", order.len());
@@ -85,7 +85,7 @@ fn refuse_rotated_imu(yaml: &Document) -> Result<()> {
         ensure!(
             offset == 0.0,
             "{} = {offset}: a rotated IMU is not supported; rotate its values first and set 0",
-            yaml.at(&path)
+            yaml.location(&path)
         );
     }
     Ok(())
@@ -94,19 +94,19 @@ fn refuse_rotated_imu(yaml: &Document) -> Result<()> {
 /// Returns the number of frames of the history. Refuses other lengths of frames, actions and commands than this reader's.
 fn history_length(yaml: &Document, joints: usize) -> Result<usize> {
     let path = |name: &str| format!("PointfootCfg.size.{name}");
-    let size = |name: &str| yaml.need(&path(name), "a number of values", count);
+    let size = |name: &str| yaml.required(&path(name), "a number of values", count);
     let (frame, length) = (size("observations_size")?, size("obs_history_length")?);
     let ours = 3 + 3 + 3 * joints + 2 + 4;
     ensure!(
         frame == ours,
         "{} = {frame}, but a frame of this family with {joints} joints has {ours} values",
-        yaml.at(&path("observations_size"))
+        yaml.location(&path("observations_size"))
     );
     for (name, expected) in [("actions_size", joints), ("commands_size", 3)] {
         let given = size(name)?;
-        ensure!(given == expected, "{} = {given}; it must be {expected}", yaml.at(&path(name)));
+        ensure!(given == expected, "{} = {given}; it must be {expected}", yaml.location(&path(name)));
     }
-    yaml.get(&path("encoder_output_size"));
+    yaml.node(&path("encoder_output_size"));
     Ok(length)
 }
 
@@ -126,26 +126,26 @@ impl Limx {
         let select = || Op::Select(Order::Places(order.to_vec()));
         parts.raw("gyro", 3, "rad/s");
         parts.value("scaled_gyro", "gyro", vec![scaled(scale("ang_vel")?)]);
-        facts.note("scaled_gyro", yaml.at("PointfootCfg.normalization.obs_scales.ang_vel"));
+        facts.note("scaled_gyro", yaml.location("PointfootCfg.normalization.obs_scales.ang_vel"));
         let (name, len, ops) = given_gravity(facts, "gravity", "wxyz", "quat")?;
         parts.raw(name, len, "");
         parts.value("gravity", name, ops);
         facts.note("gravity", facts.source("gravity"));
         parts.raw_joints("q", "robot", "rad");
         parts.raw_joints("dq", "robot", "rad/s");
-        facts.note("relative_q", yaml.at("PointfootCfg.init_state.default_joint_angle"));
+        facts.note("relative_q", yaml.location("PointfootCfg.init_state.default_joint_angle"));
         parts.value("relative_q", "q", vec![Op::Subtract(Operand::Name("initial".to_owned()))]);
         parts.value("joint_pos", "relative_q", vec![select(), scaled(scale("dof_pos")?)]);
-        facts.note("joint_pos", yaml.at("PointfootCfg.normalization.obs_scales.dof_pos"));
+        facts.note("joint_pos", yaml.location("PointfootCfg.normalization.obs_scales.dof_pos"));
         parts.value("joint_vel", "dq", vec![select(), scaled(scale("dof_vel")?)]);
-        facts.note("joint_vel", yaml.at("PointfootCfg.normalization.obs_scales.dof_vel"));
-        parts.kept("last_action", n, if facts.chooses("last_action", "raw")? { "ordered" } else { "limited" });
+        facts.note("joint_vel", yaml.location("PointfootCfg.normalization.obs_scales.dof_vel"));
+        parts.kept("last_action", n, if facts.is_choice("last_action", "raw")? { "ordered" } else { "limited" });
         parts.value("fed_back", "last_action", vec![select()]);
         facts.note("fed_back", facts.source("last_action"));
 
-        let gait: Vec<f64> = facts.find("gait")?.unwrap_or_else(|| vec![0.0; 4]);
+        let gait: Vec<f64> = facts.value("gait")?.unwrap_or_else(|| vec![0.0; 4]);
         ensure!(gait.len() == 4, "gait has {} values; give frequency, offset, duration and height", gait.len());
-        let restarts: bool = facts.get("clock.restart")?;
+        let restarts: bool = facts.value_or_default("clock.restart")?;
         parts.clock(Clock {
             wrap: (!restarts).then_some([0.0, 1.0]),
             restart_above: restarts.then_some(1.0),
@@ -166,7 +166,7 @@ impl Limx {
         parts.raw("commands", 3, "m/s, m/s, rad/s");
         let commands = commands.into_iter().collect::<Result<Vec<_>>>()?;
         parts.value("scaled_commands", "commands", vec![Op::Scale(Operand::List(commands))]);
-        facts.note("scaled_commands", yaml.at("PointfootCfg.user_cmd_scales"));
+        facts.note("scaled_commands", yaml.location("PointfootCfg.user_cmd_scales"));
         Ok(())
     }
 
@@ -176,11 +176,11 @@ impl Limx {
         ensure!(!histories.by_term, "history.layout = \"term\": this family has only \"frame\"");
         let limit = "PointfootCfg.normalization.clip_scales.clip_observations";
         parts.value("clipped_frame", "frame", vec![clip_to(yaml.number(limit)?)]);
-        facts.note("clipped_frame", yaml.at(limit));
+        facts.note("clipped_frame", yaml.location(limit));
         facts.note("frame", "profile limx (controllers/PointfootController.py:311-319)");
-        let of = if facts.get::<bool>("history.clipped")? { "clipped_frame" } else { "frame" };
+        let of = if facts.value_or_default::<bool>("history.clipped")? { "clipped_frame" } else { "frame" };
         parts.value("history", of, vec![Op::History(histories.spec(length))]);
-        let length = yaml.at("PointfootCfg.size.obs_history_length");
+        let length = yaml.location("PointfootCfg.size.obs_history_length");
         facts.note("history", format!("{length}; {}", facts.source("history.first")));
         Ok(())
     }
@@ -191,7 +191,7 @@ impl Limx {
         let (stiffness, damping) = (control("stiffness")?, control("damping")?);
         let (scale, torque) = (control("action_scale_pos")?, control("user_torque_limit")?);
         let clip = yaml.number("PointfootCfg.normalization.clip_scales.clip_actions")?;
-        facts.note("ordered", yaml.at("PointfootCfg.normalization.clip_scales.clip_actions"));
+        facts.note("ordered", yaml.location("PointfootCfg.normalization.clip_scales.clip_actions"));
         parts.value("ordered", "policy.ACTION", vec![clip_to(clip), Op::Place(Order::Places(order.to_vec()))]);
         for (name, torque) in [("lowest", -torque), ("highest", torque)] {
             let number = Operand::Number;
@@ -206,10 +206,10 @@ impl Limx {
         }
         let limits = ["lowest", "highest"].map(|name| Operand::Name(name.to_owned()));
         parts.value("limited", "ordered", vec![Op::Clip(limits)]);
-        facts.note("limited", format!("{}; {}", yaml.at("PointfootCfg.control"), facts.source("last_action")));
+        facts.note("limited", format!("{}; {}", yaml.location("PointfootCfg.control"), facts.source("last_action")));
         let ops = vec![Op::Scale(Operand::Number(scale)), Op::Add(Operand::Name("initial".to_owned()))];
         parts.value("target", "limited", ops);
-        facts.note("target", yaml.at("PointfootCfg.control.action_scale_pos"));
+        facts.note("target", yaml.location("PointfootCfg.control.action_scale_pos"));
         parts.target(TargetKind::Position, "target");
         let n = order.len();
         parts.gains(Gains {
@@ -217,7 +217,7 @@ impl Limx {
             stiffness: vec![stiffness; n],
             damping: vec![damping; n],
         });
-        facts.note("gains", yaml.at("PointfootCfg.control.stiffness"));
+        facts.note("gains", yaml.location("PointfootCfg.control.stiffness"));
         Ok(())
     }
 }
@@ -232,7 +232,7 @@ fn variant(networks: &[String], facts: &mut Facts) -> Result<String> {
             facts.note("variant", format!("the folder {only}"));
             Ok(only.to_owned())
         }
-        _ => facts.named("variant", &there),
+        _ => facts.choose_one_of("variant", &there),
     }
 }
 

@@ -100,11 +100,11 @@ impl Family for Mjlab {
             Some(ros) => {
                 let path = ros.path("phase.control_dt");
                 let dt = ros.yaml.number(&path)?;
-                ensure!((1e-6..1e6).contains(&dt), "{} = {dt}: give the seconds of a tick", ros.yaml.at(&path));
-                facts.note("rate_hz", ros.yaml.at(&path));
+                ensure!((1e-6..1e6).contains(&dt), "{} = {dt}: give the seconds of a tick", ros.yaml.location(&path));
+                facts.note("rate_hz", ros.yaml.location(&path));
                 1.0 / dt
             }
-            None => facts.find("rate_hz")?.unwrap_or(50.0),
+            None => facts.value("rate_hz")?.unwrap_or(50.0),
         };
         let mut parts = Parts::new("policy", rate);
         robot.describe(&mut parts);

@@ -61,10 +61,10 @@ impl Family for RlSar {
 
         let rate = 1.0 / (config.positive("dt")? * config.positive("decimation")?);
         let mut parts = Parts::new("policy", rate);
-        facts.note("rate_hz", format!("1 / ({} * {})", config.at("dt"), config.at("decimation")));
+        facts.note("rate_hz", format!("1 / ({} * {})", config.location("dt"), config.location("decimation")));
         let joints = Joints::read(&config, &mut parts, facts)?;
         parts.constant("default", config.of_joints("default_dof_pos")?);
-        facts.note("default", config.at("default_dof_pos"));
+        facts.note("default", config.location("default_dof_pos"));
         let action = action::act(&config, &joints, &mut parts, facts)?;
         let terms = Terms { config: &config, joints: &joints, action, rate, parts: &mut parts, facts };
         let observation = terms.observe()?;
@@ -90,7 +90,7 @@ fn chosen<'a>(documents: &'a [Document], facts: &mut Facts) -> Result<Option<Sec
     // Files of other policies are not read, and their keys not listed.
     let is_named = |section: &&Section<'_>| name.as_ref().is_some_and(|name| name == section.name);
     all.iter().filter(|section| !is_named(section)).for_each(|section| {
-        section.document.get(section.name);
+        section.document.node(section.name);
     });
     let Some(name) = &name else { return Ok(None) };
     let named: Vec<Section<'_>> = all.iter().filter(|section| section.name == name).copied().collect();
@@ -115,7 +115,7 @@ fn base<'a>(documents: &'a [Document], own: Section<'_>) -> Result<Option<Sectio
         bases.extend(names.iter().filter(|name| **name == robot).map(|name| Section { document, name }));
         // Sections of other robots are not read.
         names.iter().filter(|name| **name != robot).for_each(|name| {
-            document.get(name);
+            document.node(name);
         });
     }
     ensure!(bases.len() < 2, "several files base.yaml have the robot {:?}; name its folder", printable(robot));
@@ -141,13 +141,13 @@ fn require_base(config: &Config<'_>) -> Result<()> {
 /// Refuses what would be deployed in another way.
 fn refuse_others(config: &Config<'_>) -> Result<()> {
     let key = "use_pmtg_controller";
-    let is_pmtg = config.maybe(key, "true or false", |node| node.truth())?.unwrap_or(false);
-    ensure!(!is_pmtg, "{} is true: the gait generator PMTG is not supported", config.at(key));
-    let framework = config.maybe("framework", "a text", |node| node.text())?;
+    let is_pmtg = config.optional(key, "true or false", |node| node.truth())?.unwrap_or(false);
+    ensure!(!is_pmtg, "{} is true: the gait generator PMTG is not supported", config.location(key));
+    let framework = config.optional("framework", "a text", |node| node.text())?;
     ensure!(
         framework != Some("isaacsim") || !config.own.has("rows"),
         "{}: this older layout transposes its lists by rows and cols; write them in the order of the policy, and remove rows and cols",
-        config.at("rows")
+        config.location("rows")
     );
     Ok(())
 }
@@ -177,12 +177,12 @@ fn network(
         if let Some((own, graph)) = differs(own, graph.filter(|len| *len > 1)) {
             return Err(Facts::contradiction(
                 what,
-                (&config.at(key), &format!("{own} values")),
+                (&config.location(key), &format!("{own} values")),
                 (&format!("{file}: {}", printable(port)), &format!("{graph} values")),
             ));
         }
     }
-    facts.note("policy", config.at("model_name"));
+    facts.note("policy", config.location("model_name"));
     parts.network(&file, input, output);
     Ok(())
 }
@@ -198,7 +198,7 @@ fn require_network(
     if bundle.has(file) {
         return Ok(());
     }
-    let at = config.at("model_name");
+    let at = config.location("model_name");
     let sibling = format!("{}.pt", file.strip_suffix(".onnx").unwrap_or(file));
     let script = [given, &sibling].into_iter().find(|file| bundle.has(file));
     let script = script.with_context(|| format!("{at}: there is no {:?} in the bundle", printable(given)))?;

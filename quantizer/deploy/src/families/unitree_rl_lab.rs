@@ -26,10 +26,12 @@ impl Family for UnitreeRlLab {
     fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
         let Some(file) = bundle.find("deploy.yaml")? else { return Ok(None) };
         let document = Document::read(bundle, file)?;
-        let missing: Vec<&str> = KEYS.into_iter().filter(|key| document.look(key).is_none()).collect();
+        let missing: Vec<&str> = KEYS.into_iter().filter(|key| document.peek(key).is_none()).collect();
         match missing[..] {
             [] => {}
-            [key] => bail!("{}: it looks like a file of unitree_rl_lab, and this key is missing", document.at(key)),
+            [key] => {
+                bail!("{}: it looks like a file of unitree_rl_lab, and this key is missing", document.location(key))
+            }
             _ => return Ok(None),
         }
         let network =
@@ -41,7 +43,7 @@ impl Family for UnitreeRlLab {
         let (yaml, file) = (&found.documents[0], &found.networks[0]);
         let signature = Signature::read(&bundle.path(file)?)?;
         let mut parts = Parts::new("policy", 1.0 / yaml.number("step_dt")?);
-        facts.note("rate_hz", yaml.at("step_dt"));
+        facts.note("rate_hz", yaml.location("step_dt"));
 
         let motors = motors(yaml)?;
         let joints = motors.len();
@@ -59,7 +61,7 @@ impl Family for UnitreeRlLab {
         parts.network(file, input, output);
         target(&mut parts, yaml, &motors, facts)?;
         parts.gains(gains(yaml, &motors, facts)?);
-        facts.note("gains", format!("{}; {}", yaml.at("stiffness"), facts.source("gains.order")));
+        facts.note("gains", format!("{}; {}", yaml.location("stiffness"), facts.source("gains.order")));
         Ok(parts.finish())
     }
 }
@@ -67,18 +69,19 @@ impl Family for UnitreeRlLab {
 /// Returns the motor of each joint.
 fn motors(yaml: &Document) -> Result<Vec<usize>> {
     let key = "joint_ids_map";
-    let motors: Vec<usize> = yaml
-        .need(key, "a list of motor numbers", |node| node.numbers()?.iter().map(|number| place(*number)).collect())?;
+    let motors: Vec<usize> = yaml.required(key, "a list of motor numbers", |node| {
+        node.numbers()?.iter().map(|number| place(*number)).collect()
+    })?;
     let joints = motors.len();
     let count = motors.iter().max().map_or(0, |most| most + 1);
     let mut sorted = motors.clone();
     sorted.sort_unstable();
     sorted.dedup();
-    ensure!(sorted.len() == joints, "{}: a motor occurs twice", yaml.at(key));
+    ensure!(sorted.len() == joints, "{}: a motor occurs twice", yaml.location(key));
     ensure!(
         count == joints,
         "{}: it has {joints} joints of {count} motors, and a target of some motors is not supported",
-        yaml.at(key)
+        yaml.location(key)
     );
     Ok(motors)
 }
@@ -86,13 +89,13 @@ fn motors(yaml: &Document) -> Result<Vec<usize>> {
 fn default_pose(yaml: &Document, joints: usize) -> Result<Vec<f64>> {
     let key = "default_joint_pos";
     let default = yaml.numbers(key)?;
-    ensure!(default.len() == joints, "{} has {} values, but joint_ids_map {joints}", yaml.at(key), default.len());
+    ensure!(default.len() == joints, "{} has {} values, but joint_ids_map {joints}", yaml.location(key), default.len());
     Ok(default)
 }
 
 /// Returns the gains in the order of the motors.
 fn gains(yaml: &Document, motors: &[usize], facts: &mut Facts) -> Result<Gains> {
-    let order: String = facts.get("gains.order")?;
+    let order: String = facts.value_or_default("gains.order")?;
     let (stiffness, damping) = (yaml.numbers("stiffness")?, yaml.numbers("damping")?);
     let in_motors = |gains: Vec<f64>| -> Result<Vec<f64>> {
         ensure!(gains.len() == motors.len(), "{}: {} gains for {} joints", yaml.file, gains.len(), motors.len());
@@ -120,7 +123,7 @@ impl Terms<'_> {
     /// Adds all terms, and the observation.
     fn observe(&mut self) -> Result<()> {
         let histories = Histories::of(self.facts)?;
-        self.clip_first = self.facts.get("clip_first")?;
+        self.clip_first = self.facts.value_or_default("clip_first")?;
         for name in self.yaml.keys("observations") {
             self.add(name)?;
         }
@@ -132,15 +135,15 @@ impl Terms<'_> {
         let yaml = self.yaml;
         let path = format!("observations.{name}");
         let mut ops = self.begin(name, &path)?;
-        let clip = yaml.maybe(&format!("{path}.clip"), "two numbers", Node::pair)?;
+        let clip = yaml.optional(&format!("{path}.clip"), "two numbers", Node::pair)?;
         let clip = clip.map(|[low, high]| Op::Clip([Operand::Number(low), Operand::Number(high)]));
-        let scale = yaml.maybe(&format!("{path}.scale"), "numbers", Node::one_or_several)?;
+        let scale = yaml.optional(&format!("{path}.scale"), "numbers", Node::one_or_several)?;
         let scale = scale.map(|scale| Op::Scale(Operand::List(scale)));
         let both = if self.clip_first { [clip, scale] } else { [scale, clip] };
         ops.extend(both.into_iter().flatten());
-        let length = yaml.maybe(&format!("{path}.history_length"), "a number of frames", count)?.unwrap_or(1).max(1);
+        let length = yaml.optional(&format!("{path}.history_length"), "a number of frames", count)?.unwrap_or(1).max(1);
         let value = self.parts.term(ops, length);
-        self.facts.note(&value, yaml.at(&path));
+        self.facts.note(&value, yaml.location(&path));
         Ok(())
     }
 
@@ -168,7 +171,7 @@ impl Terms<'_> {
                 ops
             }
             "last_action" => {
-                let processed = self.facts.chooses("last_action", "processed")?;
+                let processed = self.facts.is_choice("last_action", "processed")?;
                 self.parts.state(name, joints, if processed { "processed" } else { "policy.ACTION" })
             }
             other => self.unknown(other, path)?,
@@ -177,11 +180,11 @@ impl Terms<'_> {
 
     /// Begins a term of another name. Only the application knows this term, so it becomes a raw input.
     fn unknown(&mut self, name: &str, path: &str) -> Result<Vec<Op>> {
-        let scale = self.yaml.maybe(&format!("{path}.scale"), "a list of numbers", Node::numbers)?;
+        let scale = self.yaml.optional(&format!("{path}.scale"), "a list of numbers", Node::numbers)?;
         let Some(scale) = scale else {
             bail!(
                 "{}: term {name:?} is unknown; give it a scale with one number for each of its values",
-                self.yaml.at(path)
+                self.yaml.location(path)
             );
         };
         self.facts.of_application(
@@ -195,14 +198,14 @@ impl Terms<'_> {
         let yaml = self.yaml;
         let mut ops = self.parts.input("velocity_commands", 3, "m/s, m/s, rad/s");
         let path = "commands.base_velocity.ranges";
-        if self.facts.get::<bool>("clamp_commands")? {
+        if self.facts.value_or_default::<bool>("clamp_commands")? {
             let ranges = ["lin_vel_x", "lin_vel_y", "ang_vel_z"]
-                .map(|axis| yaml.need(&format!("{path}.{axis}"), "two numbers", Node::pair));
+                .map(|axis| yaml.required(&format!("{path}.{axis}"), "two numbers", Node::pair));
             let ranges = ranges.into_iter().collect::<Result<Vec<_>>>()?;
             let of = |i: usize| Operand::List(ranges.iter().map(|range| range[i]).collect());
             ops.push(Op::Clip([of(0), of(1)]));
         } else {
-            yaml.get(path);
+            yaml.node(path);
         }
         Ok(ops)
     }
@@ -217,9 +220,10 @@ fn place(number: f64) -> Option<usize> {
 /// numbers (deploy/include/isaaclab/envs/mdp/observations.h).
 fn chosen_joints(yaml: &Document, path: &str, joints: usize) -> Result<Option<Op>> {
     let path = format!("{path}.params.asset_cfg.joint_ids");
-    let Some(ids) = yaml.get(&path).and_then(Node::numbers).filter(|ids| !ids.is_empty()) else { return Ok(None) };
+    let Some(ids) = yaml.node(&path).and_then(Node::numbers).filter(|ids| !ids.is_empty()) else { return Ok(None) };
     let places: Option<Vec<usize>> = ids.iter().map(|id| place(*id).filter(|id| *id < joints)).collect();
-    let places = places.with_context(|| format!("{} must be numbers of joints below {joints}", yaml.at(&path)))?;
+    let places =
+        places.with_context(|| format!("{} must be numbers of joints below {joints}", yaml.location(&path)))?;
     Ok(Some(Op::Select(Order::Places(places))))
 }
 
@@ -227,32 +231,33 @@ fn chosen_joints(yaml: &Document, path: &str, joints: usize) -> Result<Option<Op
 fn target(parts: &mut Parts, yaml: &Document, motors: &[usize], facts: &mut Facts) -> Result<()> {
     let actions = yaml.keys("actions");
     let [action] = actions[..] else {
-        bail!("{} has {} actions; one is supported", yaml.at("actions"), actions.len());
+        bail!("{} has {} actions; one is supported", yaml.location("actions"), actions.len());
     };
     let kind = match action {
         "JointPositionAction" => TargetKind::Position,
         "JointVelocityAction" => TargetKind::Velocity,
-        other => bail!("{}: action {other:?} is not known", yaml.at("actions")),
+        other => bail!("{}: action {other:?} is not known", yaml.location("actions")),
     };
     let path = |key: &str| format!("actions.{action}.{key}");
     let mut ops = Vec::new();
     for (key, op) in [("scale", Op::Scale as fn(Operand) -> Op), ("offset", Op::Add)] {
-        if let Some(list) = yaml.maybe(&path(key), "numbers", Node::one_or_several)? {
+        if let Some(list) = yaml.optional(&path(key), "numbers", Node::one_or_several)? {
             ops.push(op(Operand::List(list)));
         }
     }
-    if let Some(clip) = yaml.get(&path("clip")) {
+    if let Some(clip) = yaml.node(&path("clip")) {
         let pairs: Option<Vec<[f64; 2]>> = clip.items().iter().map(Node::pair).collect();
         let pairs = pairs.filter(|pairs| !pairs.is_empty());
-        let pairs = pairs.with_context(|| format!("{} must be pairs of numbers", yaml.at(&path("clip"))))?;
+        let pairs = pairs.with_context(|| format!("{} must be pairs of numbers", yaml.location(&path("clip"))))?;
         let of = |i: usize| Operand::List(pairs.iter().map(|pair| pair[i]).collect());
         ops.push(Op::Clip([of(0), of(1)]));
     }
     parts.value("processed", "policy.ACTION", ops);
     parts.value("target", "processed", vec![Op::Place(Order::Places(motors.to_vec()))]);
-    facts.note("processed", yaml.at(&format!("actions.{action}")));
+    facts.note("processed", yaml.location(&format!("actions.{action}")));
     facts.note("observation", facts.source("history.layout"));
-    facts.note("target", format!("{}; {}", yaml.at(&format!("actions.{action}")), yaml.at("joint_ids_map")));
+    facts
+        .note("target", format!("{}; {}", yaml.location(&format!("actions.{action}")), yaml.location("joint_ids_map")));
     parts.target(kind, "target");
     Ok(())
 }

@@ -15,7 +15,7 @@ pub(crate) fn clip_to(limit: f64) -> Op {
 
 /// Adds the value clipped: the action within the limit of the rule action.clip.
 pub(crate) fn clip(parts: &mut Parts, facts: &mut Facts) -> Result<()> {
-    let limit: f64 = facts.find("action.clip")?.unwrap_or(100.0);
+    let limit: f64 = facts.value("action.clip")?.unwrap_or(100.0);
     parts.value("clipped", ACTION, vec![clip_to(limit)]);
     facts.note("clipped", facts.source("action.clip"));
     Ok(())
@@ -23,7 +23,7 @@ pub(crate) fn clip(parts: &mut Parts, facts: &mut Facts) -> Result<()> {
 
 /// Adds the state last_action, which is the action or the value clipped, by the rule last_action.
 pub(crate) fn fed_back(parts: &mut Parts, len: usize, facts: &mut Facts) -> Result<()> {
-    let next = if facts.chooses("last_action", "raw")? { ACTION } else { "clipped" };
+    let next = if facts.is_choice("last_action", "raw")? { ACTION } else { "clipped" };
     parts.kept("last_action", len, next);
     facts.note("last_action", facts.source("last_action"));
     Ok(())

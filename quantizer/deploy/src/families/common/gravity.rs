@@ -14,7 +14,7 @@ pub(crate) fn given_gravity(
     open: &str,
     quaternion: &'static str,
 ) -> Result<(&'static str, usize, Vec<Op>)> {
-    let given: Option<String> = facts.find(rule)?;
+    let given: Option<String> = facts.value(rule)?;
     Ok(match given.as_deref().unwrap_or(open) {
         "vector" => ("projected_gravity", 3, Vec::new()),
         "wxyz" => (quaternion, 4, vec![Op::Gravity(Orientation::Wxyz)]),

@@ -19,8 +19,13 @@ pub(crate) struct Histories {
 impl Histories {
     /// Asks for the rules history.layout, history.first and history.fill.
     pub(crate) fn of(facts: &mut Facts) -> Result<Self> {
-        let by_term = facts.chooses("history.layout", "term")?;
-        Ok(Self { by_term, first: facts.get("history.first")?, fill: facts.get("history.fill")?, stride: 1 })
+        let by_term = facts.is_choice("history.layout", "term")?;
+        Ok(Self {
+            by_term,
+            first: facts.value_or_default("history.first")?,
+            fill: facts.value_or_default("history.fill")?,
+            stride: 1,
+        })
     }
 
     pub(crate) fn spec(&self, length: usize) -> History {

@@ -30,21 +30,21 @@ pub(crate) fn check_names(names: &[String], at: &str) -> Result<()> {
 
 /// Reads a list with commas between its names.
 pub(crate) fn names(meta: &Document, key: &str) -> Result<Vec<String>> {
-    let text = meta.need(key, "names with commas between them", Node::text)?;
+    let text = meta.required(key, "names with commas between them", Node::text)?;
     let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
     for (i, name) in names.iter().enumerate() {
-        ensure!(!name.is_empty(), "{}: name {i} is empty", meta.at(key));
-        ensure!(!names[..i].contains(name), "{}: {:?} occurs twice", meta.at(key), printable(name));
+        ensure!(!name.is_empty(), "{}: name {i} is empty", meta.location(key));
+        ensure!(!names[..i].contains(name), "{}: {:?} occurs twice", meta.location(key), printable(name));
     }
     Ok(names)
 }
 
 /// Reads a list with commas between its numbers.
 pub(crate) fn numbers(meta: &Document, key: &str) -> Result<Option<Vec<f64>>> {
-    let Some(text) = meta.maybe(key, "a text", Node::text)? else { return Ok(None) };
+    let Some(text) = meta.optional(key, "a text", Node::text)? else { return Ok(None) };
     let number = |word: &str| {
         let number: Option<f64> = word.trim().parse().ok().filter(|number: &f64| number.is_finite());
-        number.with_context(|| format!("{}: {:?} is not a finite number", meta.at(key), printable(word.trim())))
+        number.with_context(|| format!("{}: {:?} is not a finite number", meta.location(key), printable(word.trim())))
     };
     text.split(',').map(number).collect::<Result<_>>().map(Some)
 }

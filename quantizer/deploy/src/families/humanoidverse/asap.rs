@@ -19,7 +19,7 @@ const ASAP: [[&str; 4]; 3] = [
 
 /// Returns `true` if a file has the histories of one of ASAP's policies.
 pub(super) fn is_one(yaml: &Document) -> bool {
-    ASAP.iter().any(|[_, histories, ..]| yaml.look(histories).is_some())
+    ASAP.iter().any(|[_, histories, ..]| yaml.peek(histories).is_some())
 }
 
 impl Reader<'_> {
@@ -30,29 +30,29 @@ impl Reader<'_> {
         let yaml = self.yaml;
         if policy == "mimic" {
             let skill = self.skill(file)?;
-            let kind = yaml.need(&format!("mimic_robot_types.{skill}"), "a text", Node::text)?;
+            let kind = yaml.required(&format!("mimic_robot_types.{skill}"), "a text", Node::text)?;
             let mask = yaml.numbers(&format!("robot_dofs.{kind}"))?;
             self.active = Some(self.places(&mask, &format!("robot_dofs.{kind}"))?);
-            self.motion = yaml.maybe(&format!("motion_length_s.{skill}"), "a number of s", Node::number)?;
-            self.facts.note("joints of the policy", yaml.at(&format!("robot_dofs.{kind}")));
+            self.motion = yaml.optional(&format!("motion_length_s.{skill}"), "a number of s", Node::number)?;
+            self.facts.note("joints of the policy", yaml.location(&format!("robot_dofs.{kind}")));
         }
         if self.action_len.is_none() {
-            self.action_len_from = yaml.at(&format!("{dims}.actions"));
+            self.action_len_from = yaml.location(&format!("{dims}.actions"));
             let len = self.dim("actions")?;
             self.action_len = Some(self.active.as_ref().map_or(len, Vec::len));
         }
         let flag = if policy == "mimic" { "USE_HISTORY_MIMIC" } else { "USE_HISTORY_LOCO" };
-        let with_history = yaml.maybe(flag, "True or False", Node::truth)?.unwrap_or(false);
+        let with_history = yaml.optional(flag, "True or False", Node::truth)?.unwrap_or(false);
         let mut terms = yaml.keys(histories);
         terms.sort_unstable();
-        ensure!(!terms.is_empty(), "{} has no terms", yaml.at(histories));
-        self.facts.note("observation", format!("{}; {}", yaml.at(histories), self.facts.source("asap.terms")));
+        ensure!(!terms.is_empty(), "{} has no terms", yaml.location(histories));
+        self.facts.note("observation", format!("{}; {}", yaml.location(histories), self.facts.source("asap.terms")));
         let spec = History {
             length: 1,
             stride: 1,
-            first: self.facts.get("asap.history.first")?,
-            fill: self.facts.get("asap.history.fill")?,
-            current: self.facts.find("asap.history.current")?.unwrap_or(false),
+            first: self.facts.value_or_default("asap.history.first")?,
+            fill: self.facts.value_or_default("asap.history.fill")?,
+            current: self.facts.value("asap.history.current")?.unwrap_or(false),
         };
         let (mut before, mut past, mut after, mut all) = (Vec::new(), Vec::new(), Vec::new(), 0);
         for name in terms {
@@ -60,16 +60,17 @@ impl Reader<'_> {
             let value = if term.from == name { format!("{name}_term") } else { name.to_owned() };
             let len = term.len;
             self.parts.value(&value, &term.from, term.ops);
-            self.facts.note(&value, yaml.at(&format!("obs_scales.{name}")));
+            self.facts.note(&value, yaml.location(&format!("obs_scales.{name}")));
             let key = format!("{histories}.{name}");
-            let length = yaml.need(&key, "a number of frames", count)?;
+            let length = yaml.required(&key, "a number of frames", count)?;
             all += len;
             if with_history {
                 let by = yaml.number(&format!("obs_scales.{scale}"))?;
                 let ops = vec![Op::History(History { length, ..spec }), Op::Scale(Operand::Number(by))];
                 let history = format!("{name}_history");
                 self.parts.value(&history, &value, ops);
-                self.facts.note(&history, format!("{}; {}", yaml.at(&key), self.facts.source("asap.history.first")));
+                self.facts
+                    .note(&history, format!("{}; {}", yaml.location(&key), self.facts.source("asap.history.first")));
                 past.push(history);
                 all = len.checked_mul(length).and_then(|len| len.checked_add(all)).context("a history is too long")?;
             }
@@ -84,10 +85,10 @@ impl Reader<'_> {
     /// Returns which of ASAP's policies a network is: by its folder, by its length, or by the answer.
     fn asap_policy(&mut self, file: &str, observation_len: Option<usize>) -> Result<[&'static str; 4]> {
         // The order of the terms is the same for all; it is asked for here, since nothing else states it.
-        let listed: bool = self.facts.find("asap.terms")?.unwrap_or(true);
+        let listed: bool = self.facts.value("asap.terms")?.unwrap_or(true);
         ensure!(listed, "asap.terms = false: write the terms of the observation in deploy.toml");
         let there: Vec<[&str; 4]> =
-            ASAP.into_iter().filter(|[_, histories, ..]| self.yaml.look(histories).is_some()).collect();
+            ASAP.into_iter().filter(|[_, histories, ..]| self.yaml.peek(histories).is_some()).collect();
         let skills = self.yaml.keys("mimic_models");
         let is_mimic = Path::new(file)
             .iter()
@@ -102,7 +103,7 @@ impl Reader<'_> {
             self.facts.note("policy", format!("{file}: its folder and the length of its input"));
             return Ok(one);
         }
-        let answer: Option<String> = self.facts.find("asap.policy")?;
+        let answer: Option<String> = self.facts.value("asap.policy")?;
         let first = there.first().copied().context("it has no policies")?;
         let Some(answer) = answer else { return Ok(first) };
         let names = || there.iter().map(|policy| policy[0]).collect::<Vec<_>>().join(", ");
@@ -112,11 +113,11 @@ impl Reader<'_> {
 
     /// Returns the length of an observation of ASAP that selects no joints.
     fn asap_len(&self, [_, histories, dims, _]: &[&str; 4]) -> Option<usize> {
-        let with_history = self.yaml.look("USE_HISTORY_LOCO").and_then(Node::truth).unwrap_or(false);
+        let with_history = self.yaml.peek("USE_HISTORY_LOCO").and_then(Node::truth).unwrap_or(false);
         let terms = self.yaml.keys(histories);
         let len = |term: &&str| {
-            let dim = count(self.yaml.look(&format!("{dims}.{term}"))?)?;
-            let frames = count(self.yaml.look(&format!("{histories}.{term}"))?)?;
+            let dim = count(self.yaml.peek(&format!("{dims}.{term}"))?)?;
+            let frames = count(self.yaml.peek(&format!("{histories}.{term}"))?)?;
             dim.checked_mul(if with_history { frames.checked_add(1)? } else { 1 })
         };
         terms.iter().try_fold(0_usize, |all, term| all.checked_add(len(term)?))
@@ -127,21 +128,21 @@ impl Reader<'_> {
         let skills = self.yaml.keys("mimic_models");
         let folder = Path::new(file).parent().and_then(Path::file_name).and_then(|name| name.to_str());
         let found = skills.iter().find(|skill| Some(**skill) == folder);
-        self.yaml.get("mimic_models");
+        self.yaml.node("mimic_models");
         if let Some(skill) = found {
             return Ok((*skill).to_owned());
         }
         if let [only] = skills[..] {
             return Ok(only.to_owned());
         }
-        ensure!(!skills.is_empty(), "{} has no skills", self.yaml.at("mimic_models"));
-        self.facts.named("asap.skill", &skills)
+        ensure!(!skills.is_empty(), "{} has no skills", self.yaml.location("mimic_models"));
+        self.facts.choose_one_of("asap.skill", &skills)
     }
 
     /// Returns the places of a mask.
     fn places(&self, mask: &[f64], key: &str) -> Result<Vec<usize>> {
         let n = self.robot.len();
-        let at = self.yaml.at(key);
+        let at = self.yaml.location(key);
         ensure!(mask.len() == n, "{at} has {} values, but there are {n} joints", mask.len());
         ensure!(mask.iter().all(|flag| *flag == 0.0 || *flag == 1.0), "{at} must hold 0 and 1 only");
         let places: Vec<usize> = (0..n).filter(|i| mask[*i] == 1.0).collect();

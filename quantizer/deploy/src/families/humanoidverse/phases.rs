@@ -9,30 +9,31 @@ use crate::yaml::Node;
 impl Reader<'_> {
     /// Returns the value that is the phase of the gait, from 0 to 1; makes it first.
     pub(super) fn phase(&mut self) -> Result<String> {
-        if self.facts.chooses("phase", "raw")? {
+        if self.facts.is_choice("phase", "raw")? {
             self.parts.raw("phase_time", 1, "periods");
             return Ok("phase_time".to_owned());
         }
         if !self.has_phase {
             self.has_phase = true;
-            let period = match self.yaml.maybe("GAIT_PERIOD", "a number of s", Node::number)? {
+            let period = match self.yaml.optional("GAIT_PERIOD", "a number of s", Node::number)? {
                 Some(period) => period,
-                None => self.facts.find("gait_period")?.unwrap_or(1.0),
+                None => self.facts.value("gait_period")?.unwrap_or(1.0),
             };
-            ensure!(period > 0.0, "{} = {period}: give a number above 0", self.yaml.at("GAIT_PERIOD"));
+            ensure!(period > 0.0, "{} = {period}: give a number above 0", self.yaml.location("GAIT_PERIOD"));
             self.clock("gait_clock", period);
             // The deploy code multiplies the time by the command, so that the phase is 0 while the robot stands.
             self.parts.raw("command_stand", 1, "1 to walk, 0 to stand");
             let stand = Op::Scale(Operand::Name("command_stand".to_owned()));
             self.parts.value("gait_phase", "gait_clock", vec![stand]);
-            self.facts.note("gait_phase", format!("{}; {}", self.yaml.at("GAIT_PERIOD"), self.facts.source("phase")));
+            self.facts
+                .note("gait_phase", format!("{}; {}", self.yaml.location("GAIT_PERIOD"), self.facts.source("phase")));
         }
         Ok("gait_phase".to_owned())
     }
 
     /// Makes the phase of the reference motion, from 0 to 1.
     pub(super) fn motion_phase(&mut self) -> Result<Term> {
-        match (self.facts.chooses("motion_phase", "raw")?, self.motion) {
+        match (self.facts.is_choice("motion_phase", "raw")?, self.motion) {
             (true, _) => Ok(self.raw("ref_motion_phase", 1, "motions")),
             (false, Some(length)) => {
                 ensure!(length > 0.0, "motion_length_s = {length}: give a number above 0");

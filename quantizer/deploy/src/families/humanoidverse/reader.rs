@@ -40,7 +40,7 @@ pub(super) struct Reader<'a> {
 impl Reader<'_> {
     /// Returns the length of a term that the file states.
     pub(super) fn dim(&self, term: &str) -> Result<usize> {
-        self.yaml.need(&format!("{}.{term}", self.dims), "a number of values", count)
+        self.yaml.required(&format!("{}.{term}", self.dims), "a number of values", count)
     }
 
     pub(super) fn raw(&mut self, name: &str, len: usize, unit: &str) -> Term {

@@ -28,20 +28,20 @@ impl Robot {
     pub(super) fn read(yaml: &Document, facts: &mut Facts) -> Result<Self> {
         let default = yaml.numbers(DEFAULT)?;
         let n = default.len();
-        ensure!(n > 0, "{} is empty", yaml.at(DEFAULT));
-        facts.note("default", yaml.at(DEFAULT));
-        if let Some(joints) = yaml.maybe("NUM_JOINTS", "a number of joints", count)? {
+        ensure!(n > 0, "{} is empty", yaml.location(DEFAULT));
+        facts.note("default", yaml.location(DEFAULT));
+        if let Some(joints) = yaml.optional("NUM_JOINTS", "a number of joints", count)? {
             same_number(yaml, n, "NUM_JOINTS", joints, "joints")?;
         }
         ask_for_order(yaml, facts)?;
-        let names = yaml.maybe(NAMES, "a list of texts", Node::texts)?.unwrap_or_default();
+        let names = yaml.optional(NAMES, "a list of texts", Node::texts)?.unwrap_or_default();
         if !names.is_empty() {
             same_number(yaml, n, NAMES, names.len(), "names")?;
-            ensure!(names.iter().collect::<BTreeSet<_>>().len() == n, "{}: a name occurs twice", yaml.at(NAMES));
+            ensure!(names.iter().collect::<BTreeSet<_>>().len() == n, "{}: a name occurs twice", yaml.location(NAMES));
         }
         let upper = upper_body(yaml, n, &names)?;
-        let by_name = !names.is_empty() && facts.chooses("joint_order", "names")?;
-        let order = if names.is_empty() { yaml.at(DEFAULT) } else { facts.source("joint_order") };
+        let by_name = !names.is_empty() && facts.is_choice("joint_order", "names")?;
+        let order = if names.is_empty() { yaml.location(DEFAULT) } else { facts.source("joint_order") };
         facts.note("joint order", order);
         Ok(Self { default, names, by_name, upper })
     }
@@ -58,8 +58,8 @@ fn same_number(yaml: &Document, n: usize, key: &str, len: usize, what: &str) -> 
     }
     Err(Facts::contradiction(
         "number of joints",
-        (&yaml.at(DEFAULT), &format!("{n} joints")),
-        (&yaml.at(key), &format!("{len} {what}")),
+        (&yaml.location(DEFAULT), &format!("{n} joints")),
+        (&yaml.location(key), &format!("{len} {what}")),
     ))
 }
 
@@ -67,10 +67,10 @@ fn same_number(yaml: &Document, n: usize, key: &str, len: usize, what: &str) -> 
 fn ask_for_order(yaml: &Document, facts: &mut Facts) -> Result<()> {
     let mut reordered = false;
     for key in ["JOINT2MOTOR", "MOTOR2JOINT"] {
-        let map = yaml.maybe(key, "a list of numbers", Node::numbers)?;
+        let map = yaml.optional(key, "a list of numbers", Node::numbers)?;
         reordered |= map.is_some_and(|map| !map.iter().enumerate().all(|(i, place)| *place == i as f64));
     }
-    let parallel = yaml.maybe("MOTOR_TYPE", "a text", Node::text)? == Some("parallel");
+    let parallel = yaml.optional("MOTOR_TYPE", "a text", Node::text)? == Some("parallel");
     if reordered || parallel {
         let what = if parallel { "MOTOR_TYPE is parallel" } else { "JOINT2MOTOR is not the identity" };
         let meaning = format!(
@@ -85,28 +85,28 @@ fn ask_for_order(yaml: &Document, facts: &mut Facts) -> Result<()> {
 /// Returns the places of the joints of the upper body: those that the file names, or else the last ones.
 fn upper_body(yaml: &Document, n: usize, names: &[String]) -> Result<Vec<usize>> {
     let (counted, named) = ("NUM_UPPER_BODY_JOINTS", "dof_names_upper_body");
-    let number = yaml.maybe(counted, "a number of joints", whole)?;
-    let upper: Vec<usize> = match yaml.maybe(named, "a list of texts", Node::texts)? {
+    let number = yaml.optional(counted, "a number of joints", whole)?;
+    let upper: Vec<usize> = match yaml.optional(named, "a list of texts", Node::texts)? {
         Some(upper) => {
             let place = |name: &String| {
                 let place = names.iter().position(|other| other == name);
-                place.with_context(|| format!("{}: {name:?} is not one of dof_names", yaml.at(named)))
+                place.with_context(|| format!("{}: {name:?} is not one of dof_names", yaml.location(named)))
             };
             upper.iter().map(place).collect::<Result<_>>()?
         }
         None => {
             let number = number.unwrap_or(0);
-            ensure!(number <= n, "{} = {number}, but there are {n} joints", yaml.at(counted));
+            ensure!(number <= n, "{} = {number}, but there are {n} joints", yaml.location(counted));
             (n - number..n).collect()
         }
     };
     let distinct = upper.iter().collect::<BTreeSet<_>>().len();
-    ensure!(distinct == upper.len(), "{}: a name occurs twice", yaml.at(named));
+    ensure!(distinct == upper.len(), "{}: a name occurs twice", yaml.location(named));
     match number {
         Some(number) if number != upper.len() => Err(Facts::contradiction(
             "number of joints of the upper body",
-            (&yaml.at(counted), &number.to_string()),
-            (&yaml.at(named), &format!("{} names", upper.len())),
+            (&yaml.location(counted), &number.to_string()),
+            (&yaml.location(named), &format!("{} names", upper.len())),
         )),
         _ => Ok(upper),
     }

@@ -13,7 +13,7 @@ impl Reader<'_> {
     pub(super) fn act(&mut self) -> Result<()> {
         let (yaml, n) = (self.yaml, self.robot.len());
         clip(&mut self.parts, self.facts)?;
-        let scale: f64 = self.facts.get("action_scale")?;
+        let scale: f64 = self.facts.value_or_default("action_scale")?;
         let scaled = || Op::Scale(Operand::Number(scale));
         let action_len = self.action_len.unwrap_or(n);
         let mut source = self.facts.source("action_scale");
@@ -29,10 +29,10 @@ impl Reader<'_> {
         } else if action_len == n {
             ops.push(scaled());
             let key = "residual_upper_body_action";
-            if yaml.maybe(key, "True or False", Node::truth)?.unwrap_or(false) {
+            if yaml.optional(key, "True or False", Node::truth)?.unwrap_or(false) {
                 self.residual()?;
                 ops.push(Op::Add(Operand::Name("residual".to_owned())));
-                source = format!("{source}; {}; {}", yaml.at(key), self.facts.source("residual"));
+                source = format!("{source}; {}; {}", yaml.location(key), self.facts.source("residual"));
             }
             "clipped".to_owned()
         } else if action_len < n {
@@ -42,18 +42,18 @@ impl Reader<'_> {
         };
         ops.push(Op::Add(Operand::Name("default".to_owned())));
         let limits = ["motor_pos_lower_limit_list", "motor_pos_upper_limit_list"];
-        let lists = limits.map(|key| yaml.maybe(key, "a list of finite numbers", Node::numbers));
+        let lists = limits.map(|key| yaml.optional(key, "a list of finite numbers", Node::numbers));
         let [low, high] = lists;
         if let (Some(low), Some(high)) = (low?, high?)
             && !low.is_empty()
             && !high.is_empty()
-            && self.facts.find("target.clip")?.unwrap_or(true)
+            && self.facts.value("target.clip")?.unwrap_or(true)
         {
             for (key, list) in limits.iter().zip([&low, &high]) {
-                ensure!(list.len() == n, "{} has {} values, but there are {n} joints", yaml.at(key), list.len());
+                ensure!(list.len() == n, "{} has {} values, but there are {n} joints", yaml.location(key), list.len());
             }
             ops.push(Op::Clip([Operand::List(low), Operand::List(high)]));
-            source = format!("{source}; {}", yaml.at(limits[0]));
+            source = format!("{source}; {}", yaml.location(limits[0]));
         }
         self.parts.value("target", &from, ops);
         self.facts.note("target", source);
@@ -69,7 +69,7 @@ impl Reader<'_> {
         Facts::contradiction(
             "length of the action",
             (&self.action_len_from, &format!("{action_len} values")),
-            (&self.yaml.at(key), &format!("{expected} joints")),
+            (&self.yaml.location(key), &format!("{expected} joints")),
         )
     }
 
@@ -81,7 +81,7 @@ impl Reader<'_> {
             "{}: residual_upper_body_action is True, but dof_names_upper_body is missing or empty",
             self.yaml.file
         );
-        let added: bool = self.facts.find("residual")?.unwrap_or(true);
+        let added: bool = self.facts.value("residual")?.unwrap_or(true);
         let source = self.facts.source("residual");
         ensure!(added, "residual = false: set residual_upper_body_action in {} to False", self.yaml.file);
         self.parts.raw("ref_upper_dof_pos", upper.len(), "rad");
@@ -100,7 +100,7 @@ impl Reader<'_> {
     fn short(&mut self, action_len: usize, scaled: Op) -> Result<String> {
         let n = self.robot.len();
         self.parts.value("scaled", "clipped", vec![scaled]);
-        match self.facts.find::<String>("target.short")?.as_deref() {
+        match self.facts.value::<String>("target.short")?.as_deref() {
             Some(fill @ ("zeros_first" | "zeros_last")) => {
                 add_zero(&mut self.parts, "scaled");
                 let moved = if fill == "zeros_first" { n - action_len..n } else { 0..action_len };
@@ -110,7 +110,7 @@ impl Reader<'_> {
             _ => {
                 let upper = self.robot.upper.len();
                 if action_len + upper != n {
-                    let key = if self.yaml.look("dof_names_upper_body").is_some() {
+                    let key = if self.yaml.peek("dof_names_upper_body").is_some() {
                         "dof_names_upper_body"
                     } else {
                         "NUM_UPPER_BODY_JOINTS"
@@ -126,14 +126,14 @@ impl Reader<'_> {
 
     pub(super) fn gains(&mut self) -> Result<()> {
         let (yaml, n) = (self.yaml, self.robot.len());
-        let list = |key: &str| yaml.maybe(key, "a list of finite numbers", Node::numbers);
+        let list = |key: &str| yaml.optional(key, "a list of finite numbers", Node::numbers);
         if let (Some(stiffness), Some(damping)) = (list("MOTOR_KP")?, list("MOTOR_KD")?) {
             for (key, list) in [("MOTOR_KP", &stiffness), ("MOTOR_KD", &damping)] {
-                ensure!(list.len() == n, "{} has {} values, but there are {n} joints", yaml.at(key), list.len());
+                ensure!(list.len() == n, "{} has {} values, but there are {n} joints", yaml.location(key), list.len());
             }
             let joints = self.robot.by_name.then(|| "robot".to_owned());
             self.parts.gains(Gains { joints, stiffness, damping });
-            self.facts.note("gains", yaml.at("MOTOR_KP"));
+            self.facts.note("gains", yaml.location("MOTOR_KP"));
         }
         Ok(())
     }

@@ -21,17 +21,17 @@ impl Reader<'_> {
         if term.stated != dim {
             let what = match name {
                 "actions" => self.action_len_from.clone(),
-                "ref_upper_dof_pos" => yaml.at("dof_names_upper_body"),
+                "ref_upper_dof_pos" => yaml.location("dof_names_upper_body"),
                 _ => format!("the deploy code, for {n} joints"),
             };
             return Err(Facts::contradiction(
                 &format!("length of {name}"),
-                (&yaml.at(&format!("{}.{name}", self.dims)), &format!("{dim} values")),
+                (&yaml.location(&format!("{}.{name}", self.dims)), &format!("{dim} values")),
                 (&what, &format!("{} values", term.stated)),
             ));
         }
         let key = format!("obs_scales.{name}");
-        let scale = yaml.need(&key, "a number, or a list of them", |node| {
+        let scale = yaml.required(&key, "a number, or a list of them", |node| {
             Some(match node.number() {
                 Some(number) => Operand::Number(number),
                 None => Operand::List(node.numbers()?),
@@ -91,10 +91,10 @@ impl Reader<'_> {
     }
 
     fn gravity(&mut self) -> Result<Term> {
-        let booster = match self.yaml.maybe("SDK_TYPE", "a text", Node::text)? {
+        let booster = match self.yaml.optional("SDK_TYPE", "a text", Node::text)? {
             Some("booster") => true,
             Some("unitree") | None => false,
-            Some(other) => bail!("{}: {other:?} is unknown; use unitree or booster", self.yaml.at("SDK_TYPE")),
+            Some(other) => bail!("{}: {other:?} is unknown; use unitree or booster", self.yaml.location("SDK_TYPE")),
         };
         let rule = if booster { "gravity.booster" } else { "gravity.unitree" };
         let (name, len, ops) = given_gravity(self.facts, rule, "wxyz", "base_quat")?;

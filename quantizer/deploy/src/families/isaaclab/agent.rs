@@ -26,17 +26,17 @@ impl Agent {
         }
         let yaml = Document::read(bundle, &file)?;
         let limit = |node: &Node| node.number().filter(|limit| *limit > 0.0);
-        let limit = yaml.maybe("clip_actions", "a number above 0, or null", limit)?;
-        let clip = limit.map(|limit| Given { numbers: vec![limit], from: yaml.at("clip_actions") });
+        let limit = yaml.optional("clip_actions", "a number above 0, or null", limit)?;
+        let clip = limit.map(|limit| Given { numbers: vec![limit], from: yaml.location("clip_actions") });
         // The network has another name in later versions.
-        let path = ["obs_groups.actor", "obs_groups.policy"].into_iter().find(|path| yaml.look(path).is_some());
+        let path = ["obs_groups.actor", "obs_groups.policy"].into_iter().find(|path| yaml.peek(path).is_some());
         let group = match path.map(|path| Ok::<_, actq::error::Error>((path, yaml.texts(path)?))).transpose()? {
             None => None,
             Some((path, groups)) => match <[String; 1]>::try_from(groups) {
-                Ok([group]) => Some((group, yaml.at(path))),
+                Ok([group]) => Some((group, yaml.location(path))),
                 Err(groups) => bail!(
                     "{}: the policy reads {} groups of observations ({}), and one is supported; write deploy.toml by docs/DEPLOY.md",
-                    yaml.at(path),
+                    yaml.location(path),
                     groups.len(),
                     printable(&groups.join(", "))
                 ),

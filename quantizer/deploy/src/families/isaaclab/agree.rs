@@ -120,7 +120,7 @@ fn of_actions(own: &[Action], others: &[Action]) -> Result<()> {
 /// of an environment.
 pub(super) fn with_metadata(policy: &Policy, meta: &Document, named: bool) -> Result<()> {
     let list = |key: &str| -> Result<Option<Given>> {
-        Ok(numbers(meta, key)?.map(|numbers| Given { numbers, from: meta.at(key) }))
+        Ok(numbers(meta, key)?.map(|numbers| Given { numbers, from: meta.location(key) }))
     };
     let mut pairs = vec![("default positions", Some(policy.default.clone()), list("default_joint_pos")?)];
     if let Some([stiffness, damping]) = &policy.gains {
@@ -138,13 +138,13 @@ pub(super) fn with_metadata(policy: &Policy, meta: &Document, named: bool) -> Re
         }
     }
     let key = "observation_names";
-    if named && meta.maybe(key, "a text", Node::text)?.is_some() {
+    if named && meta.optional(key, "a text", Node::text)?.is_some() {
         let (listed, own) = (names(meta, key)?, policy.terms.iter().map(|term| term.name.clone()).collect::<Vec<_>>());
         if listed != own {
             return Err(Facts::contradiction(
                 "terms of the observation",
                 (&policy.terms.first().map_or(String::new(), |term| term.from.clone()), &own.join(", ")),
-                (&meta.at(key), &listed.join(", ")),
+                (&meta.location(key), &listed.join(", ")),
             ));
         }
     }

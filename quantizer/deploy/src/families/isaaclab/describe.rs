@@ -113,7 +113,7 @@ impl Maker<'_> {
     /// Adds the action within its limit, if it has one and the rule holds.
     fn clip_action(&mut self, parts: &mut Parts) -> Result<()> {
         let Some(limit) = self.clip.take() else { return Ok(()) };
-        if self.facts.get("clip_actions")? {
+        if self.facts.value_or_default("clip_actions")? {
             let limits = [-limit.numbers[0], limit.numbers[0]].map(Operand::Number);
             parts.value(CLIPPED, ACTION, vec![Op::Clip(limits)]);
             self.facts.note(CLIPPED, format!("{}; {}", limit.from, self.facts.source("clip_actions")));
@@ -127,7 +127,7 @@ impl Maker<'_> {
         let total: usize = policy.actions.iter().map(|action| action.joints.len()).sum();
         let lens = self.lens(total)?;
         let is_open = self.is_open();
-        let clip_first: bool = self.facts.get("clip_first")?;
+        let clip_first: bool = self.facts.value_or_default("clip_first")?;
         let mut shown = Vec::new();
         for (term, len) in policy.terms.iter().zip(lens) {
             let (mut ops, source) = self.term(parts, term, len, total)?;
@@ -228,7 +228,7 @@ impl Maker<'_> {
                 let unit = if *len == 3 { "m/s, m/s, rad/s" } else { "" };
                 let mut ops = parts.input_as(&name, input, *len, unit);
                 if let Some(ranges) = ranges {
-                    if self.facts.get("clamp_commands")? {
+                    if self.facts.value_or_default("clamp_commands")? {
                         ops.extend(clip(ranges));
                     }
                     also(self.facts, "clamp_commands");
@@ -252,7 +252,7 @@ impl Maker<'_> {
                 ops
             }
             What::LastAction(places) => {
-                let is_processed = self.facts.chooses("last_action", "processed")?;
+                let is_processed = self.facts.is_choice("last_action", "processed")?;
                 also(self.facts, "last_action");
                 let next = if is_processed { "processed" } else { self.action };
                 let ops = parts.state(&name, total, next);
@@ -272,7 +272,7 @@ impl Maker<'_> {
     /// Adds what is made of the action, one target for each of its parts.
     fn targets(&mut self, parts: &mut Parts) -> Result<()> {
         let actions = &self.policy.actions;
-        let order: Option<String> = self.facts.find("action.clip")?;
+        let order: Option<String> = self.facts.value("action.clip")?;
         let mut made = Vec::new();
         for (i, (action, places)) in actions.iter().zip(parts_of(actions)).enumerate() {
             let suffix = if actions.len() == 1 { String::new() } else { format!("_{i}") };

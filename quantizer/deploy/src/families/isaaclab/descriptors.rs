@@ -13,23 +13,23 @@ use crate::yaml::Node;
 
 /// Returns `true` if a file has the keys of exported descriptors.
 pub(super) fn is_one(yaml: &Document) -> bool {
-    ["actions", "observations", "articulations", "scene.dt"].iter().all(|key| yaml.look(key).is_some())
+    ["actions", "observations", "articulations", "scene.dt"].iter().all(|key| yaml.peek(key).is_some())
 }
 
 /// Returns the order of the robot's joints.
 pub(super) fn joints(yaml: &Document, asset: &str) -> Result<Joints> {
     let path = format!("articulations.{asset}");
     ensure!(
-        yaml.look(&path).is_some(),
+        yaml.peek(&path).is_some(),
         "{} is missing; answer asset with one of {}",
-        yaml.at(&path),
+        yaml.location(&path),
         yaml.keys("articulations").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
     );
     for other in yaml.keys("articulations").into_iter().filter(|other| *other != asset) {
-        yaml.get(&format!("articulations.{other}"));
+        yaml.node(&format!("articulations.{other}"));
     }
     let path = format!("{path}.joint_names");
-    Joints::new(yaml.texts(&path)?, yaml.at(&path))
+    Joints::new(yaml.texts(&path)?, yaml.location(&path))
 }
 
 /// Reads a file.
@@ -41,11 +41,11 @@ pub(super) fn read(yaml: &Document, asset: &str, group: &str, joints: Joints) ->
         ensure!(
             numbers.len() == joints.len(),
             "{} has {} values, but joint_names {}",
-            yaml.at(&path),
+            yaml.location(&path),
             numbers.len(),
             joints.len()
         );
-        Ok(Given { numbers, from: yaml.at(&path) })
+        Ok(Given { numbers, from: yaml.location(&path) })
     };
     let (default, default_velocity) = (of_joints("default_joint_pos")?, of_joints("default_joint_vel")?);
     let gains = [of_joints("default_joint_stiffness")?, of_joints("default_joint_damping")?];
@@ -60,21 +60,26 @@ pub(super) fn read(yaml: &Document, asset: &str, group: &str, joints: Joints) ->
 fn rate(yaml: &Document) -> Result<Given> {
     let (dt, step, decimation) =
         (yaml.number("scene.dt")?, yaml.number("scene.physics_dt")?, yaml.number("scene.decimation")?);
-    ensure!((1e-6..1e6).contains(&dt), "{} = {dt}: give the seconds of a tick", yaml.at("scene.dt"));
+    ensure!((1e-6..1e6).contains(&dt), "{} = {dt}: give the seconds of a tick", yaml.location("scene.dt"));
     if (step * decimation - dt).abs() > 1e-6 * dt {
         return Err(Facts::contradiction(
             "time of a tick",
-            (&yaml.at("scene.dt"), &format!("{dt} s")),
-            (&yaml.at("scene.physics_dt"), &format!("{step} s, {decimation} times")),
+            (&yaml.location("scene.dt"), &format!("{dt} s")),
+            (&yaml.location("scene.physics_dt"), &format!("{step} s, {decimation} times")),
         ));
     }
-    Ok(Given { numbers: vec![1.0 / dt], from: yaml.at("scene.dt") })
+    Ok(Given { numbers: vec![1.0 / dt], from: yaml.location("scene.dt") })
 }
 
 /// Reads one number for all values or one for each; `otherwise` if it is not there.
 fn each(yaml: &Document, path: &str, len: usize, otherwise: f64) -> Result<Vec<f64>> {
-    let given = yaml.maybe(path, "finite numbers", numbers)?.unwrap_or_else(|| vec![otherwise]);
-    ensure!([1, len].contains(&given.len()), "{} has {} values; {len} joints are named", yaml.at(path), given.len());
+    let given = yaml.optional(path, "finite numbers", numbers)?.unwrap_or_else(|| vec![otherwise]);
+    ensure!(
+        [1, len].contains(&given.len()),
+        "{} has {} values; {len} joints are named",
+        yaml.location(path),
+        given.len()
+    );
     Ok(if given.len() == len { given } else { vec![given[0]; len] })
 }
 
@@ -82,51 +87,51 @@ fn actions(yaml: &Document, joints: &Joints) -> Result<Vec<Action>> {
     let mut actions = Vec::new();
     for item in yaml.keys("actions") {
         let of = |key: &str| format!("actions.{item}.{key}");
-        let name = yaml.need(&of("name"), "a name", Node::text)?;
-        plain(name, &yaml.at(&of("name")))?;
-        let kind = Kind::of(yaml.need(&of("full_path"), "a class", Node::text)?, &yaml.at(&of("full_path")))?;
+        let name = yaml.required(&of("name"), "a name", Node::text)?;
+        plain(name, &yaml.location(&of("name")))?;
+        let kind = Kind::of(yaml.required(&of("full_path"), "a class", Node::text)?, &yaml.location(&of("full_path")))?;
         let names = yaml.texts(&of("joint_names"))?;
-        let places = joints.places(&names, &yaml.at(&of("joint_names")))?;
-        ensure!(!places.is_empty(), "{} is empty", yaml.at(&of("joint_names")));
-        if let Some(len) = yaml.maybe(&of("shape"), "the number of values, as a list", one)? {
+        let places = joints.places(&names, &yaml.location(&of("joint_names")))?;
+        ensure!(!places.is_empty(), "{} is empty", yaml.location(&of("joint_names")));
+        if let Some(len) = yaml.optional(&of("shape"), "the number of values, as a list", one)? {
             ensure!(
                 len == places.len(),
                 "{} = [{len}], but joint_names has {} names",
-                yaml.at(&of("shape")),
+                yaml.location(&of("shape")),
                 places.len()
             );
         }
         let scale = each(yaml, &of("scale"), places.len(), 1.0)?;
         let offset = each(yaml, &of("offset"), places.len(), 0.0)?;
         let pairs = |node: &Node| node.items().iter().map(bounds).collect::<Option<Vec<_>>>();
-        let clip = yaml.maybe(&of("clip"), "pairs of numbers", pairs)?;
+        let clip = yaml.optional(&of("clip"), "pairs of numbers", pairs)?;
         if let Some(clip) = &clip {
             ensure!(
                 clip.len() == places.len(),
                 "{} has {} pairs; {} joints are named",
-                yaml.at(&of("clip")),
+                yaml.location(&of("clip")),
                 clip.len(),
                 places.len()
             );
         }
-        let from = yaml.at(&format!("actions.{item}"));
+        let from = yaml.location(&format!("actions.{item}"));
         actions.push(Action { name: name.to_owned(), kind, joints: places, scale, offset, clip, from });
     }
-    ensure!(!actions.is_empty(), "{} has no actions", yaml.at("actions"));
+    ensure!(!actions.is_empty(), "{} has no actions", yaml.location("actions"));
     Ok(actions)
 }
 
 fn terms(yaml: &Document, group: &str, joints: &Joints, actions: &[Action]) -> Result<Vec<Term>> {
     let group = format!("observations.{group}");
     ensure!(
-        yaml.look(&group).is_some(),
+        yaml.peek(&group).is_some(),
         "{} is missing; answer group with one of {}",
-        yaml.at(&group),
+        yaml.location(&group),
         yaml.keys("observations").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
     );
     for other in yaml.keys("observations").into_iter().map(|other| format!("observations.{other}")) {
         if other != group {
-            yaml.get(&other);
+            yaml.node(&other);
         }
     }
     let total = actions.iter().map(|action| action.joints.len()).sum();
@@ -141,10 +146,10 @@ fn terms(yaml: &Document, group: &str, joints: &Joints, actions: &[Action]) -> R
 /// Reads a term. `total` is the length of the action, and `before` are the terms before this one.
 fn term(yaml: &Document, path: &str, joints: &Joints, total: usize, before: &[Term]) -> Result<Term> {
     let of = |key: &str| format!("{path}.{key}");
-    let name = yaml.need(&of("name"), "a name", Node::text)?;
-    plain(name, &yaml.at(&of("name")))?;
-    let function = yaml.need(&of("full_path"), "a function", Node::text)?.to_owned();
-    let len = yaml.need(&of("shape"), "the number of values, as a list", one)?;
+    let name = yaml.required(&of("name"), "a name", Node::text)?;
+    plain(name, &yaml.location(&of("name")))?;
+    let function = yaml.required(&of("full_path"), "a function", Node::text)?.to_owned();
+    let len = yaml.required(&of("shape"), "the number of values, as a list", one)?;
     let (what, relative) = match content(name, &function, len, total) {
         _ if has_modifiers(yaml, path) => {
             let why = format!("term {name:?} has modifiers, which this reader does not know");
@@ -169,13 +174,13 @@ fn term(yaml: &Document, path: &str, joints: &Joints, total: usize, before: &[Te
         function,
         joints: places,
         offset,
-        clip: yaml.maybe(&of("overloads.clip"), "two numbers", bounds)?,
-        scale: yaml.maybe(&of("overloads.scale"), "finite numbers", numbers)?,
+        clip: yaml.optional(&of("overloads.clip"), "two numbers", bounds)?,
+        scale: yaml.optional(&of("overloads.scale"), "finite numbers", numbers)?,
         frames: history(yaml, &of("overloads"))?,
-        from: yaml.at(path),
+        from: yaml.location(path),
     };
     let own = term.len(total).unwrap_or(len);
-    ensure!(own == len, "{} = [{len}], but the term has {own} values", yaml.at(&of("shape")));
+    ensure!(own == len, "{} = [{len}], but the term has {own} values", yaml.location(&of("shape")));
     Ok(term)
 }
 
@@ -196,7 +201,7 @@ fn content(name: &str, function: &str, len: usize, total: usize) -> Result<(What
 }
 
 fn has_modifiers(yaml: &Document, path: &str) -> bool {
-    let modifiers = yaml.get(&format!("{path}.extras.modifiers"));
+    let modifiers = yaml.node(&format!("{path}.extras.modifiers"));
     modifiers.is_some_and(|node| !node.items().is_empty() || !node.entries().is_empty())
 }
 
@@ -208,14 +213,14 @@ fn observed_joints(
     relative: Option<&str>,
 ) -> Result<(Vec<usize>, Vec<f64>)> {
     let of = |key: &str| format!("{path}.{key}");
-    let places = joints.places(&yaml.texts(&of("joint_names"))?, &yaml.at(&of("joint_names")))?;
+    let places = joints.places(&yaml.texts(&of("joint_names"))?, &yaml.location(&of("joint_names")))?;
     let Some(input) = relative else { return Ok((places, Vec::new())) };
     let key = if input == "joint_pos" { "joint_pos_offsets" } else { "joint_vel_offsets" };
     let offset = yaml.numbers(&of(key))?;
     ensure!(
         offset.len() == places.len(),
         "{} has {} values, but joint_names {}",
-        yaml.at(&of(key)),
+        yaml.location(&of(key)),
         offset.len(),
         places.len()
     );

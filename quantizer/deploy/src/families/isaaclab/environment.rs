@@ -17,8 +17,8 @@ const SETTINGS: [&str; 5] =
 
 /// Returns `true` if a file has the keys of an environment.
 pub(super) fn is_one(yaml: &Document) -> bool {
-    let has_terms = |path| yaml.look(path).is_some_and(|node| !node.entries().is_empty());
-    ["decimation", "sim.dt", "scene"].iter().all(|key| yaml.look(key).is_some())
+    let has_terms = |path| yaml.peek(path).is_some_and(|node| !node.entries().is_empty());
+    ["decimation", "sim.dt", "scene"].iter().all(|key| yaml.peek(key).is_some())
         && has_terms("observations")
         && has_terms("actions")
 }
@@ -40,14 +40,14 @@ impl Environment<'_> {
         ensure!(
             (1e-6..1e3).contains(&dt) && (1.0..1e6).contains(&decimation),
             "{} = {dt} and decimation = {decimation}: give the seconds of a simulation's step, and steps in a tick",
-            yaml.at("sim.dt")
+            yaml.location("sim.dt")
         );
         let robot = |key: &str| format!("scene.{}.{key}", self.asset);
         let path = robot("init_state");
         ensure!(
-            yaml.look(&path).is_some(),
+            yaml.peek(&path).is_some(),
             "{} is missing; answer asset with the name of the robot in the scene: {}",
-            yaml.at(&path),
+            yaml.location(&path),
             yaml.keys("scene").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
         );
         let pose = |key: &str, facts: &mut Facts| {
@@ -56,25 +56,25 @@ impl Environment<'_> {
                 numbers: self
                     .by_joint(&path, &self.joints, 0.0, facts)?
                     .unwrap_or_else(|| vec![0.0; self.joints.len()]),
-                from: yaml.at(&path),
+                from: yaml.location(&path),
             })
         };
         let (default, default_velocity) = (pose("joint_pos", facts)?, pose("joint_vel", facts)?);
         let gains = self.gains(&robot("actuators"), facts)?;
         // The rest of the robot is for the simulation.
-        yaml.get(&format!("scene.{}", self.asset));
+        yaml.node(&format!("scene.{}", self.asset));
         let actions = self.actions(&default, &default_velocity, facts)?;
         let terms = self.terms(&actions, &default, &default_velocity)?;
         let rate = Given {
             numbers: vec![1.0 / (dt * decimation)],
-            from: format!("{}; {}", yaml.at("sim.dt"), yaml.at("decimation")),
+            from: format!("{}; {}", yaml.location("sim.dt"), yaml.location("decimation")),
         };
         Ok(Policy { rate, decimation, joints: self.joints, default, default_velocity, gains, terms, actions })
     }
 
     /// Reads a number for all joints, or numbers by pattern; `otherwise` is that of joints that none matches.
     fn by_joint(&self, path: &str, joints: &Joints, otherwise: f64, facts: &mut Facts) -> Result<Option<Vec<f64>>> {
-        let Some(node) = self.yaml.get(path) else { return Ok(None) };
+        let Some(node) = self.yaml.node(path) else { return Ok(None) };
         let what = "a finite number, or finite numbers by patterns of joints";
         if let Some(number) = node.number() {
             return Ok(Some(vec![number; joints.len()]));
@@ -82,8 +82,9 @@ impl Environment<'_> {
         let pairs = node.entries().iter().map(|(pattern, number)| Some((pattern.clone(), number.number()?)));
         let pairs: Option<Vec<(String, f64)>> = pairs.collect();
         let pairs = pairs.filter(|pairs| !pairs.is_empty());
-        let pairs = pairs.with_context(|| format!("{} (line {}) must be {what}", self.yaml.at(path), node.line))?;
-        let found = joints.resolve(&pairs, &self.yaml.at(path))?;
+        let pairs =
+            pairs.with_context(|| format!("{} (line {}) must be {what}", self.yaml.location(path), node.line))?;
+        let found = joints.resolve(&pairs, &self.yaml.location(path))?;
         self.unmatched(&found, joints, path, facts)?;
         Ok(Some(found.into_iter().map(|number| number.unwrap_or(otherwise)).collect()))
     }
@@ -91,11 +92,11 @@ impl Environment<'_> {
     /// Asks for the rule of joints that no pattern matches, if there are some.
     fn unmatched<T>(&self, found: &[Option<T>], joints: &Joints, path: &str, facts: &mut Facts) -> Result<()> {
         let Some(place) = found.iter().position(Option::is_none) else { return Ok(()) };
-        let holds: Option<bool> = facts.find("unmatched")?;
+        let holds: Option<bool> = facts.value("unmatched")?;
         ensure!(
             joints.open || holds != Some(false),
             "{}: no pattern matches joint {:?}; add one",
-            self.yaml.at(path),
+            self.yaml.location(path),
             joints.names[place]
         );
         Ok(())
@@ -104,14 +105,16 @@ impl Environment<'_> {
     /// Reads the gains of all actuators; nothing if the USD file has some of them.
     fn gains(&self, path: &str, facts: &mut Facts) -> Result<Option<[Given; 2]>> {
         let yaml = self.yaml;
-        let mut gains = ["stiffness", "damping"]
-            .map(|key| Given { numbers: vec![0.0; self.joints.len()], from: yaml.at(&format!("{path}.*.{key}")) });
+        let mut gains = ["stiffness", "damping"].map(|key| Given {
+            numbers: vec![0.0; self.joints.len()],
+            from: yaml.location(&format!("{path}.*.{key}")),
+        });
         let mut actuated = vec![None; self.joints.len()];
         let mut is_complete = !yaml.keys(path).is_empty();
         for actuator in yaml.keys(path) {
             let of = |key: &str| format!("{path}.{actuator}.{key}");
             let patterns = texts(yaml, &of("joint_names_expr"))?;
-            let at = yaml.at(&of("joint_names_expr"));
+            let at = yaml.location(&of("joint_names_expr"));
             let places = self.joints.select(&patterns.with_context(|| format!("{at} is missing"))?, false, &at)?;
             for place in &places {
                 ensure!(
@@ -142,30 +145,30 @@ impl Environment<'_> {
         let mut actions = Vec::new();
         for name in yaml.keys("actions") {
             let of = |key: &str| format!("actions.{name}.{key}");
-            let from = yaml.at(&format!("actions.{name}"));
-            if yaml.look(&format!("actions.{name}")).is_some_and(Node::is_null) {
-                yaml.get(&format!("actions.{name}"));
+            let from = yaml.location(&format!("actions.{name}"));
+            if yaml.peek(&format!("actions.{name}")).is_some_and(Node::is_null) {
+                yaml.node(&format!("actions.{name}"));
                 continue;
             }
             plain(name, &from)?;
-            let class = yaml.need(&of("class_type"), "a class", Node::text)?;
-            let kind = Kind::of(&class.replace(':', "."), &yaml.at(&of("class_type")))?;
-            let asset = yaml.need(&of("asset_name"), "the name of the robot", Node::text)?;
+            let class = yaml.required(&of("class_type"), "a class", Node::text)?;
+            let kind = Kind::of(&class.replace(':', "."), &yaml.location(&of("class_type")))?;
+            let asset = yaml.required(&of("asset_name"), "the name of the robot", Node::text)?;
             ensure!(
                 asset == self.asset,
                 "{} = {:?}: the robot is {:?}; answer asset with its name in the scene",
-                yaml.at(&of("asset_name")),
+                yaml.location(&of("asset_name")),
                 printable(asset),
                 self.asset
             );
             let path = of("joint_names");
-            let patterns = texts(yaml, &path)?.with_context(|| format!("{} is missing", yaml.at(&path)))?;
-            let in_their_order = yaml.maybe(&of("preserve_order"), "true or false", Node::truth)?.unwrap_or(false);
-            let places = self.joints.select(&patterns, in_their_order, &yaml.at(&path))?;
+            let patterns = texts(yaml, &path)?.with_context(|| format!("{} is missing", yaml.location(&path)))?;
+            let in_their_order = yaml.optional(&of("preserve_order"), "true or false", Node::truth)?.unwrap_or(false);
+            let places = self.joints.select(&patterns, in_their_order, &yaml.location(&path))?;
             let joints = self.joints.at(&places);
             let scale = self.by_joint(&of("scale"), &joints, 1.0, facts)?.unwrap_or_else(|| vec![1.0; joints.len()]);
             let own = self.by_joint(&of("offset"), &joints, 0.0, facts)?.unwrap_or_else(|| vec![0.0; joints.len()]);
-            let needs = |key: &str| yaml.need(&of(key), "true or false", Node::truth);
+            let needs = |key: &str| yaml.required(&of(key), "true or false", Node::truth);
             let of_default = |all: &Given| places.iter().map(|place| all.numbers[*place]).collect();
             let offset = match kind {
                 Kind::Position if needs("use_default_offset")? => of_default(default),
@@ -176,19 +179,19 @@ impl Environment<'_> {
             let clip = self.clip(&of("clip"), &joints)?;
             actions.push(Action { name: name.to_owned(), kind, joints: places, scale, offset, clip, from });
         }
-        ensure!(!actions.is_empty(), "{} has no actions", yaml.at("actions"));
+        ensure!(!actions.is_empty(), "{} has no actions", yaml.location("actions"));
         Ok(actions)
     }
 
     /// Reads the limits of an action by patterns of its joints.
     fn clip(&self, path: &str, joints: &Joints) -> Result<Option<Vec<[f64; 2]>>> {
-        let Some(node) = self.yaml.get(path) else { return Ok(None) };
+        let Some(node) = self.yaml.node(path) else { return Ok(None) };
         let pairs = node.entries().iter().map(|(pattern, pair)| Some((pattern.clone(), bounds(pair)?)));
         let pairs: Option<Vec<(String, [f64; 2])>> = pairs.collect();
         let pairs = pairs.filter(|pairs| !pairs.is_empty()).with_context(|| {
-            format!("{} (line {}) must be pairs of numbers by patterns of joints", self.yaml.at(path), node.line)
+            format!("{} (line {}) must be pairs of numbers by patterns of joints", self.yaml.location(path), node.line)
         })?;
-        let found = joints.resolve(&pairs, &self.yaml.at(path))?;
+        let found = joints.resolve(&pairs, &self.yaml.location(path))?;
         Ok(Some(found.into_iter().map(|pair| pair.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])).collect()))
     }
 
@@ -196,17 +199,21 @@ impl Environment<'_> {
     fn check_group(&self, group: &str) -> Result<()> {
         let yaml = self.yaml;
         ensure!(
-            yaml.look(group).is_some_and(|node| !node.is_null()),
+            yaml.peek(group).is_some_and(|node| !node.is_null()),
             "{} is missing; answer group with one of {}",
-            yaml.at(group),
+            yaml.location(group),
             yaml.keys("observations").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
         );
         for other in yaml.keys("observations").into_iter().filter(|other| *other != self.group) {
-            yaml.get(&format!("observations.{other}"));
+            yaml.node(&format!("observations.{other}"));
         }
         let path = format!("{group}.concatenate_terms");
-        let joined = yaml.maybe(&path, "true or false", Node::truth)?.unwrap_or(true);
-        ensure!(joined, "{} = false: the policy reads each term by itself, which is not supported", yaml.at(&path));
+        let joined = yaml.optional(&path, "true or false", Node::truth)?.unwrap_or(true);
+        ensure!(
+            joined,
+            "{} = false: the policy reads each term by itself, which is not supported",
+            yaml.location(&path)
+        );
         Ok(())
     }
 
@@ -215,23 +222,23 @@ impl Environment<'_> {
         let (yaml, group) = (self.yaml, format!("observations.{}", self.group));
         let in_group = |key: &str| format!("{group}.{key}");
         self.check_group(&group)?;
-        let has_history = yaml.maybe(&in_group("history_length"), "a number of frames", count)?.is_some();
+        let has_history = yaml.optional(&in_group("history_length"), "a number of frames", count)?.is_some();
         let mut terms = Vec::new();
         for name in yaml.keys(&group).into_iter().filter(|name| !SETTINGS.contains(name)) {
             let path = in_group(name);
-            if yaml.look(&path).is_some_and(Node::is_null) {
-                yaml.get(&path);
+            if yaml.peek(&path).is_some_and(Node::is_null) {
+                yaml.node(&path);
                 continue;
             }
             let mut term = self.term(name, &path, actions, [default, default_velocity])?;
             // A group's settings replace those of its terms.
             term.frames = history(yaml, if has_history { &group } else { &path })?;
             for key in ["history_length", "flatten_history_dim"] {
-                yaml.get(&format!("{path}.{key}"));
+                yaml.node(&format!("{path}.{key}"));
             }
             terms.push(term);
         }
-        yaml.get(&in_group("flatten_history_dim"));
+        yaml.node(&in_group("flatten_history_dim"));
         Ok(terms)
     }
 
@@ -239,12 +246,12 @@ impl Environment<'_> {
     fn term(&self, name: &str, path: &str, actions: &[Action], defaults: [&Given; 2]) -> Result<Term> {
         let yaml = self.yaml;
         let of = |key: &str| format!("{path}.{key}");
-        plain(name, &yaml.at(path))?;
-        let function = yaml.need(&of("func"), "a function", Node::text)?.replace(':', ".");
+        plain(name, &yaml.location(path))?;
+        let function = yaml.required(&of("func"), "a function", Node::text)?.replace(':', ".");
         let (what, relative) = self.what(name, &function, path, actions)?;
         let joints =
             if matches!(what, What::Joints(..)) { self.observed(&of("params.asset_cfg"))? } else { Vec::new() };
-        yaml.get(&of("params"));
+        yaml.node(&of("params"));
         let [default, default_velocity] = defaults;
         let offset = match what {
             What::Joints("joint_pos", _) if relative => joints.iter().map(|place| default.numbers[*place]).collect(),
@@ -257,10 +264,10 @@ impl Environment<'_> {
             what,
             joints,
             offset,
-            clip: yaml.maybe(&of("clip"), "two numbers", bounds)?,
-            scale: yaml.maybe(&of("scale"), "finite numbers", numbers)?,
+            clip: yaml.optional(&of("clip"), "two numbers", bounds)?,
+            scale: yaml.optional(&of("scale"), "finite numbers", numbers)?,
             frames: 1,
-            from: yaml.at(path),
+            from: yaml.location(path),
         })
     }
 
@@ -268,12 +275,12 @@ impl Environment<'_> {
     fn what(&self, name: &str, function: &str, path: &str, actions: &[Action]) -> Result<(What, bool)> {
         let yaml = self.yaml;
         let unknown = |why: String| Ok((What::Unknown(why, None), false));
-        let modifiers = yaml.get(&format!("{path}.modifiers"));
+        let modifiers = yaml.node(&format!("{path}.modifiers"));
         if modifiers.is_some_and(|node| !node.items().is_empty() || !node.entries().is_empty()) {
             return unknown(format!("term {name:?} has modifiers, which this reader does not know"));
         }
-        let param = |key: &str| yaml.get(&format!("{path}.params.{key}"));
-        let text = |key: &str| yaml.maybe(&format!("{path}.params.{key}"), "a name", Node::text);
+        let param = |key: &str| yaml.node(&format!("{path}.params.{key}"));
+        let text = |key: &str| yaml.optional(&format!("{path}.params.{key}"), "a name", Node::text);
         let own = yaml.keys(&format!("{path}.params"));
         let other = own.iter().find(|key| !["asset_cfg", "command_name", "action_name"].contains(*key));
         if let Some(other) = other.filter(|other| param(other).is_some()) {
@@ -288,7 +295,7 @@ impl Environment<'_> {
                 let Some(of) = text("action_name")? else { return Ok((What::LastAction(None), false)) };
                 let part = actions.iter().position(|action| action.name == of);
                 let part = part.with_context(|| {
-                    format!("{}.params.action_name = {:?}: there is no such action", yaml.at(path), printable(of))
+                    format!("{}.params.action_name = {:?}: there is no such action", yaml.location(path), printable(of))
                 })?;
                 Ok((What::LastAction(parts_of(actions).into_iter().nth(part)), false))
             }
@@ -314,7 +321,8 @@ impl Environment<'_> {
     /// Returns a velocity command with its ranges; any other command is unknown.
     fn command(&self, command: &str, term: &str) -> Result<(What, bool)> {
         let yaml = self.yaml;
-        let class = yaml.maybe(&format!("commands.{command}.class_type"), "a class", Node::text)?.unwrap_or_default();
+        let class =
+            yaml.optional(&format!("commands.{command}.class_type"), "a class", Node::text)?.unwrap_or_default();
         let class = class.replace(':', ".");
         let is_velocity = MODULES.iter().any(|module| {
             let own = class.strip_prefix(module).and_then(|rest| rest.strip_prefix("commands.velocity_command."));
@@ -324,8 +332,8 @@ impl Environment<'_> {
             let why = format!("command {:?} of term {term:?} is not one of Isaac Lab's velocities", printable(command));
             return Ok((What::Unknown(why, None), false));
         }
-        plain(command, &yaml.at("commands"))?;
-        let range = |axis: &str| yaml.maybe(&format!("commands.{command}.ranges.{axis}"), "two numbers", bounds);
+        plain(command, &yaml.location("commands"))?;
+        let range = |axis: &str| yaml.optional(&format!("commands.{command}.ranges.{axis}"), "two numbers", bounds);
         let ranges = [range("lin_vel_x")?, range("lin_vel_y")?, range("ang_vel_z")?];
         Ok((What::Command(command.to_owned(), 3, ranges.into_iter().collect()), false))
     }
@@ -335,24 +343,24 @@ impl Environment<'_> {
         let yaml = self.yaml;
         let (names, ids) = (format!("{path}.joint_names"), format!("{path}.joint_ids"));
         let in_their_order = format!("{path}.preserve_order");
-        let in_their_order = yaml.maybe(&in_their_order, "true or false", Node::truth)?.unwrap_or(false);
+        let in_their_order = yaml.optional(&in_their_order, "true or false", Node::truth)?.unwrap_or(false);
         let places = match texts(yaml, &names)? {
-            Some(patterns) => self.joints.select(&patterns, in_their_order, &yaml.at(&names))?,
+            Some(patterns) => self.joints.select(&patterns, in_their_order, &yaml.location(&names))?,
             None => (0..self.joints.len()).collect(),
         };
         // A slice of all joints is a list of three nothings.
-        let listed = yaml.get(&ids).filter(|node| node.items().iter().any(|item| !item.is_null()));
+        let listed = yaml.node(&ids).filter(|node| node.items().iter().any(|item| !item.is_null()));
         let Some(listed) = listed else { return Ok(places) };
         let listed: Option<Vec<usize>> = listed.items().iter().map(count).collect();
-        let listed = listed.with_context(|| format!("{} must be places of joints", yaml.at(&ids)))?;
+        let listed = listed.with_context(|| format!("{} must be places of joints", yaml.location(&ids)))?;
         if self.joints.open {
             return Ok(listed.iter().map(|_| 0).collect());
         }
-        if yaml.get(&names).is_none() {
+        if yaml.node(&names).is_none() {
             ensure!(
                 listed.iter().all(|place| *place < self.joints.len()) && listed.len() <= self.joints.len(),
                 "{}: the robot has {} joints ({})",
-                yaml.at(&ids),
+                yaml.location(&ids),
                 self.joints.len(),
                 self.joints.from
             );
@@ -361,8 +369,8 @@ impl Environment<'_> {
         if listed != places {
             return Err(Facts::contradiction(
                 "joints of a term",
-                (&yaml.at(&ids), &format!("{listed:?}")),
-                (&format!("{} with the joints of {}", yaml.at(&names), self.joints.from), &format!("{places:?}")),
+                (&yaml.location(&ids), &format!("{listed:?}")),
+                (&format!("{} with the joints of {}", yaml.location(&names), self.joints.from), &format!("{places:?}")),
             ));
         }
         Ok(places)
@@ -372,9 +380,9 @@ impl Environment<'_> {
 /// Reads a text or a list of texts, if it is there.
 fn texts(yaml: &Document, path: &str) -> Result<Option<Vec<String>>> {
     let one_or_more = |node: &Node| node.texts().or_else(|| Some(vec![node.text()?.to_owned()]));
-    let texts = yaml.maybe(path, "a text or a list of texts", one_or_more)?;
+    let texts = yaml.optional(path, "a text or a list of texts", one_or_more)?;
     if texts.as_ref().is_some_and(Vec::is_empty) {
-        bail!("{} is empty", yaml.at(path));
+        bail!("{} is empty", yaml.location(path));
     }
     Ok(texts)
 }

@@ -29,9 +29,13 @@ pub(super) fn numbers(node: &Node) -> Option<Vec<f64>> {
 /// Reads the number of frames that a term or a group observes.
 pub(super) fn history(yaml: &Document, at: &str) -> Result<usize> {
     let (length, flat) = (format!("{at}.history_length"), format!("{at}.flatten_history_dim"));
-    let frames = yaml.maybe(&length, "a number of frames", count)?.unwrap_or(0).max(1);
-    ensure!(frames <= MOST_FRAMES, "{} = {frames}: at most {MOST_FRAMES} frames are read", yaml.at(&length));
-    let is_flat = yaml.maybe(&flat, "true or false", Node::truth)?.unwrap_or(true);
-    ensure!(frames == 1 || is_flat, "{} = false: a history with an axis of its own is not supported", yaml.at(&flat));
+    let frames = yaml.optional(&length, "a number of frames", count)?.unwrap_or(0).max(1);
+    ensure!(frames <= MOST_FRAMES, "{} = {frames}: at most {MOST_FRAMES} frames are read", yaml.location(&length));
+    let is_flat = yaml.optional(&flat, "true or false", Node::truth)?.unwrap_or(true);
+    ensure!(
+        frames == 1 || is_flat,
+        "{} = false: a history with an axis of its own is not supported",
+        yaml.location(&flat)
+    );
     Ok(frames)
 }

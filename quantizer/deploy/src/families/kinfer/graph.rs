@@ -50,7 +50,7 @@ impl Graph {
         }
         Err(Facts::contradiction(
             "inputs",
-            (&meta.at("input_params"), &named.join(", ")),
+            (&meta.location("input_params"), &named.join(", ")),
             (&self.file, &here.join(", ")),
         ))
     }
@@ -88,7 +88,7 @@ impl Outputs {
         let key = "states.buffer";
         let by_length = |(name, other): &&(String, usize)| other == len && *name != action && *name != scaled;
         let candidates: Vec<&str> = graph.outputs.iter().filter(by_length).map(|(name, _)| name.as_str()).collect();
-        let buffer = match (facts.find::<String>(key)?.as_deref(), &candidates[..]) {
+        let buffer = match (facts.value::<String>(key)?.as_deref(), &candidates[..]) {
             (Some("by length"), [only]) => Some((*only).to_owned()),
             (Some("by length"), []) => bail!(
                 "{}: the input {:?} has {len} values, and no other output has that length ({}); its next value is lost",
@@ -126,7 +126,7 @@ impl Outputs {
     fn choose(graph: &Graph, key: &str, facts: &mut Facts) -> Result<String> {
         let has = |name: &&String| graph.outputs.iter().any(|(output, _)| output == *name);
         let first = graph.outputs.first().with_context(|| format!("{}: it has no outputs", graph.file))?;
-        match facts.find::<Choice>(key)? {
+        match facts.value::<Choice>(key)? {
             None => Ok(first.0.clone()),
             Some(Choice::One(name)) => graph.output(&name).map(|_| name),
             Some(Choice::First(names)) => {

@@ -34,7 +34,7 @@ pub(super) fn inputs(
         }
     }
     if !BUFFERS.iter().any(|name| graph.has_input(name)) {
-        meta.get("num_observations");
+        meta.node("num_observations");
     }
     Ok(network)
 }
@@ -77,11 +77,11 @@ impl Inputs<'_> {
         if !BUFFERS.contains(&name) {
             return Ok(false);
         }
-        let given = self.meta.maybe("num_observations", "a number", Node::number)?;
+        let given = self.meta.optional("num_observations", "a number", Node::number)?;
         if let Some(given) = given.filter(|given| *given != len as f64) {
             return Err(Facts::contradiction(
                 "length of the history",
-                (&self.meta.at("num_observations"), &given.to_string()),
+                (&self.meta.location("num_observations"), &given.to_string()),
                 (&self.at(input), &len.to_string()),
             ));
         }
@@ -103,7 +103,7 @@ impl Inputs<'_> {
             "imu_lin_acc" => raw(self.parts, name, len, "m/s2"),
             "t" | "timestamp" => {
                 let value = self.time(name)?;
-                source = format!("{}; {}", self.meta.at("sim_dt"), self.facts.source("clock"));
+                source = format!("{}; {}", self.meta.location("sim_dt"), self.facts.source("clock"));
                 value
             }
             "dof_pos" => {
@@ -135,7 +135,7 @@ impl Inputs<'_> {
 
     /// Adds the time, as a raw input or a clock; returns the name of its value.
     fn time(&mut self, name: &str) -> Result<String> {
-        if self.facts.chooses("clock", "raw")? {
+        if self.facts.is_choice("clock", "raw")? {
             return Ok(raw(self.parts, name, 1, "s"));
         }
         self.parts.clock(Clock::from_zero(name, self.period, When::After));
@@ -145,7 +145,7 @@ impl Inputs<'_> {
     /// Adds the joints' positions; returns the name of their value, which may be relative to the default.
     fn position(&mut self, name: &str) -> Result<String> {
         self.parts.raw_joints(name, "robot", "rad");
-        if !self.facts.get::<bool>("dof_pos.relative")? {
+        if !self.facts.value_or_default::<bool>("dof_pos.relative")? {
             return Ok(name.to_owned());
         }
         self.parts.value("relative_dof_pos", name, vec![Op::Subtract(Operand::Name("default".to_owned()))]);
@@ -167,7 +167,7 @@ fn state(
     output: &str,
     facts: &mut Facts,
 ) -> Result<()> {
-    let start: f64 = facts.get("states.start")?;
+    let start: f64 = facts.value_or_default("states.start")?;
     if start == 0.0 {
         network.states.insert(input.to_owned(), output.to_owned());
     } else {

@@ -13,13 +13,13 @@ use crate::yaml::Node;
 /// Returns the joints' names: those of the MuJoCo file, or of the metadata.
 pub(super) fn joint_names(meta: &Document, robot: Option<&Robot>, n: usize, facts: &mut Facts) -> Result<Vec<String>> {
     let path = "joint_names";
-    let stated = meta.maybe(path, "a list of names", Node::texts)?;
+    let stated = meta.optional(path, "a list of names", Node::texts)?;
     if let Some(stated) = &stated {
-        ensure!(stated.len() == n, "{} has {} names, and there are {n} actions", meta.at(path), stated.len());
+        ensure!(stated.len() == n, "{} has {} names, and there are {n} actions", meta.location(path), stated.len());
     }
     let (names, source) = match (robot, stated) {
         (Some(robot), None) => (robot.joints.clone(), robot.file.clone()),
-        (None, Some(stated)) => (stated, meta.at(path)),
+        (None, Some(stated)) => (stated, meta.location(path)),
         (Some(robot), Some(stated)) => {
             if let Some(i) = (0..n).find(|&i| stated.get(i) != robot.joints.get(i)) {
                 let shown = |names: &[String]| {
@@ -28,11 +28,11 @@ pub(super) fn joint_names(meta: &Document, robot: Option<&Robot>, n: usize, fact
                 };
                 return Err(Facts::contradiction(
                     "order of the joints",
-                    (&meta.at(path), &shown(&stated)),
+                    (&meta.location(path), &shown(&stated)),
                     (&robot.file, &shown(&robot.joints)),
                 ));
             }
-            (stated, format!("{}; {}", meta.at(path), robot.file))
+            (stated, format!("{}; {}", meta.location(path), robot.file))
         }
         (None, None) => {
             let names: Option<Vec<String>> = facts.missing(
@@ -59,16 +59,17 @@ enum Pose {
 /// Returns the default pose.
 pub(super) fn default_pose(meta: &Document, robot: Option<&Robot>, n: usize, facts: &mut Facts) -> Result<Vec<f64>> {
     let key = "default_pose";
-    let standing = meta.maybe("default_standing", "numbers", Node::numbers)?;
-    let rule: Option<Pose> = facts.find(key)?;
+    let standing = meta.optional("default_standing", "numbers", Node::numbers)?;
+    let rule: Option<Pose> = facts.value(key)?;
     let (pose, source) = match rule {
         Some(Pose::Numbers(numbers)) => (numbers, facts.source(key)),
         Some(Pose::Of(of)) if of == "default_standing" => {
-            let standing = standing.clone().with_context(|| format!("{} is missing", meta.at("default_standing")))?;
-            (standing, format!("{}; {}", meta.at("default_standing"), facts.source(key)))
+            let standing =
+                standing.clone().with_context(|| format!("{} is missing", meta.location("default_standing")))?;
+            (standing, format!("{}; {}", meta.location("default_standing"), facts.source(key)))
         }
         Some(Pose::Of(of)) if of == "keyframe" => {
-            let name: Option<String> = facts.find("keyframe")?;
+            let name: Option<String> = facts.value("keyframe")?;
             let keyframe = match (&name, robot) {
                 (Some(name), Some(robot)) => robot.keyframe(name)?,
                 _ => None,
@@ -95,8 +96,11 @@ pub(super) fn default_pose(meta: &Document, robot: Option<&Robot>, n: usize, fac
     };
     ensure!(pose.len() == n, "the default pose ({source}) has {} values, and there are {n} actions", pose.len());
     let differs = standing.is_some_and(|standing| standing != pose);
-    let other =
-        if differs { format!(" ({} differs, and is not used)", meta.at("default_standing")) } else { String::new() };
+    let other = if differs {
+        format!(" ({} differs, and is not used)", meta.location("default_standing"))
+    } else {
+        String::new()
+    };
     facts.note("default", format!("{source}{other}"));
     Ok(pose)
 }
@@ -105,12 +109,12 @@ pub(super) fn default_pose(meta: &Document, robot: Option<&Robot>, n: usize, fac
 pub(super) fn gains(meta: &Document, joints: &[String], facts: &mut Facts) -> Result<Option<Gains>> {
     let mut lists = Vec::new();
     for path in ["robot_stiffness", "robot_damping"] {
-        let Some(node) = meta.get(path) else { return Ok(None) };
+        let Some(node) = meta.node(path) else { return Ok(None) };
         // Which joint a gain belongs to is not known before the joints' names are.
         if facts.is_open("joints.names") {
             continue;
         }
-        let wrong = || format!("{} must be finite numbers", meta.at(path));
+        let wrong = || format!("{} must be finite numbers", meta.location(path));
         let kinds: Option<Vec<f64>> = node.entries().iter().map(|(_, kind)| kind.number()).collect();
         let numbers = node.numbers().or(kinds.filter(|kinds| !kinds.is_empty())).with_context(wrong)?;
         let by_name: Option<Vec<f64>> = joints.iter().map(|joint| node.get(joint)?.number()).collect();
@@ -122,12 +126,12 @@ pub(super) fn gains(meta: &Document, joints: &[String], facts: &mut Facts) -> Re
                 let fits = |places: &Vec<usize>| {
                     places.len() == joints.len() && places.iter().all(|place| *place < numbers.len())
                 };
-                let places: Option<Vec<usize>> = facts.find(key)?;
+                let places: Option<Vec<usize>> = facts.value(key)?;
                 let places = match places {
                     Some(places) if !fits(&places) => {
                         let meaning = format!(
                             "{} has {} values for {} joints, for which the family's places do not fit; which of them does each joint take (places from 0)?",
-                            meta.at(path),
+                            meta.location(path),
                             numbers.len(),
                             joints.len()
                         );
@@ -148,7 +152,7 @@ pub(super) fn gains(meta: &Document, joints: &[String], facts: &mut Facts) -> Re
     if lists.is_empty() {
         return Ok(None);
     }
-    facts.note("gains", format!("{}; {}", meta.at("robot_stiffness"), meta.at("robot_damping")));
+    facts.note("gains", format!("{}; {}", meta.location("robot_stiffness"), meta.location("robot_damping")));
     let [stiffness, damping] = <[Vec<f64>; 2]>::try_from(lists).map_err(|_| Error::input("gains are incomplete"))?;
     Ok(Some(Gains { joints: Some("robot".to_owned()), stiffness, damping }))
 }

@@ -53,7 +53,7 @@ impl Robot {
             ));
         }
         if all > n {
-            let last: Option<bool> = facts.find("joints.last")?;
+            let last: Option<bool> = facts.value("joints.last")?;
             ensure!(
                 last != Some(false),
                 "joints.last = false: {file} has {all} joints for {n} actions, and it is not known which"

@@ -97,13 +97,13 @@ pub(super) fn describe(
 
 fn rate(yaml: &Document, facts: &mut Facts) -> Result<f64> {
     let key = "pipeline.configs.frequency";
-    let rate = yaml.maybe(key, "a number above 0", |node| node.number().filter(|number| *number > 0.0))?;
+    let rate = yaml.optional(key, "a number above 0", |node| node.number().filter(|number| *number > 0.0))?;
     match rate {
         Some(rate) => {
-            facts.note("rate_hz", yaml.at(key));
+            facts.note("rate_hz", yaml.location(key));
             Ok(rate)
         }
-        None => Ok(facts.find("rate_hz")?.unwrap_or(1.0)),
+        None => Ok(facts.value("rate_hz")?.unwrap_or(1.0)),
     }
 }
 

@@ -24,7 +24,7 @@ pub(super) struct Initial {
 impl Initial {
     pub(super) fn of(bundle: &Bundle, yaml: &Document, models: &[Model], pipeline: &Pipeline) -> Result<Self> {
         let key = "pipeline.initial_values";
-        let Some(name) = yaml.maybe(key, "the name of a file", Node::text)? else { return Ok(Self::default()) };
+        let Some(name) = yaml.optional(key, "the name of a file", Node::text)? else { return Ok(Self::default()) };
         let file = beside(&yaml.file, name);
         let tensors = tensors(bundle, &file, |_| true)?;
         let mut fed_back = BTreeSet::new();
@@ -46,7 +46,7 @@ impl Initial {
     pub(super) fn start(&self, model: &Model, port: &Port, facts: &mut Facts) -> Result<(Vec<f64>, String)> {
         let key = key_of(model, port);
         let Some(tensor) = self.tensors.get(&key) else {
-            let start: f64 = facts.get("state.start")?;
+            let start: f64 = facts.value_or_default("state.start")?;
             return Ok((vec![start; port.len], facts.source("state.start")));
         };
         let at = format!("{}: {}", self.file, printable(&key));

@@ -51,7 +51,7 @@ pub(super) struct Port {
 /// Reads the models, in the order in which they run.
 pub(super) fn models(bundle: &Bundle, yaml: &Document) -> Result<Vec<Model>> {
     let names: Vec<String> = yaml.keys("models").into_iter().map(str::to_owned).collect();
-    let at = yaml.at("models");
+    let at = yaml.location("models");
     ensure!(
         (1..=MOST_MODELS).contains(&names.len()),
         "{at}: it has {} models; 1 to {MOST_MODELS} are possible",
@@ -70,38 +70,38 @@ fn model(bundle: &Bundle, yaml: &Document, name: String) -> Result<Model> {
         let mut ports: Vec<Port> =
             yaml.keys(&path).iter().map(|i| port(yaml, &format!("{path}.{i}"))).collect::<Result<_>>()?;
         let names: Vec<String> = ports.iter().map(|port| port.name.clone()).collect();
-        check_names(&names, &yaml.at(&path))?;
-        bind(&mut ports, graph, what, &file, &yaml.at(&path))?;
+        check_names(&names, &yaml.location(&path))?;
+        bind(&mut ports, graph, what, &file, &yaml.location(&path))?;
         Ok(ports)
     };
     let (inputs, outputs) = (ports("inputs", &signature.inputs)?, ports("outputs", &signature.outputs)?);
-    Ok(Model { at: yaml.at(&path), name, file, inputs, outputs })
+    Ok(Model { at: yaml.location(&path), name, file, inputs, outputs })
 }
 
 /// Returns a model's ONNX file.
 fn network(bundle: &Bundle, yaml: &Document, path: &str) -> Result<String> {
     let key = format!("{path}.backend");
-    let backend = yaml.need(&key, "the name of a backend", Node::text)?;
+    let backend = yaml.required(&key, "the name of a backend", Node::text)?;
     ensure!(
         backend == "onnx",
         "{} = {:?}: an image is made of ONNX files only; export the model with \
          annotate.output_tensors(..., export_with=\"onnx\"), or with --export_method onnx-dynamo of Isaac Lab's LEAPP export",
-        yaml.at(&key),
+        yaml.location(&key),
         printable(backend)
     );
     let key = format!("{path}.model_path");
-    let name = yaml.need(&key, "the path of a file", Node::text)?;
+    let name = yaml.required(&key, "the path of a file", Node::text)?;
     let file = beside(&yaml.file, name.strip_prefix("./").unwrap_or(name));
-    let full = bundle.path(&file).with_context(|| yaml.at(&key))?;
-    ensure!(bundle.has(&file), "{}: there is no {:?} in the bundle", yaml.at(&key), printable(&file));
+    let full = bundle.path(&file).with_context(|| yaml.location(&key))?;
+    ensure!(bundle.has(&file), "{}: there is no {:?} in the bundle", yaml.location(&key), printable(&file));
     let key = format!("{path}.sha256sum");
-    if let Some(given) = yaml.maybe(&key, "a hash in hexadecimal digits", Node::text)? {
+    if let Some(given) = yaml.optional(&key, "a hash in hexadecimal digits", Node::text)? {
         let bytes = fs::read(full).with_context(|| file.clone())?;
         let own: String = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
         ensure!(
             given.eq_ignore_ascii_case(&own),
             "{}: {:?}, and {file} has {own}: the file has changed since its export; export it again",
-            yaml.at(&key),
+            yaml.location(&key),
             printable(given)
         );
     }
@@ -111,25 +111,25 @@ fn network(bundle: &Bundle, yaml: &Document, path: &str) -> Result<String> {
 fn port(yaml: &Document, path: &str) -> Result<Port> {
     let of = |key: &str| format!("{path}.{key}");
     let text = |key: &str| -> Result<String> {
-        Ok(yaml.maybe(&of(key), "a text", Node::text)?.unwrap_or_default().to_owned())
+        Ok(yaml.optional(&of(key), "a text", Node::text)?.unwrap_or_default().to_owned())
     };
-    let name = yaml.need(&of("name"), "a name", Node::text)?.to_owned();
+    let name = yaml.required(&of("name"), "a name", Node::text)?.to_owned();
     let key = of("dtype");
-    let dtype = yaml.need(&key, "a type of numbers", Node::text)?;
+    let dtype = yaml.required(&key, "a type of numbers", Node::text)?;
     ensure!(
         dtype == "float32",
         "{} = {:?}: the ports of an image are float32; cast outside of the pipeline and export again",
-        yaml.at(&key),
+        yaml.location(&key),
         printable(dtype)
     );
     let lens = |node: &Node| counts(node).filter(|shape| !shape.contains(&0));
-    let shape = yaml.need(&of("shape"), "a list of lengths above 0", lens)?;
+    let shape = yaml.required(&of("shape"), "a list of lengths above 0", lens)?;
     let len = shape.iter().try_fold(1, |len: usize, axis| len.checked_mul(*axis)).filter(|len| *len <= MOST_VALUES);
-    let len = len.with_context(|| format!("{}: more than {MOST_VALUES} values", yaml.at(&of("shape"))))?;
+    let len = len.with_context(|| format!("{}: more than {MOST_VALUES} values", yaml.location(&of("shape"))))?;
     let (names, is_series) = names(yaml, path, &shape, len)?;
-    let at = match yaml.maybe(&of("isaaclab_connection"), "a text", Node::text)? {
-        Some(connection) => format!("{} ({})", yaml.at(path), printable(connection)),
-        None => yaml.at(path),
+    let at = match yaml.optional(&of("isaaclab_connection"), "a text", Node::text)? {
+        Some(connection) => format!("{} ({})", yaml.location(path), printable(connection)),
+        None => yaml.location(path),
     };
     Ok(Port { graph: name.clone(), name, shape, len, kind: text("kind")?, unit: text("units")?, names, is_series, at })
 }
@@ -141,12 +141,12 @@ fn names(yaml: &Document, path: &str, shape: &[usize], len: usize) -> Result<(Op
     let mut is_series = false;
     let axes = format!("{path}.axes");
     for axis in yaml.keys(&axes) {
-        let kind = yaml.maybe(&format!("{axes}.{axis}.kind"), "a text", Node::text)?;
+        let kind = yaml.optional(&format!("{axes}.{axis}.kind"), "a text", Node::text)?;
         is_series |= kind == Some("time");
-        lists.extend(yaml.maybe(&format!("{axes}.{axis}.names"), "a list of names", Node::texts)?);
+        lists.extend(yaml.optional(&format!("{axes}.{axis}.names"), "a list of names", Node::texts)?);
     }
     let key = format!("{path}.element_names");
-    if let Some(node) = yaml.get(&key) {
+    if let Some(node) = yaml.node(&key) {
         let is_name = |item: &Node| item.text().is_some_and(|text| text != TIME) && !item.is_null();
         if node.items().iter().all(is_name) {
             lists.push(yaml.texts(&key)?);
@@ -156,19 +156,19 @@ fn names(yaml: &Document, path: &str, shape: &[usize], len: usize) -> Result<(Op
                     Some(list) => lists.push(list),
                     None => {
                         let is_time = item.text() == Some(TIME);
-                        ensure!(is_time, "{} (line {}) must be lists of names", yaml.at(&key), item.line);
+                        ensure!(is_time, "{} (line {}) must be lists of names", yaml.location(&key), item.line);
                         is_series = true;
                     }
                 }
             }
         }
     }
-    let key = if yaml.look(&axes).is_some() { axes } else { key };
+    let key = if yaml.peek(&axes).is_some() { axes } else { key };
     if let Some(list) = lists.iter().find(|list| !shape.contains(&list.len())) {
         return Err(Facts::contradiction(
             "length of an axis",
-            (&yaml.at(&key), &format!("{} names", list.len())),
-            (&yaml.at(&format!("{path}.shape")), &format!("{shape:?}")),
+            (&yaml.location(&key), &format!("{} names", list.len())),
+            (&yaml.location(&format!("{path}.shape")), &format!("{shape:?}")),
         ));
     }
     let named = lists.iter().try_fold(1, |product: usize, list| product.checked_mul(list.len()));
@@ -182,7 +182,7 @@ fn names(yaml: &Document, path: &str, shape: &[usize], len: usize) -> Result<(Op
         outer.iter().flat_map(|outer| inner.iter().map(move |inner| format!("{outer}_{inner}"))).collect()
     });
     let names = if names.is_empty() { lists.pop().unwrap_or_default() } else { names };
-    check_names(&names, &yaml.at(&key))?;
+    check_names(&names, &yaml.location(&key))?;
     Ok((Some(names), is_series))
 }
 

@@ -37,11 +37,11 @@ impl Pipeline {
         for (flow, is_feedback) in [("pipeline.data_flow", false), ("pipeline.feedback_flow", true)] {
             let keys = yaml.keys(flow);
             if keys.is_empty() {
-                yaml.get(flow);
+                yaml.node(flow);
             }
             for key in keys {
                 let path = format!("{flow}.{key}");
-                let at = yaml.at(&path);
+                let at = yaml.location(&path);
                 let from = port(key, models, outputs).with_context(|| at.clone())?;
                 for target in yaml.texts(&path)? {
                     let to = port(&target, models, inputs).with_context(|| at.clone())?;
@@ -57,9 +57,10 @@ impl Pipeline {
                 let path = format!("{path}.{model}");
                 for name in yaml.texts(&path)? {
                     let ports = if is_input { inputs } else { outputs };
-                    let found = port(&format!("{model}/{name}"), models, ports).with_context(|| yaml.at(&path))?;
+                    let found =
+                        port(&format!("{model}/{name}"), models, ports).with_context(|| yaml.location(&path))?;
                     if is_input {
-                        pipeline.add(models, found, Source::Application, yaml.at(&path))?;
+                        pipeline.add(models, found, Source::Application, yaml.location(&path))?;
                     } else if !pipeline.outputs.contains(&found) {
                         pipeline.outputs.push(found);
                     }

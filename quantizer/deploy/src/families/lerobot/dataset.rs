@@ -32,8 +32,8 @@ impl Training {
         let mut found = Vec::new();
         for (document, key) in [(&self.info, "fps"), (&self.config, "env.fps")] {
             let Some(document) = document else { continue };
-            if let Some(rate) = document.maybe(key, "a number of ticks a second", Node::number)? {
-                found.push((rate, document.at(key)));
+            if let Some(rate) = document.optional(key, "a number of ticks a second", Node::number)? {
+                found.push((rate, document.location(key)));
             }
         }
         let rate = match &found[..] {
@@ -45,7 +45,7 @@ impl Training {
                 facts.note("rate_hz", at.clone());
                 *first
             }
-            [(first, at), (second, second_at), ..] => match facts.find("rate_hz")? {
+            [(first, at), (second, second_at), ..] => match facts.value("rate_hz")? {
                 Some(rate) => rate,
                 None => {
                     return Err(Facts::contradiction(
@@ -55,7 +55,7 @@ impl Training {
                     ));
                 }
             },
-            [] => facts.find("rate_hz")?.unwrap_or(1.0),
+            [] => facts.value("rate_hz")?.unwrap_or(1.0),
         };
         ensure!(rate > 0.0, "{}: rate_hz = {rate}: give a number above 0", facts.source("rate_hz"));
         Ok(rate)
@@ -65,19 +65,19 @@ impl Training {
     pub(super) fn names(&self, feature: &Feature) -> Result<Option<(Vec<String>, String)>> {
         let Some(info) = &self.info else { return Ok(None) };
         let path = format!("features.{}", feature.name);
-        let shape = info.maybe(&format!("{path}.shape"), "a list of lengths", Node::numbers)?;
+        let shape = info.optional(&format!("{path}.shape"), "a list of lengths", Node::numbers)?;
         if let Some(shape) = shape
             && shape != [feature.len as f64]
         {
             return Err(Facts::contradiction(
                 &format!("shape of {:?}", printable(&feature.name)),
                 (&feature.at, &format!("[{}]", feature.len)),
-                (&info.at(&path), &format!("{shape:?}")),
+                (&info.location(&path), &format!("{shape:?}")),
             ));
         }
         let path = format!("{path}.names");
-        let Some(names) = info.maybe(&path, "a list of texts, or a map with one", names)? else { return Ok(None) };
-        let at = info.at(&path);
+        let Some(names) = info.optional(&path, "a list of texts, or a map with one", names)? else { return Ok(None) };
+        let at = info.location(&path);
         // One name of several values is that of the axis.
         if names.len() == 1 && feature.len > 1 {
             return Ok(None);

@@ -27,7 +27,7 @@ impl Feature {
         let section = KEYS[0];
         let features: Vec<Self> =
             config.keys(section).into_iter().map(|name| Self::of(config, section, name)).collect::<Result<_>>()?;
-        ensure!(!features.is_empty(), "{}: it has no features; the policy must read a state", config.at(section));
+        ensure!(!features.is_empty(), "{}: it has no features; the policy must read a state", config.location(section));
         for feature in &features {
             ensure!(
                 ["STATE", "ENV"].contains(&feature.kind.as_str()),
@@ -45,7 +45,7 @@ impl Feature {
         let [name] = names[..] else {
             bail!(
                 "{}: it has {} features; a policy with the only one \"action\" is supported",
-                config.at(section),
+                config.location(section),
                 names.len()
             )
         };
@@ -60,16 +60,16 @@ impl Feature {
 
     fn of(config: &Document, section: &str, name: &str) -> Result<Self> {
         let path = format!("{section}.{name}");
-        let kind = config.need(&format!("{path}.type"), "a text", Node::text)?.to_owned();
+        let kind = config.required(&format!("{path}.type"), "a text", Node::text)?.to_owned();
         let shape_path = format!("{path}.shape");
-        let shape = config.need(&shape_path, "a list of lengths above 0", lengths)?;
-        let at = config.at(&path);
+        let shape = config.required(&shape_path, "a list of lengths above 0", lengths)?;
+        let at = config.location(&path);
         ensure!(
             kind != "VISUAL",
             "{at} is an image {shape:?}, whose encoder does not run on a microcontroller. Export the network behind the encoder, \
              and declare what it reads as features of the type STATE, which the application computes; or train a policy of states"
         );
-        let [len] = shape[..] else { bail!("{} = {shape:?}: give one length", config.at(&shape_path)) };
+        let [len] = shape[..] else { bail!("{} = {shape:?}: give one length", config.location(&shape_path)) };
         Ok(Self { name: name.to_owned(), kind, len, at })
     }
 

@@ -35,7 +35,7 @@ impl Graph {
                 facts.note("network", "the only ONNX file");
                 only.clone()
             }
-            _ => facts.named("network", &files.iter().map(String::as_str).collect::<Vec<_>>())?,
+            _ => facts.choose_one_of("network", &files.iter().map(String::as_str).collect::<Vec<_>>())?,
         };
         let signature = Signature::read(&bundle.path(&file)?)?;
         let (inputs, outputs) = (known(&file, &signature.inputs)?, known(&file, &signature.outputs)?);

@@ -45,7 +45,7 @@ pub(super) fn frames(
             &format!(
                 "length of the observation (if it has histories, answer {key} with a list of one number of frames for each term)"
             ),
-            (&meta.at("observation_names"), &format!("{sum} values: {}", shown())),
+            (&meta.location("observation_names"), &format!("{sum} values: {}", shown())),
             (&format!("{}: input {:?}", graph.file, printable(&graph.input)), &format!("{all} values")),
         ));
     };

@@ -48,10 +48,10 @@ impl Robot {
         let given = Given { meta, ros, raw: &raw, moved: &moved, listed: &listed };
         let (default, default_source) =
             agreed(given.pair("default_joint_pos", "walkready_state", false)?, "default_pose", &observed, facts)?
-                .with_context(|| format!("{} is missing", meta.at("default_joint_pos")))?;
+                .with_context(|| format!("{} is missing", meta.location("default_joint_pos")))?;
         let (scale, scale_source) =
             agreed(given.pair("action_scale", "action_scales", true)?, "action_scale", &moved, facts)?
-                .with_context(|| format!("{} is missing", meta.at("action_scale")))?;
+                .with_context(|| format!("{} is missing", meta.location("action_scale")))?;
         let stiffness = agreed(given.pair("joint_stiffness", "kp", false)?, "stiffness", &moved, facts)?;
         let damping = agreed(given.pair("joint_damping", "kd", false)?, "damping", &moved, facts)?;
         let (gains, gains_source) = match (stiffness, damping) {
@@ -144,9 +144,9 @@ fn observed_joints(
     listed: &[String],
     facts: &mut Facts,
 ) -> Result<(Vec<String>, String)> {
-    let at = meta.at(NAMES);
+    let at = meta.location(NAMES);
     let Some(ros) = ros else { return Ok((raw.to_vec(), at)) };
-    order(raw, &at, listed, &ros.yaml.at(&ros.path(&format!("joints.{ROS_KEY}"))), facts)
+    order(raw, &at, listed, &ros.yaml.location(&ros.path(&format!("joints.{ROS_KEY}"))), facts)
 }
 
 /// Returns the joints that the policy moves: all that it observes, or as many as the graph has actions.
@@ -184,7 +184,7 @@ fn sent_joints(ros: Option<&Ros<'_>>, moved: &[String]) -> Result<Vec<String>> {
     let mut uncontrolled = Vec::new();
     if let Some(ros) = ros {
         let path = ros.path("joints.uncontrolled_joint_names");
-        uncontrolled = ros.yaml.maybe(&path, "a list of names", Node::texts)?.unwrap_or_default();
+        uncontrolled = ros.yaml.optional(&path, "a list of names", Node::texts)?.unwrap_or_default();
     }
     let sent: Vec<String> = moved.iter().filter(|joint| !uncontrolled.contains(joint)).cloned().collect();
     ensure!(!sent.is_empty(), "uncontrolled_joint_names names all joints that the policy moves");
@@ -217,18 +217,18 @@ impl Given<'_> {
             len => {
                 return Err(Facts::contradiction(
                     "number of joints",
-                    (&self.meta.at(key), &format!("{len} values")),
-                    (&self.meta.at(NAMES), &format!("{} joints, of which {} move", raw.len(), moved.len())),
+                    (&self.meta.location(key), &format!("{len} values")),
+                    (&self.meta.location(NAMES), &format!("{} joints, of which {} move", raw.len(), moved.len())),
                 ));
             }
         };
-        Ok(Some((all, self.meta.at(key))))
+        Ok(Some((all, self.meta.location(key))))
     }
 
     fn of_ros(&self, key: &str) -> Result<Option<ByJoint>> {
         let Some(ros) = self.ros else { return Ok(None) };
         let list = ros.numbers(key, self.listed.len())?;
-        let at = ros.yaml.at(&ros.path(&format!("joints.{key}")));
+        let at = ros.yaml.location(&ros.path(&format!("joints.{key}")));
         Ok(list.map(|list| (self.listed.iter().cloned().zip(list).collect(), at)))
     }
 

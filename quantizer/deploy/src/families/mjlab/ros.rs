@@ -22,8 +22,8 @@ impl RosNode {
         let mut nodes = Vec::new();
         for name in yaml.keys("") {
             let at = format!("{name}.ros__parameters");
-            if yaml.look(&format!("{at}.joints.{ROS_KEY}")).is_some() {
-                let model = yaml.need(&format!("{at}.model"), "the name of an ONNX file", Node::text)?;
+            if yaml.peek(&format!("{at}.joints.{ROS_KEY}")).is_some() {
+                let model = yaml.required(&format!("{at}.model"), "the name of an ONNX file", Node::text)?;
                 nodes.push(Self { name: name.to_owned(), model: model.to_owned() });
             }
         }
@@ -46,12 +46,12 @@ impl Ros<'_> {
     /// Returns a list of the joints' numbers, if it is there.
     pub(super) fn numbers(&self, key: &str, joints: usize) -> Result<Option<Vec<f64>>> {
         let path = self.path(&format!("joints.{key}"));
-        let numbers = self.yaml.maybe(&path, "a list of finite numbers", Node::numbers)?;
+        let numbers = self.yaml.optional(&path, "a list of finite numbers", Node::numbers)?;
         if let Some(numbers) = &numbers {
             ensure!(
                 numbers.len() == joints,
                 "{} has {} values, but {ROS_KEY} {joints} names",
-                self.yaml.at(&path),
+                self.yaml.location(&path),
                 numbers.len()
             );
         }

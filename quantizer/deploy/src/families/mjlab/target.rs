@@ -11,7 +11,7 @@ use crate::facts::Facts;
 /// Adds the target: the scaled action, and what it is added to.
 pub(super) fn target(parts: &mut Parts, robot: &Robot, ros: Option<&Ros<'_>>, facts: &mut Facts) -> Result<()> {
     let mut ops = vec![Op::Scale(Operand::Name("action_scale".to_owned()))];
-    let base: Option<String> = facts.find("target.base")?;
+    let base: Option<String> = facts.value("target.base")?;
     match base.as_deref() {
         Some("current") => {
             let position = if ros.is_some() { "position" } else { "joint_pos" };

@@ -73,8 +73,8 @@ pub(super) fn terms(
     let (lens, open) = lengths(&terms, robot, graph, facts)?;
     let frames = frames(meta, graph, &names, &lens, open, facts)?;
 
-    let plain: Option<bool> = facts.find("terms.plain")?;
-    let relative: bool = facts.get("joint_pos.relative")?;
+    let plain: Option<bool> = facts.value("terms.plain")?;
+    let relative: bool = facts.value_or_default("joint_pos.relative")?;
     let has_ros = ros.is_some();
     let mut builder = Builder { parts, meta, robot, has_ros, relative, facts };
     builder.joint_inputs(&terms)?;
@@ -142,7 +142,7 @@ impl Builder<'_> {
     fn joint_inputs(&mut self, terms: &[(&str, Term)]) -> Result<()> {
         let (position, velocity) = self.joint_names();
         let has = |is_read: fn(&Term) -> bool| terms.iter().any(|(_, term)| is_read(term));
-        if self.facts.chooses("target.base", "current")? || has(|term| matches!(term, Term::Position)) {
+        if self.facts.is_choice("target.base", "current")? || has(|term| matches!(term, Term::Position)) {
             self.parts.raw_joints(position, "robot", "rad");
         }
         if has(|term| matches!(term, Term::Velocity)) {
@@ -154,7 +154,7 @@ impl Builder<'_> {
     /// Begins a term; returns the operations on its raw input, and where they come from.
     fn begin(&mut self, name: &str, term: Term, len: usize) -> Result<(Vec<Op>, String)> {
         let (position, velocity) = self.joint_names();
-        let listed = self.meta.at(NAMES);
+        let listed = self.meta.location(NAMES);
         let by_rule = |facts: &Facts, rule: &str| format!("{listed}; {}", facts.source(rule));
         Ok(match term {
             Term::Raw(len, unit, of_ros) => {
@@ -177,7 +177,7 @@ impl Builder<'_> {
                 (self.robot.select(), listed)
             }
             Term::Action => {
-                let is_processed = self.facts.chooses("last_action", "processed")?;
+                let is_processed = self.facts.is_choice("last_action", "processed")?;
                 let ops = self.parts.state(name, len, if is_processed { "processed" } else { ACTION });
                 (ops, by_rule(self.facts, "last_action"))
             }
@@ -197,7 +197,7 @@ impl Builder<'_> {
 
 /// Returns the length and unit of the command by its name, or nothing if it is another command.
 fn command(meta: &Document, robot: &Robot) -> Result<Option<(usize, &'static str)>> {
-    let commands = meta.maybe("command_names", "a text", Node::text)?.unwrap_or_default();
+    let commands = meta.optional("command_names", "a text", Node::text)?.unwrap_or_default();
     Ok(match commands.trim() {
         "twist" | "base_velocity" => Some((3, "m/s, m/s, rad/s")),
         // Positions and velocities of all joints in the motion.

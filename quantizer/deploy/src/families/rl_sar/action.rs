@@ -17,12 +17,12 @@ pub(super) fn act(config: &Config<'_>, joints: &Joints, parts: &mut Parts, facts
     let mut sources = Vec::new();
     if let Some([low, high]) = clip(config)? {
         ops.push(Op::Clip([Operand::List(low), Operand::List(high)]));
-        sources.push(config.at("clip_actions_lower"));
-        sources.push(config.at("clip_actions_upper"));
+        sources.push(config.location("clip_actions_lower"));
+        sources.push(config.location("clip_actions_upper"));
     }
     if let Some(hips) = hips(config, n)? {
         ops.push(Op::Scale(Operand::List(hips)));
-        sources.push(config.at("hip_scale_reduction"));
+        sources.push(config.location("hip_scale_reduction"));
     }
     let action = if ops.is_empty() { "policy.ACTION" } else { "clipped_action" };
     if !ops.is_empty() {
@@ -35,14 +35,14 @@ pub(super) fn act(config: &Config<'_>, joints: &Joints, parts: &mut Parts, facts
     let only = |wheel: bool| Op::Scale(Operand::List(masked(&scale, |i| wheels.contains(&i) == wheel)));
     let default = Operand::Name("default".to_owned());
     joints.target(parts, TargetKind::Position, "target", action, vec![only(false), Op::Add(default)]);
-    let source = config.at("action_scale");
-    facts.note("target", format!("{source}; {}", config.at("default_dof_pos")));
+    let source = config.location("action_scale");
+    facts.note("target", format!("{source}; {}", config.location("default_dof_pos")));
     if !wheels.is_empty() {
         joints.target(parts, TargetKind::Velocity, "target_velocity", action, vec![only(true)]);
-        facts.note("target_velocity", format!("{source}; {}", config.at("wheel_indices")));
+        facts.note("target_velocity", format!("{source}; {}", config.location("wheel_indices")));
     }
     joints.gains(parts, &config.of_joints("rl_kp")?, &config.of_joints("rl_kd")?);
-    facts.note("gains", format!("{}; {}", config.at("rl_kp"), config.at("rl_kd")));
+    facts.note("gains", format!("{}; {}", config.location("rl_kp"), config.location("rl_kd")));
     Ok(action)
 }
 
@@ -54,20 +54,20 @@ pub(super) fn masked(numbers: &[f64], keep: impl Fn(usize) -> bool) -> Vec<f64> 
 /// Returns the limits of the action, if there are some.
 fn clip(config: &Config<'_>) -> Result<Option<[Vec<f64>; 2]>> {
     let keys = ["clip_actions_lower", "clip_actions_upper"];
-    let (low, high) = match keys.map(|key| config.maybe_of_joints(key)) {
+    let (low, high) = match keys.map(|key| config.optional_of_joints(key)) {
         [Err(error), _] | [_, Err(error)] => return Err(error),
         [Ok(Some(low)), Ok(Some(high))] => (low, high),
         [Ok(None), Ok(None)] => return Ok(None),
         [Ok(low), Ok(_)] => {
             let (there, missing) = if low.is_some() { (keys[0], keys[1]) } else { (keys[1], keys[0]) };
-            bail!("{} is there without {missing}; give both, or none", config.at(there));
+            bail!("{} is there without {missing}; give both, or none", config.location(there));
         }
     };
     if let Some(i) = (0..low.len()).find(|&i| low[i] > high[i]) {
         return Err(Facts::contradiction(
             &format!("limits of action {i} (the first is 0)"),
-            (&config.at(keys[0]), &low[i].to_string()),
-            (&config.at(keys[1]), &high[i].to_string()),
+            (&config.location(keys[0]), &low[i].to_string()),
+            (&config.location(keys[1]), &high[i].to_string()),
         ));
     }
     Ok(Some([low, high]))
@@ -76,7 +76,7 @@ fn clip(config: &Config<'_>) -> Result<Option<[Vec<f64>; 2]>> {
 /// Returns the factors of the older layout's `hip_scale_reduction`, if they change something.
 fn hips(config: &Config<'_>, n: usize) -> Result<Option<Vec<f64>>> {
     let hips = config.places("hip_scale_reduction_indices")?;
-    let Some(by) = config.maybe("hip_scale_reduction", "a finite number", Node::number)? else { return Ok(None) };
+    let Some(by) = config.optional("hip_scale_reduction", "a finite number", Node::number)? else { return Ok(None) };
     let factors = (0..n).map(|i| if hips.contains(&i) { by } else { 1.0 }).collect();
     Ok((!hips.is_empty() && by != 1.0).then_some(factors))
 }
@@ -84,7 +84,7 @@ fn hips(config: &Config<'_>, n: usize) -> Result<Option<Vec<f64>>> {
 /// Returns the scale of each joint's action: a list, or the older layout's numbers for joints and wheels.
 fn scale(config: &Config<'_>, wheels: &[usize], n: usize) -> Result<Vec<f64>> {
     let key = "action_scale";
-    let one = config.need(key, "a finite number, or one for each joint", |node| {
+    let one = config.required(key, "a finite number, or one for each joint", |node| {
         node.number().map(Some).or_else(|| node.numbers().map(|_| None))
     })?;
     let Some(one) = one else { return config.of_joints(key) };

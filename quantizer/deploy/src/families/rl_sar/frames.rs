@@ -10,14 +10,14 @@ use crate::facts::Facts;
 /// Returns the number of frames, and how they are kept.
 pub(super) fn frames(config: &Config<'_>, facts: &mut Facts) -> Result<(usize, Histories)> {
     let key = "observations_history";
-    let numbers = config.maybe(key, "a list of frames' numbers, from 0", counts)?.unwrap_or_default();
+    let numbers = config.optional(key, "a list of frames' numbers, from 0", counts)?.unwrap_or_default();
     let by_term =
-        config.maybe("observations_history_priority", "\"time\" or \"term\"", |node| match node.text()? {
+        config.optional("observations_history_priority", "\"time\" or \"term\"", |node| match node.text()? {
             "time" => Some(false),
             "term" => Some(true),
             _ => None,
         })?;
-    facts.note("observation", config.at("observations"));
+    facts.note("observation", config.location("observations"));
     if matches!(numbers[..], [] | [0]) {
         let (first, fill) = Default::default();
         return Ok((1, Histories { by_term: false, first, fill, stride: 1 }));
@@ -29,15 +29,15 @@ pub(super) fn frames(config: &Config<'_>, facts: &mut Facts) -> Result<(usize, H
     ensure!(
         stride > 0 && is_even,
         "{}: only numbers in equal steps, from 0 or down to 0, are supported",
-        config.at(key)
+        config.location(key)
     );
     let (by_term, layout) = match by_term {
-        Some(by_term) => (by_term, config.at("observations_history_priority")),
-        None => (facts.chooses("history.layout", "term")?, facts.source("history.layout")),
+        Some(by_term) => (by_term, config.location("observations_history_priority")),
+        None => (facts.is_choice("history.layout", "term")?, facts.source("history.layout")),
     };
-    let first = if ascends == facts.chooses("history.zero", "oldest")? { First::Oldest } else { First::Newest };
-    let fill = facts.get("history.fill")?;
+    let first = if ascends == facts.is_choice("history.zero", "oldest")? { First::Oldest } else { First::Newest };
+    let fill = facts.value_or_default("history.fill")?;
     let [zero, filled] = ["history.zero", "history.fill"].map(|rule| facts.source(rule));
-    facts.note("observation", format!("{}; {layout}; {zero}; {filled}", config.at(key)));
+    facts.note("observation", format!("{}; {layout}; {zero}; {filled}", config.location(key)));
     Ok((numbers.len(), Histories { by_term, first, fill, stride }))
 }

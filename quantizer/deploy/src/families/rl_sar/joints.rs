@@ -33,7 +33,7 @@ impl Joints {
             (Some(mapping), _) => mapping,
             (None, Some(names)) => (names.key, (0..names.list.len()).collect()),
             (None, None) => {
-                bail!("{} is missing, and there are no joint_names; add one of them", config.at("joint_mapping"))
+                bail!("{} is missing, and there are no joint_names; add one of them", config.location("joint_mapping"))
             }
         };
         config.check(key, map.len())?;
@@ -41,26 +41,27 @@ impl Joints {
         let mut taken = vec![false; robot];
         for (i, joint) in map.iter().enumerate() {
             let Some(taken) = taken.get_mut(*joint) else {
-                let source = names.as_ref().map_or_else(|| config.at("num_of_dofs"), |names| names.source.clone());
+                let source =
+                    names.as_ref().map_or_else(|| config.location("num_of_dofs"), |names| names.source.clone());
                 return Err(Facts::contradiction(
                     "number of the robot's joints",
-                    (&config.at(key), &format!("joint {i} of the policy is joint {joint} of the robot")),
+                    (&config.location(key), &format!("joint {i} of the policy is joint {joint} of the robot")),
                     (&source, &format!("{robot} joints")),
                 ));
             };
-            ensure!(!*taken, "{}: joint {joint} occurs twice", config.at(key));
+            ensure!(!*taken, "{}: joint {joint} occurs twice", config.location(key));
             *taken = true;
         }
         let named = names.is_some();
         if let Some(Names { source, list, .. }) = names {
             facts.note("robot", source);
             if !(map.len() == robot && is_identity(&map)) {
-                facts.note(ORDER, config.at(key));
+                facts.note(ORDER, config.location(key));
                 parts.joints(ORDER, map.iter().map(|joint| list[*joint].clone()).collect());
             }
             parts.joints("robot", list);
         }
-        facts.note("joint order", config.at(key));
+        facts.note("joint order", config.location(key));
         Ok(Self { map, robot, named })
     }
 
@@ -130,7 +131,7 @@ fn is_identity(map: &[usize]) -> bool {
 
 /// Returns the robot's joint of each joint of the policy, and the key that has it.
 fn mapping(config: &Config<'_>) -> Result<Option<(&'static str, Vec<usize>)>> {
-    let list = |key: &str| config.maybe(key, "a list of joints' numbers, from 0", counts);
+    let list = |key: &str| config.optional(key, "a list of joints' numbers, from 0", counts);
     if let Some(map) = list("joint_mapping")? {
         return Ok(Some(("joint_mapping", map)));
     }
@@ -141,8 +142,8 @@ fn mapping(config: &Config<'_>) -> Result<Option<(&'static str, Vec<usize>)>> {
     if !reverse {
         return Err(Facts::contradiction(
             "order of the joints",
-            (&config.at("state_mapping"), &format!("{state:?}")),
-            (&config.at("command_mapping"), &format!("{command:?}, which is not its reverse")),
+            (&config.location("state_mapping"), &format!("{state:?}")),
+            (&config.location("command_mapping"), &format!("{command:?}, which is not its reverse")),
         ));
     }
     Ok(Some(("state_mapping", state)))
@@ -160,7 +161,7 @@ fn names(config: &Config<'_>) -> Result<Option<Names>> {
     for key in ["joint_names", "joint_controller_names"] {
         let of = |section: Section<'_>| -> Result<Option<Names>> {
             let list = section.names(key)?;
-            Ok(list.map(|list| Names { key, source: section.at(key), list }))
+            Ok(list.map(|list| Names { key, source: section.location(key), list }))
         };
         let (own, base) = (of(config.own)?, config.base.map(of).transpose()?.flatten());
         if let (Some(own), Some(base)) = (&own, &base) {

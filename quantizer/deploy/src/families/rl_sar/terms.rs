@@ -37,12 +37,13 @@ impl Terms<'_, '_> {
     /// Adds the observation; returns its length, or `None` while that of a term is a question.
     pub(super) fn observe(mut self) -> Result<Option<usize>> {
         let config = self.config;
-        let terms = config.need("observations", "a list of terms", |node| node.texts().filter(|t| !t.is_empty()))?;
-        let clip = config.need("clip_obs", "a number from 0", |node| node.number().filter(|clip| *clip >= 0.0))?;
+        let terms =
+            config.required("observations", "a list of terms", |node| node.texts().filter(|t| !t.is_empty()))?;
+        let clip = config.required("clip_obs", "a number from 0", |node| node.number().filter(|clip| *clip >= 0.0))?;
         let (length, histories) = frames(config, self.facts)?;
         let mut all = Some(0);
         for (i, name) in terms.iter().enumerate() {
-            let shown = config.at("observations");
+            let shown = config.location("observations");
             ensure!(is_plain(name), "{shown}: term {i} (the first is 0) is no name: use letters, digits, _ - /");
             ensure!(!terms[..i].contains(name), "{shown}: {name:?} occurs twice");
             let mut term = self.term(name)?;
@@ -52,12 +53,12 @@ impl Terms<'_, '_> {
             all = all.zip(term.len).map(|(all, len)| all + len);
         }
         self.parts.observe(&histories)?;
-        let given = config.maybe("num_observations", "a number of values", count)?;
+        let given = config.optional("num_observations", "a number of values", count)?;
         match (given, all) {
             (Some(given), Some(all)) if given != all => Err(Facts::contradiction(
                 "length of the observation",
-                (&config.at("num_observations"), &given.to_string()),
-                (&config.at("observations"), &format!("terms of {all} values")),
+                (&config.location("num_observations"), &given.to_string()),
+                (&config.location("observations"), &format!("terms of {all} values")),
             )),
             _ => Ok(all.map(|all| all * length)),
         }
@@ -68,12 +69,12 @@ impl Terms<'_, '_> {
         let (config, n) = (self.config, self.joints.len());
         let scaled = |key: &str, len: usize, mut ops: Vec<Op>| -> Result<Term> {
             ops.push(Op::Scale(Operand::Number(config.number(key)?)));
-            Ok(Term { len: Some(len), ops, source: config.at(key) })
+            Ok(Term { len: Some(len), ops, source: config.location(key) })
         };
         match name {
             "lin_vel" => {
                 let mut term = scaled("lin_vel_scale", 3, Vec::new())?;
-                if self.facts.chooses("lin_vel", "input")? {
+                if self.facts.is_choice("lin_vel", "input")? {
                     self.parts.input(name, 3, "m/s");
                 } else {
                     self.parts.unchanged("no_lin_vel", vec![0.0; 3]);
@@ -99,10 +100,10 @@ impl Terms<'_, '_> {
             }
             "commands" => {
                 let three = |node: &Node| node.numbers().filter(|scales| scales.len() == 3);
-                let by = config.need("commands_scale", "three finite numbers", three)?;
+                let by = config.required("commands_scale", "three finite numbers", three)?;
                 self.parts.input(name, 3, "m/s, m/s, rad/s");
                 let ops = vec![Op::Scale(Operand::List(by))];
-                Ok(Term { len: Some(3), ops, source: config.at("commands_scale") })
+                Ok(Term { len: Some(3), ops, source: config.location("commands_scale") })
             }
             "dof_pos" => {
                 let (wheels, by) = (config.places("wheel_indices")?, config.number("dof_pos_scale")?);
@@ -110,11 +111,11 @@ impl Terms<'_, '_> {
                 ops.push(Op::Subtract(Operand::Name("default".to_owned())));
                 // The angle of a wheel is observed as 0.
                 ops.push(Op::Scale(Operand::List(masked(&vec![by; n], |i| !wheels.contains(&i)))));
-                Ok(Term { len: Some(n), ops, source: config.at("dof_pos_scale") })
+                Ok(Term { len: Some(n), ops, source: config.location("dof_pos_scale") })
             }
             "dof_vel" => scaled("dof_vel_scale", n, self.joints.input(self.parts, name, "rad/s")),
             "actions" => {
-                let is_raw = self.facts.chooses("last_action", "raw")?;
+                let is_raw = self.facts.is_choice("last_action", "raw")?;
                 let ops = self.parts.state(name, n, if is_raw { "policy.ACTION" } else { self.action });
                 Ok(Term { len: Some(n), ops, source: self.facts.source("last_action") })
             }
@@ -154,14 +155,14 @@ impl Terms<'_, '_> {
 
     /// Returns a time by its rule; 1 while it is a question.
     fn seconds(&mut self, rule: &str) -> Result<f64> {
-        let seconds: f64 = self.facts.find(rule)?.unwrap_or(1.0);
+        let seconds: f64 = self.facts.value(rule)?.unwrap_or(1.0);
         ensure!(seconds > 0.0 && seconds.is_finite(), "{rule} = {seconds}: give a number above 0");
         Ok(seconds)
     }
 
     /// Adds a clock that advances by 1 in some seconds.
     fn clock(&mut self, name: &str, seconds: f64, wrap: Option<[f64; 2]>) -> Result<()> {
-        let when: Option<When> = self.facts.find("clock.when")?;
+        let when: Option<When> = self.facts.value("clock.when")?;
         let advance = 1.0 / (self.rate * seconds);
         self.parts.clock(Clock { wrap, ..Clock::from_zero(name, advance, when.unwrap_or(When::Before)) });
         self.facts.note(name, self.facts.source("clock.when"));
