@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::clock::Phases;
 use crate::description::{End, Orientation, TargetKind};
 use crate::history::Frames;
-use crate::plan::{Arg, Feed, Maker, Plan, PlannedTarget, Step, Work};
+use crate::plan::{Arg, Feed, Plan, PlannedTarget, TickStep, ValueOp, ValueSource};
 
 /// Values of a tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,17 +33,18 @@ pub struct Runner {
 impl Runner {
     /// Starts at the state after a reset.
     pub fn new(plan: Plan) -> Self {
-        let clock =
-            |maker: &Maker| if let Maker::Clock(clock, _) = maker { Some(Phases::new(clock.clone())) } else { None };
-        let frames = |step: &Step| if let Step::History(spec) = step { Some(Frames::new(*spec)) } else { None };
-        let histories = |maker: &Maker| match maker {
-            Maker::Value(_, steps) => steps.iter().map(frames).collect(),
+        let clock = |source: &ValueSource| {
+            if let ValueSource::Clock(clock, _) = source { Some(Phases::new(clock.clone())) } else { None }
+        };
+        let frames = |step: &ValueOp| if let ValueOp::History(spec) = step { Some(Frames::new(*spec)) } else { None };
+        let histories = |source: &ValueSource| match source {
+            ValueSource::Value(_, steps) => steps.iter().map(frames).collect(),
             _ => Vec::new(),
         };
         let mut runner = Self {
             values: vec![Vec::new(); plan.values.len()],
-            clocks: plan.values.iter().map(|value| clock(&value.maker)).collect(),
-            histories: plan.values.iter().map(|value| histories(&value.maker)).collect(),
+            clocks: plan.values.iter().map(|value| clock(&value.source)).collect(),
+            histories: plan.values.iter().map(|value| histories(&value.source)).collect(),
             states: Vec::new(),
             outputs: Vec::new(),
             tick: 0,
@@ -84,8 +85,8 @@ impl Runner {
         let mut observations = vec![Vec::new(); self.plan.networks.len()];
         for i in 0..self.plan.order.len() {
             match self.plan.order[i] {
-                Work::Make(slot) => self.values[slot] = self.make(slot, raw),
-                Work::Run(network) => observations[network] = self.run(network),
+                TickStep::Value(index) => self.values[index] = self.make(index, raw),
+                TickStep::Network(network) => observations[network] = self.run(network),
             }
         }
         self.states = self.plan.states.iter().map(|state| self.values[state.next].clone()).collect();
@@ -99,7 +100,7 @@ impl Runner {
 
     fn targets(&self) -> Vec<(TargetKind, Vec<f64>)> {
         let limited = |target: &PlannedTarget| {
-            let mut values = self.values[target.slot].clone();
+            let mut values = self.values[target.value].clone();
             if let Some([low, high]) = &target.limits {
                 values.iter_mut().zip(low.iter().zip(high)).for_each(|(x, (low, high))| *x = x.clamp(*low, *high));
             }
@@ -108,26 +109,26 @@ impl Runner {
         self.plan.targets.iter().map(limited).collect()
     }
 
-    fn make(&mut self, slot: usize, raw: &[Vec<f64>]) -> Vec<f64> {
-        match &self.plan.values[slot].maker {
-            Maker::Input(i) => raw[*i].clone(),
-            Maker::State(i) => self.states[*i].clone(),
-            Maker::Clock(_, of) => {
+    fn make(&mut self, index: usize, raw: &[Vec<f64>]) -> Vec<f64> {
+        match &self.plan.values[index].source {
+            ValueSource::Input(i) => raw[*i].clone(),
+            ValueSource::State(i) => self.states[*i].clone(),
+            ValueSource::Clock(_, of) => {
                 let norms: Vec<f64> = of.iter().map(|value| norm(&self.values[*value])).collect();
-                self.clocks[slot].as_mut().map_or_else(Vec::new, |phases| phases.step(&norms))
+                self.clocks[index].as_mut().map_or_else(Vec::new, |phases| phases.step(&norms))
             }
-            Maker::Motion { rows, lag, end } => {
+            ValueSource::Motion { rows, lag, end } => {
                 let (count, len) = (rows.shape[0], rows.values.len() / rows.shape[0]);
                 let row = self.tick.saturating_sub(*lag);
                 let row = if *end == End::Repeat { row % count } else { row.min(count - 1) };
                 rows.values[row * len..][..len].to_vec()
             }
-            Maker::Output(network, output) => {
+            ValueSource::Output(network, output) => {
                 self.outputs[*network][*output].iter().map(|value| f64::from(*value)).collect()
             }
-            Maker::Value(from, steps) => {
-                let mut value: Vec<f64> = from.iter().flat_map(|slot| self.values[*slot].iter().copied()).collect();
-                for (step, frames) in steps.iter().zip(&mut self.histories[slot]) {
+            ValueSource::Value(from, steps) => {
+                let mut value: Vec<f64> = from.iter().flat_map(|index| self.values[*index].iter().copied()).collect();
+                for (step, frames) in steps.iter().zip(&mut self.histories[index]) {
                     value = match frames {
                         Some(frames) => frames.step(&value),
                         None => apply(step, value, &self.values),
@@ -142,7 +143,7 @@ impl Runner {
     fn run(&mut self, index: usize) -> Vec<f64> {
         let network = &mut self.plan.networks[index];
         let of = |feed: &Feed| match feed {
-            Feed::Value(slot) => self.values[*slot].iter().map(|value| *value as f32).collect(),
+            Feed::Value(index) => self.values[*index].iter().map(|value| *value as f32).collect(),
             Feed::Before(output, _) => self.outputs[index][*output].clone(),
         };
         let inputs: Vec<Vec<f32>> = network.feeds.iter().map(of).collect();
@@ -156,38 +157,38 @@ fn norm(value: &[f64]) -> f64 {
 }
 
 /// Applies an operation that keeps no state.
-fn apply(step: &Step, mut value: Vec<f64>, values: &[Vec<f64>]) -> Vec<f64> {
+fn apply(step: &ValueOp, mut value: Vec<f64>, values: &[Vec<f64>]) -> Vec<f64> {
     let mut with = |arg: &Arg, f: fn(f64, f64) -> f64| {
         let other = match arg {
             Arg::Numbers(numbers) => numbers,
-            Arg::Slot(slot) => &values[*slot],
+            Arg::Value(index) => &values[*index],
         };
         for (i, x) in value.iter_mut().enumerate() {
             *x = f(*x, other[if other.len() == 1 { 0 } else { i }]);
         }
     };
     match step {
-        Step::Select(places) => return places.iter().map(|place| value[*place]).collect(),
-        Step::Place(places) => {
+        ValueOp::Select(places) => return places.iter().map(|place| value[*place]).collect(),
+        ValueOp::Place(places) => {
             let mut placed = vec![0.0; value.len()];
             places.iter().zip(&value).for_each(|(place, x)| placed[*place] = *x);
             return placed;
         }
-        Step::Add(arg) => with(arg, |x, y| x + y),
-        Step::Subtract(arg) => with(arg, |x, y| x - y),
-        Step::Scale(arg) => with(arg, |x, y| x * y),
-        Step::Divide(arg) => with(arg, |x, y| x / y),
-        Step::Clip([low, high]) => {
+        ValueOp::Add(arg) => with(arg, |x, y| x + y),
+        ValueOp::Subtract(arg) => with(arg, |x, y| x - y),
+        ValueOp::Scale(arg) => with(arg, |x, y| x * y),
+        ValueOp::Divide(arg) => with(arg, |x, y| x / y),
+        ValueOp::Clip([low, high]) => {
             with(high, |x, y| if x > y { y } else { x });
             with(low, |x, y| if x < y { y } else { x });
         }
-        Step::Wrap => value.iter_mut().for_each(|x| *x = (*x + PI).rem_euclid(2.0 * PI) - PI),
-        Step::Sin => value.iter_mut().for_each(|x| *x = x.sin()),
-        Step::Cos => value.iter_mut().for_each(|x| *x = x.cos()),
-        Step::Norm => return vec![norm(&value)],
-        Step::Gravity(orientation) => return gravity(*orientation, &value),
+        ValueOp::Wrap => value.iter_mut().for_each(|x| *x = (*x + PI).rem_euclid(2.0 * PI) - PI),
+        ValueOp::Sin => value.iter_mut().for_each(|x| *x = x.sin()),
+        ValueOp::Cos => value.iter_mut().for_each(|x| *x = x.cos()),
+        ValueOp::Norm => return vec![norm(&value)],
+        ValueOp::Gravity(orientation) => return gravity(*orientation, &value),
         // A history has a state.
-        Step::History(_) => {}
+        ValueOp::History(_) => {}
     }
     value
 }

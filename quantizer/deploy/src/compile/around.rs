@@ -9,9 +9,9 @@ use actq_kernels::image::OpKind;
 use super::chain::Chain;
 use super::clock;
 use super::joined::{Joined, Output, Source, has_weights, part};
-use super::operations::{Operations, words};
+use super::operations::{Operations, Phase, words};
 use crate::description::{Clock, End, TargetKind, When};
-use crate::plan::{Feed, Maker, Plan, PlannedTarget, Slot, Step};
+use crate::plan::{Feed, Plan, PlannedTarget, ValueIndex, ValueOp, ValueSource};
 use crate::sources::Array;
 
 /// Makes the operations.
@@ -20,7 +20,7 @@ pub(super) fn around(plan: &Plan, joined: &Joined) -> Result<Around> {
         plan,
         joined,
         to: Operations::default(),
-        slots: vec![None; plan.values.len()],
+        placed: vec![None; plan.values.len()],
         states: Vec::new(),
         before: Vec::new(),
         outputs: Vec::new(),
@@ -33,7 +33,7 @@ struct Compiler<'a> {
     joined: &'a Joined,
     to: Operations,
     /// Place of each value.
-    slots: Vec<Option<Slice>>,
+    placed: Vec<Option<Slice>>,
     /// Place of each state.
     states: Vec<Slice>,
     /// Places of outputs of the tick before.
@@ -70,7 +70,7 @@ impl Compiler<'_> {
         let mut sources = Vec::new();
         for source in &self.joined.observation {
             sources.push(match source {
-                Source::Value(slot) => self.place(*slot)?,
+                Source::Value(index) => self.place(*index)?,
                 Source::Before(output) => find(&self.before, *output).context("a state has no place")?,
             });
         }
@@ -79,10 +79,10 @@ impl Compiler<'_> {
         let observation = if is_whole && self.to.buffers[observation.buffer].lifetime == Lifetime::Step {
             observation
         } else {
-            self.to.own(observation)
+            self.to.writable_copy(observation)
         };
-        let targets = self.places(&plan.targets.iter().map(|target| target.slot).collect::<Vec<_>>())?;
-        self.to.phase = 1;
+        let targets = self.places(&plan.targets.iter().map(|target| target.value).collect::<Vec<_>>())?;
+        self.to.phase = Phase::After;
         let action = self.to.value(targets.iter().map(|target| target.len).sum());
         let mut offset = 0;
         for target in targets {
@@ -90,7 +90,7 @@ impl Compiler<'_> {
             offset += target.len;
         }
         self.advance()?;
-        let [before, after] = std::mem::take(&mut self.to.steps);
+        let (before, after) = (std::mem::take(&mut self.to.before), std::mem::take(&mut self.to.after));
         let buffers = std::mem::take(&mut self.to.buffers);
         Ok(Around {
             buffers,
@@ -113,12 +113,12 @@ impl Compiler<'_> {
         for (output, place) in self.before.clone() {
             moves.push((self.output(output)?, place));
         }
-        self.to.phase = 1;
+        self.to.phase = Phase::After;
         moves.retain(|(from, to)| from.buffer != to.buffer);
         // A state that another one takes must still have this tick's value then.
         for (from, _) in &mut moves {
             if self.to.buffers.get(from.buffer).is_some_and(|buffer| buffer.lifetime == Lifetime::State) {
-                *from = self.to.own(*from);
+                *from = self.to.writable_copy(*from);
             }
         }
         for (from, to) in moves {
@@ -128,20 +128,20 @@ impl Compiler<'_> {
     }
 
     /// Returns the place of a value; makes it, before the network if it does not depend on its output.
-    pub(super) fn place(&mut self, slot: Slot) -> Result<Slice> {
-        if let Some(place) = self.slots[slot] {
+    pub(super) fn place(&mut self, index: ValueIndex) -> Result<Slice> {
+        if let Some(place) = self.placed[index] {
             return Ok(place);
         }
-        let phase = std::mem::replace(&mut self.to.phase, usize::from(self.joined.depends[slot]));
-        let name = || self.plan.values[slot].labels.first().map_or_else(String::new, |label| label.value.clone());
-        let place = self.make(slot).with_context(|| format!("value {:?}", name()))?;
+        let phase = std::mem::replace(&mut self.to.phase, Phase::of(self.joined.depends[index]));
+        let name = || self.plan.values[index].labels.first().map_or_else(String::new, |label| label.value.clone());
+        let place = self.make(index).with_context(|| format!("value {:?}", name()))?;
         self.to.phase = phase;
-        self.slots[slot] = Some(place);
+        self.placed[index] = Some(place);
         Ok(place)
     }
 
-    fn places(&mut self, slots: &[Slot]) -> Result<Vec<Slice>> {
-        slots.iter().map(|slot| self.place(*slot)).collect()
+    fn places(&mut self, indices: &[ValueIndex]) -> Result<Vec<Slice>> {
+        indices.iter().map(|index| self.place(*index)).collect()
     }
 
     /// Returns the place of an output after its contract.
@@ -153,16 +153,16 @@ impl Compiler<'_> {
         let place = if has_weights(part) {
             let found = self.joined.outputs.iter().find(|(known, _)| *known == output);
             let span = found.context("an output of a network is not computed")?.1;
-            self.to.phase = 1;
+            self.to.phase = Phase::After;
             Slice { buffer: OUTPUT, offset: span.from, len: span.len }
         } else {
             let feeds = &self.plan.networks[output.0].feeds;
-            let depends = |read: &usize| matches!(feeds[*read], Feed::Value(slot) if self.joined.depends[slot]);
-            self.to.phase = usize::from(part.reads.iter().any(depends));
+            let depends = |read: &usize| matches!(feeds[*read], Feed::Value(index) if self.joined.depends[index]);
+            self.to.phase = Phase::of(part.reads.iter().any(depends));
             let mut read = Vec::new();
             for i in part.reads {
                 read.push(match feeds[*i] {
-                    Feed::Value(slot) => self.place(slot)?,
+                    Feed::Value(index) => self.place(index)?,
                     Feed::Before(before, _) => {
                         find(&self.before, (output.0, before)).context("a state has no place")?
                     }
@@ -185,25 +185,25 @@ impl Compiler<'_> {
         if contract.low.is_some() || contract.high.is_some() {
             let low = self.to.constant(&of(&contract.low, f32::MIN));
             let high = self.to.constant(&of(&contract.high, f32::MAX));
-            place = self.to.own(place);
+            place = self.to.writable_copy(place);
             self.to.emit(OpKind::Clip, place, Some(low), Some(high), StepData::None);
         }
         self.outputs.push((output, place));
         Ok(place)
     }
 
-    fn make(&mut self, slot: Slot) -> Result<Slice> {
+    fn make(&mut self, index: ValueIndex) -> Result<Slice> {
         let plan = self.plan;
-        match &plan.values[slot].maker {
-            Maker::Input(i) => {
+        match &plan.values[index].source {
+            ValueSource::Input(i) => {
                 let offset = plan.inputs[..*i].iter().map(|(_, len)| len).sum();
                 Ok(Slice { buffer: 0, offset, len: plan.inputs[*i].1 })
             }
-            Maker::State(i) => Ok(self.states[*i]),
-            Maker::Clock(clock, of) => self.clock(clock, of),
-            Maker::Motion { rows, lag, end } => self.motion(rows, *lag, *end),
-            Maker::Output(network, output) => self.output((*network, *output)),
-            Maker::Value(from, steps) => {
+            ValueSource::State(i) => Ok(self.states[*i]),
+            ValueSource::Clock(clock, of) => self.clock(clock, of),
+            ValueSource::Motion { rows, lag, end } => self.motion(rows, *lag, *end),
+            ValueSource::Output(network, output) => self.output((*network, *output)),
+            ValueSource::Value(from, steps) => {
                 let parts = self.places(from)?;
                 let mut chain = Chain::of(self.to.concatenated(&parts));
                 for step in steps {
@@ -224,7 +224,7 @@ impl Compiler<'_> {
         (value, count)
     }
 
-    fn clock(&mut self, clock: &Clock, of: &[Slot]) -> Result<Slice> {
+    fn clock(&mut self, clock: &Clock, of: &[ValueIndex]) -> Result<Slice> {
         if clock.wrap.is_none() && clock.restart_above.is_none() && clock.standing.is_none() {
             return Ok(self.time(clock));
         }
@@ -278,10 +278,10 @@ impl Compiler<'_> {
     }
 
     /// Returns the values that a step reads beside its own, each with `len` numbers.
-    fn operands(&mut self, step: &Step, len: usize) -> Result<Vec<Slice>> {
+    fn operands(&mut self, step: &ValueOp, len: usize) -> Result<Vec<Slice>> {
         let mut operands = Vec::new();
-        for slot in step.slots() {
-            let place = self.place(slot)?;
+        for index in step.read_values() {
+            let place = self.place(index)?;
             operands.push(if place.len == len { place } else { self.to.select(place, &vec![0; len]) });
         }
         Ok(operands)
@@ -293,7 +293,7 @@ fn limits(plan: &Plan) -> Option<[Vec<f32>; 2]> {
     let of = |which: usize, none: f32| {
         let each = plan.targets.iter().flat_map(move |target| match &target.limits {
             Some(limits) => limits[which].iter().map(|limit| *limit as f32).collect(),
-            None => vec![none; plan.values[target.slot].labels.len()],
+            None => vec![none; plan.values[target.value].labels.len()],
         });
         each.collect()
     };
@@ -318,8 +318,8 @@ fn ports(plan: &Plan) -> Vec<NamedPort> {
             TargetKind::Velocity => PortKind::Velocity,
             TargetKind::Torque => PortKind::Torque,
         };
-        let name = plan.names[target.slot].clone();
-        let len = plan.values[target.slot].labels.len();
+        let name = plan.names[target.value].clone();
+        let len = plan.values[target.value].labels.len();
         NamedPort { kind, name, names: target.joints.clone(), len, range: UNLIMITED }
     };
     plan.inputs.iter().enumerate().map(input).chain(plan.targets.iter().map(target)).collect()

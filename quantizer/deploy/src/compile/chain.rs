@@ -9,17 +9,17 @@ use actq_kernels::math::Function;
 
 use super::operations::{Operations, words};
 use crate::description::{Fill, First, History, Orientation};
-use crate::plan::{Arg, Step};
+use crate::plan::{Arg, ValueOp};
 
 /// Adding this to a number below 2^22 and subtracting it again rounds to an integer.
 const ROUND: f32 = 12_582_912.0;
 
-/// A value in the making.
+/// A value under construction.
 pub(super) struct Chain {
     value: Slice,
     /// Nothing else reads the value, so that an operation may overwrite it.
-    is_own: bool,
-    /// What is still to be done to it.
+    is_writable: bool,
+    /// Pending scale and offset.
     affine: Option<Affine>,
 }
 
@@ -40,66 +40,66 @@ fn single(numbers: &[f64]) -> Vec<f32> {
 
 impl Chain {
     pub(super) fn of(value: Slice) -> Self {
-        Self { value, is_own: false, affine: None }
+        Self { value, is_writable: false, affine: None }
     }
 
     pub(super) fn len(&self) -> usize {
         self.value.len
     }
 
-    /// Emits what is still to be done, and returns the value.
+    /// Emits the pending scale and offset; returns the value.
     pub(super) fn end(mut self, to: &mut Operations) -> Slice {
         self.flush(to)
     }
 
     /// Emits or notes an operation; `operands` are the values that it reads beside this one.
-    pub(super) fn step(&mut self, to: &mut Operations, step: &Step, operands: &[Slice]) -> Result<()> {
+    pub(super) fn step(&mut self, to: &mut Operations, step: &ValueOp, operands: &[Slice]) -> Result<()> {
         let len = self.len();
         match (step, operands) {
-            (Step::Add(Arg::Numbers(numbers)), _) => {
+            (ValueOp::Add(Arg::Numbers(numbers)), _) => {
                 self.shift(to, &numbers.iter().map(|number| -number).collect::<Vec<_>>());
             }
-            (Step::Subtract(Arg::Numbers(numbers)), _) => self.shift(to, numbers),
-            (Step::Scale(Arg::Numbers(numbers)), _) => self.scale(numbers),
-            (Step::Divide(Arg::Numbers(numbers)), _) => {
+            (ValueOp::Subtract(Arg::Numbers(numbers)), _) => self.shift(to, numbers),
+            (ValueOp::Scale(Arg::Numbers(numbers)), _) => self.scale(numbers),
+            (ValueOp::Divide(Arg::Numbers(numbers)), _) => {
                 self.scale(&numbers.iter().map(|number| 1.0 / number).collect::<Vec<_>>());
             }
-            (Step::Add(_), [other]) => {
-                let value = self.own(to);
+            (ValueOp::Add(_), [other]) => {
+                let value = self.make_writable(to);
                 to.with(OpKind::Add, value, *other);
             }
-            (Step::Subtract(_), [other]) => {
+            (ValueOp::Subtract(_), [other]) => {
                 let negative = to.times(*other, -1.0);
-                let value = self.own(to);
+                let value = self.make_writable(to);
                 to.with(OpKind::Add, value, negative);
             }
-            (Step::Scale(_), [other]) => {
-                let value = self.own(to);
+            (ValueOp::Scale(_), [other]) => {
+                let value = self.make_writable(to);
                 to.with(OpKind::Mul, value, *other);
             }
-            (Step::Clip(limits), _) => self.clip(to, limits, operands),
-            (Step::Select(places), _) => {
+            (ValueOp::Clip(limits), _) => self.clip(to, limits, operands),
+            (ValueOp::Select(places), _) => {
                 let value = self.flush(to);
                 self.replace(to.select(value, places));
             }
-            (Step::Place(places), _) => {
+            (ValueOp::Place(places), _) => {
                 let value = self.flush(to);
                 let mut from = vec![0; len];
                 places.iter().enumerate().for_each(|(i, place)| from[*place] = i);
                 self.replace(to.select(value, &from));
             }
-            (Step::Wrap, _) => {
+            (ValueOp::Wrap, _) => {
                 // x - tau * round(x / tau)
                 let (zero, one) = (vec![0.0; len], vec![1.0; len]);
-                let value = self.own(to);
+                let value = self.make_writable(to);
                 let turns = to.normalize(value, &zero, &vec![1.0 / TAU; len], f32::INFINITY);
                 let turns = to.normalize(turns, &vec![-ROUND; len], &one, f32::INFINITY);
                 let turns = to.normalize(turns, &vec![ROUND; len], &vec![-TAU; len], f32::INFINITY);
                 to.with(OpKind::Add, value, turns);
             }
-            (Step::Sin, _) => self.function(to, Function::Sin),
-            (Step::Cos, _) => self.function(to, Function::Cos),
-            (Step::Norm, _) => {
+            (ValueOp::Sin, _) => self.function(to, Function::Sin),
+            (ValueOp::Cos, _) => self.function(to, Function::Cos),
+            (ValueOp::Norm, _) => {
                 // The sum of x * x / |x|.
                 let value = self.flush(to);
                 let parts = direction(to, value);
@@ -110,25 +110,25 @@ impl Chain {
                 }
                 self.replace(sum);
             }
-            (Step::Gravity(orientation), _) => {
+            (ValueOp::Gravity(orientation), _) => {
                 let value = self.flush(to);
                 let gravity = gravity(to, *orientation, value);
                 self.replace(gravity);
             }
-            (Step::History(history), _) => {
+            (ValueOp::History(history), _) => {
                 let value = self.flush(to);
                 let frames = frames(to, history, value);
                 self.replace(frames);
             }
-            (Step::Divide(_), _) => bail!("an image cannot divide by a value; compute it in the application"),
-            (Step::Add(_) | Step::Subtract(_) | Step::Scale(_), _) => bail!("an operand is missing"),
+            (ValueOp::Divide(_), _) => bail!("an image cannot divide by a value; compute it in the application"),
+            (ValueOp::Add(_) | ValueOp::Subtract(_) | ValueOp::Scale(_), _) => bail!("an operand is missing"),
         }
         Ok(())
     }
 
     fn replace(&mut self, value: Slice) {
         // It may be a part of what others read.
-        (self.value, self.is_own) = (value, false);
+        (self.value, self.is_writable) = (value, false);
     }
 
     fn flush(&mut self, to: &mut Operations) -> Slice {
@@ -136,22 +136,22 @@ impl Chain {
             && (mean.iter().any(|mean| *mean != 0.0) || scale.iter().any(|scale| *scale != 1.0))
         {
             self.value = to.normalize(self.value, &single(&mean), &single(&scale), f32::INFINITY);
-            self.is_own = true;
+            self.is_writable = true;
         }
         self.value
     }
 
-    /// Makes the value one that may be overwritten.
-    fn own(&mut self, to: &mut Operations) -> Slice {
+    /// Copies the value if others read it; returns a value that may be overwritten.
+    fn make_writable(&mut self, to: &mut Operations) -> Slice {
         let value = self.flush(to);
-        if !self.is_own {
-            (self.value, self.is_own) = (to.own(value), true);
+        if !self.is_writable {
+            (self.value, self.is_writable) = (to.writable_copy(value), true);
         }
         self.value
     }
 
     fn function(&mut self, to: &mut Operations, function: Function) {
-        let value = self.own(to);
+        let value = self.make_writable(to);
         to.emit(OpKind::Function(function), value, None, None, StepData::None);
     }
 
@@ -188,15 +188,15 @@ impl Chain {
             let (mean, scale) = (single(mean), single(scale));
             self.affine = None;
             self.value = to.normalize(self.value, &mean, &scale, *high as f32);
-            self.is_own = true;
+            self.is_writable = true;
             return;
         }
         let mut operands = operands.iter().copied();
         let [low, high] = limits.each_ref().map(|limit| match limit {
             Arg::Numbers(numbers) => to.constant(&single(&each(numbers, len))),
-            Arg::Slot(_) => operands.next().unwrap_or(self.value),
+            Arg::Value(_) => operands.next().unwrap_or(self.value),
         });
-        let value = self.own(to);
+        let value = self.make_writable(to);
         to.emit(OpKind::Clip, value, Some(low), Some(high), StepData::None);
     }
 }
@@ -205,7 +205,7 @@ impl Chain {
 fn direction(to: &mut Operations, value: Slice) -> Slice {
     // An RMS norm divides by the norm over the root of the length.
     let weight = 1.0 / (value.len as f32).sqrt();
-    let direction = to.own(value);
+    let direction = to.writable_copy(value);
     let mut constants = vec![f32::MIN_POSITIVE];
     constants.extend(std::iter::repeat_n(weight, value.len));
     to.emit(OpKind::RmsNorm, direction, None, None, StepData::Constants(constants));
@@ -217,7 +217,7 @@ fn gravity(to: &mut Operations, orientation: Orientation, value: Slice) -> Slice
     let infinity = f32::INFINITY;
     let product = |to: &mut Operations, a: [Slice; 2], places: [[usize; 3]; 2]| {
         let [first, second] = [0, 1].map(|i| to.select(a[i], &places[i]));
-        let product = to.own(first);
+        let product = to.writable_copy(first);
         to.with(OpKind::Mul, product, second);
         product
     };
@@ -228,7 +228,7 @@ fn gravity(to: &mut Operations, orientation: Orientation, value: Slice) -> Slice
             // (sin p, -sin r cos p, -cos r cos p), of the sines of r and p and then their cosines.
             let mut waves = Vec::new();
             for function in [Function::Sin, Function::Cos] {
-                let angles = to.own(Slice { len: 2, ..value });
+                let angles = to.writable_copy(Slice { len: 2, ..value });
                 to.emit(OpKind::Function(function), angles, None, None, StepData::None);
                 waves.push(angles);
             }

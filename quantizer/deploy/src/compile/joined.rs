@@ -5,17 +5,17 @@ use actq::graph::ops::{Concat, Span};
 use actq::graph::{Graph, ValueId};
 use actq_kernels::Kind;
 
-use crate::plan::{Feed, Maker, Plan, Slot, Step, Work};
+use crate::plan::{Feed, Plan, TickStep, ValueIndex, ValueOp, ValueSource};
 use crate::sources::Part;
 
 /// An output: its network, and its number there.
 pub(super) type Output = (usize, usize);
 
-/// What the joined network reads.
+/// A part of the joined network's observation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
     /// A value.
-    Value(Slot),
+    Value(ValueIndex),
     /// An output in the tick before.
     Before(Output),
 }
@@ -23,7 +23,7 @@ pub(super) enum Source {
 impl Source {
     pub(super) fn len(self, plan: &Plan) -> usize {
         match self {
-            Self::Value(slot) => plan.values[slot].labels.len(),
+            Self::Value(index) => plan.values[index].labels.len(),
             Self::Before((network, output)) => plan.networks[network].compute.outputs()[output],
         }
     }
@@ -33,11 +33,11 @@ impl Source {
 #[derive(Debug)]
 pub(super) struct Joined {
     pub(super) graph: Graph,
-    /// What its observation is made of, one after the other.
+    /// Parts of its observation, one after the other.
     pub(super) observation: Vec<Source>,
     /// Outputs with weights, and their places in the joined output.
     pub(super) outputs: Vec<(Output, Span)>,
-    /// For each value, whether it depends on an output with weights.
+    /// `true` for each value that depends on a network with weights.
     pub(super) depends: Vec<bool>,
 }
 
@@ -58,12 +58,12 @@ pub(super) fn has_weights(part: Part<'_>) -> bool {
 
 /// Returns what a network reads by a feed whose first value is at `from`: the feed, and the parts that it is made of.
 pub(super) fn sources(plan: &Plan, network: usize, feed: &Feed, from: usize) -> Vec<(Source, usize)> {
-    let slot = match feed {
+    let index = match feed {
         Feed::Before(output, _) => return vec![(Source::Before((network, *output)), from)],
-        Feed::Value(slot) => *slot,
+        Feed::Value(index) => *index,
     };
-    let mut found = vec![(Source::Value(slot), from)];
-    if let Maker::Value(parts, steps) = &plan.values[slot].maker
+    let mut found = vec![(Source::Value(index), from)];
+    if let ValueSource::Value(parts, steps) = &plan.values[index].source
         && steps.is_empty()
     {
         let mut at = from;
@@ -113,22 +113,22 @@ impl Joined {
     }
 }
 
-/// Returns for each value whether it depends on weights.
+/// Returns `true` for each value that depends on weights.
 fn depends(plan: &Plan) -> Result<Vec<bool>> {
     let mut depends = vec![false; plan.values.len()];
     for work in &plan.order {
-        let Work::Make(slot) = *work else { continue };
-        depends[slot] = match &plan.values[slot].maker {
-            Maker::Input(_) | Maker::State(_) | Maker::Motion { .. } => false,
-            Maker::Clock(_, of) => of.iter().any(|value| depends[*value]),
-            Maker::Value(from, steps) => {
-                from.iter().copied().chain(steps.iter().flat_map(Step::slots)).any(|value| depends[value])
+        let TickStep::Value(index) = *work else { continue };
+        depends[index] = match &plan.values[index].source {
+            ValueSource::Input(_) | ValueSource::State(_) | ValueSource::Motion { .. } => false,
+            ValueSource::Clock(_, of) => of.iter().any(|value| depends[*value]),
+            ValueSource::Value(from, steps) => {
+                from.iter().copied().chain(steps.iter().flat_map(ValueOp::read_values)).any(|value| depends[value])
             }
-            Maker::Output(network, output) => {
+            ValueSource::Output(network, output) => {
                 let part = part(plan, (*network, *output))?;
                 let feeds = &plan.networks[*network].feeds;
                 has_weights(part)
-                    || part.reads.iter().any(|read| matches!(feeds[*read], Feed::Value(slot) if depends[slot]))
+                    || part.reads.iter().any(|read| matches!(feeds[*read], Feed::Value(index) if depends[index]))
             }
         };
     }
@@ -146,8 +146,8 @@ impl Builder<'_> {
     /// Lists the outputs with weights that something outside of networks reads.
     fn used(&self) -> Result<Vec<Output>> {
         let plan = self.plan;
-        let mut read: Vec<Slot> = vec![plan.action];
-        read.extend(plan.targets.iter().map(|target| target.slot));
+        let mut read: Vec<ValueIndex> = vec![plan.action];
+        read.extend(plan.targets.iter().map(|target| target.value));
         read.extend(plan.states.iter().map(|state| state.next));
         let mut seen = vec![false; plan.values.len()];
         let mut used = Vec::new();
@@ -157,21 +157,21 @@ impl Builder<'_> {
             }
             Ok(())
         };
-        while let Some(slot) = read.pop() {
-            if std::mem::replace(&mut seen[slot], true) {
+        while let Some(index) = read.pop() {
+            if std::mem::replace(&mut seen[index], true) {
                 continue;
             }
-            match &plan.values[slot].maker {
-                Maker::Output(network, output) => {
+            match &plan.values[index].source {
+                ValueSource::Output(network, output) => {
                     add((*network, *output))?;
                     if !has_weights(part(plan, (*network, *output))?) {
                         let feeds = plan.networks[*network].feeds.iter();
-                        read.extend(feeds.filter_map(|f| if let Feed::Value(slot) = f { Some(*slot) } else { None }));
+                        read.extend(feeds.filter_map(|f| if let Feed::Value(index) = f { Some(*index) } else { None }));
                     }
                 }
-                Maker::Clock(_, of) => read.extend(of),
-                Maker::Value(from, steps) => {
-                    read.extend(from.iter().copied().chain(steps.iter().flat_map(Step::slots)))
+                ValueSource::Clock(_, of) => read.extend(of),
+                ValueSource::Value(from, steps) => {
+                    read.extend(from.iter().copied().chain(steps.iter().flat_map(ValueOp::read_values)))
                 }
                 _ => {}
             }
@@ -188,19 +188,21 @@ impl Builder<'_> {
     }
 
     /// Returns the parts of a value that a network reads.
-    fn parts(&self, slot: Slot) -> Result<Vec<Slot>> {
-        if !self.depends[slot] {
-            return Ok(vec![slot]);
+    fn parts(&self, index: ValueIndex) -> Result<Vec<ValueIndex>> {
+        if !self.depends[index] {
+            return Ok(vec![index]);
         }
-        match &self.plan.values[slot].maker {
-            Maker::Output(network, output) if has_weights(part(self.plan, (*network, *output))?) => Ok(vec![slot]),
-            Maker::Value(from, steps) if steps.is_empty() => {
-                let parts = from.iter().map(|slot| self.parts(*slot)).collect::<Result<Vec<_>>>()?;
+        match &self.plan.values[index].source {
+            ValueSource::Output(network, output) if has_weights(part(self.plan, (*network, *output))?) => {
+                Ok(vec![index])
+            }
+            ValueSource::Value(from, steps) if steps.is_empty() => {
+                let parts = from.iter().map(|index| self.parts(*index)).collect::<Result<Vec<_>>>()?;
                 Ok(parts.concat())
             }
             _ => bail!(
                 "{:?} lies between two networks; an image can only put outputs and values one after the other there",
-                self.plan.values[slot].labels.first().map_or_else(String::new, |label| label.to_string())
+                self.plan.values[index].labels.first().map_or_else(String::new, |label| label.to_string())
             ),
         }
     }
@@ -211,7 +213,7 @@ impl Builder<'_> {
         for read in part(self.plan, output)?.reads {
             match &self.plan.networks[output.0].feeds[*read] {
                 Feed::Before(before, _) => reads.push(Source::Before((output.0, *before))),
-                Feed::Value(slot) => reads.extend(self.parts(*slot)?.into_iter().map(Source::Value)),
+                Feed::Value(index) => reads.extend(self.parts(*index)?.into_iter().map(Source::Value)),
             }
         }
         Ok(reads)
@@ -219,9 +221,9 @@ impl Builder<'_> {
 
     /// Returns the output that a source is, if it is no part of the observation.
     fn inner(&self, source: Source) -> Option<Output> {
-        let Source::Value(slot) = source else { return None };
-        match self.plan.values[slot].maker {
-            Maker::Output(network, output) if self.depends[slot] => Some((network, output)),
+        let Source::Value(index) = source else { return None };
+        match self.plan.values[index].source {
+            ValueSource::Output(network, output) if self.depends[index] => Some((network, output)),
             _ => None,
         }
     }

@@ -5,14 +5,29 @@ use actq::graph::lowering::{Buffer, BufferId, Lifetime, Slice, Step, StepData};
 use actq::graph::steps::operations;
 use actq_kernels::image::OpKind;
 
-/// Operations before or after the network, and the buffers of both.
+/// Time of operations, relative to the network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Phase {
+    #[default]
+    Before,
+    After,
+}
+
+impl Phase {
+    /// Returns the first phase in which an operation can run.
+    pub(super) fn of(depends_on_network: bool) -> Self {
+        if depends_on_network { Self::After } else { Self::Before }
+    }
+}
+
+/// Operations before and after the network, and the buffers of both.
 #[derive(Debug, Default)]
 pub(super) struct Operations {
     pub(super) buffers: Vec<Buffer>,
-    /// Operations before the network, and those after it.
-    pub(super) steps: [Vec<Step<Slice>>; 2],
-    /// Where operations go now: 0 before the network, 1 after it.
-    pub(super) phase: usize,
+    pub(super) before: Vec<Step<Slice>>,
+    pub(super) after: Vec<Step<Slice>>,
+    /// Phase of the operations that are emitted now.
+    pub(super) phase: Phase,
 }
 
 impl Operations {
@@ -32,7 +47,11 @@ impl Operations {
     }
 
     pub(super) fn emit(&mut self, kind: OpKind, dst: Slice, src: Option<Slice>, third: Option<Slice>, data: StepData) {
-        self.steps[self.phase].push(Step { kind, dst, src, third, data });
+        let steps = match self.phase {
+            Phase::Before => &mut self.before,
+            Phase::After => &mut self.after,
+        };
+        steps.push(Step { kind, dst, src, third, data });
     }
 
     pub(super) fn copy(&mut self, src: Slice, dst: Slice) {
@@ -96,7 +115,7 @@ impl Operations {
     }
 
     /// Copies a value that an operation in place will overwrite.
-    pub(super) fn own(&mut self, src: Slice) -> Slice {
+    pub(super) fn writable_copy(&mut self, src: Slice) -> Slice {
         let dst = self.value(src.len);
         self.copy(src, dst);
         dst

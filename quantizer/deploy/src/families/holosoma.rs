@@ -186,7 +186,7 @@ fn numbers(node: &Node) -> Option<Vec<f64>> {
     (!list.is_empty() && list.iter().all(|number| number.is_finite())).then_some(list)
 }
 
-/// A description in the making.
+/// A description under construction.
 struct Reader<'a> {
     parts: Parts,
     facts: &'a mut Facts,

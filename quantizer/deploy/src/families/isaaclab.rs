@@ -13,7 +13,7 @@ use actq::error::{Context as _, Result, bail};
 use actq_onnx::Signature;
 
 use self::agent::Agent;
-use self::describe::Maker;
+use self::describe::Builder;
 use self::environment::Environment;
 use self::model::{MODULES, Policy};
 use self::patterns::Joints;
@@ -125,6 +125,6 @@ impl Family for IsaacLab {
         if let Some(meta) = meta {
             agree::with_metadata(&policy, meta, environment.is_some())?;
         }
-        Maker { policy: &policy, graph: &graph, clip: agent.clip, action: ACTION, facts }.make(&signature)
+        Builder { policy: &policy, graph: &graph, clip: agent.clip, action: ACTION, facts }.make(&signature)
     }
 }

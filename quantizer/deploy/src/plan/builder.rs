@@ -6,7 +6,9 @@ use actq::error::{Context as _, Result, bail, ensure};
 
 use super::names::Names;
 use super::numbers;
-use super::parts::{Feed, Maker, Plan, Planned, PlannedNetwork, PlannedState, PlannedTarget, Slot, Work};
+use super::parts::{
+    Feed, Plan, Planned, PlannedNetwork, PlannedState, PlannedTarget, TickStep, ValueIndex, ValueSource,
+};
 use crate::description::{Clock, Description, Order, SCHEMA, Target};
 use crate::label::{Label, labels};
 use crate::sources::Sources;
@@ -60,7 +62,7 @@ pub(super) struct Builder<'a> {
     pub(super) description: &'a Description,
     names: &'a Names<'a>,
     sources: &'a dyn Sources,
-    values: BTreeMap<String, Slot>,
+    values: BTreeMap<String, ValueIndex>,
     /// Names whose values are being made.
     open: Vec<String>,
     /// Values of all names so far.
@@ -95,7 +97,7 @@ impl Builder<'_> {
             let labels = labels(&input.name, len, joints);
             self.plan.inputs.push((input.name.clone(), len));
             self.plan.ranges.push(input.range);
-            self.add(&input.name, Maker::Input(i), labels, input.joints.clone())?;
+            self.add(&input.name, ValueSource::Input(i), labels, input.joints.clone())?;
         }
         for (i, state) in description.states.iter().enumerate() {
             ensure!(
@@ -104,7 +106,7 @@ impl Builder<'_> {
                 state.name,
                 state.len
             );
-            self.add(&state.name, Maker::State(i), labels(&state.name, state.len, None), None)?;
+            self.add(&state.name, ValueSource::State(i), labels(&state.name, state.len, None), None)?;
         }
         // Every value is made and so checked, even if nothing reads it.
         let all: Vec<String> = self.names.all().map(str::to_owned).collect();
@@ -131,8 +133,8 @@ impl Builder<'_> {
 
     fn target(&mut self, target: &Target) -> Result<PlannedTarget> {
         let key = format!("target {:?}", target.value);
-        let slot = self.value(&target.value, &format!("{key}: value"))?;
-        let value = &self.plan.values[slot];
+        let index = self.value(&target.value, &format!("{key}: value"))?;
+        let value = &self.plan.values[index];
         let len = value.labels.len();
         if let Some(order) = &target.joints {
             let names = self.joints(order, &key)?.len();
@@ -153,7 +155,7 @@ impl Builder<'_> {
             Ok([low, high])
         });
         let limits = limits.transpose().with_context(|| format!("{key}: limits"))?;
-        Ok(PlannedTarget { kind: target.kind, slot, joints, limits })
+        Ok(PlannedTarget { kind: target.kind, value: index, joints, limits })
     }
 
     fn gains(&self) -> Result<()> {
@@ -165,7 +167,7 @@ impl Builder<'_> {
         );
         // With names of joints they may be those of the whole robot.
         if let (None, [target]) = (&gains.joints, &self.plan.targets[..]) {
-            let len = self.plan.values[target.slot].labels.len();
+            let len = self.plan.values[target.value].labels.len();
             ensure!(stiffness == len, "gains: they have {stiffness} values, and the target {len}");
         }
         for (name, list) in [("stiffness", &gains.stiffness), ("damping", &gains.damping)] {
@@ -184,15 +186,21 @@ impl Builder<'_> {
         Ok(())
     }
 
-    pub(super) fn add(&mut self, name: &str, maker: Maker, labels: Vec<Label>, joints: Option<String>) -> Result<Slot> {
+    pub(super) fn add(
+        &mut self,
+        name: &str,
+        source: ValueSource,
+        labels: Vec<Label>,
+        joints: Option<String>,
+    ) -> Result<ValueIndex> {
         self.in_all += labels.len();
         ensure!(self.in_all <= MOST_IN_ALL, "{name:?}: with it there are more than {MOST_IN_ALL} values");
-        let slot = self.plan.values.len();
-        self.plan.values.push(Planned { maker, labels, joints });
+        let index = self.plan.values.len();
+        self.plan.values.push(Planned { source, labels, joints });
         self.plan.names.push(name.to_owned());
-        self.values.insert(name.to_owned(), slot);
-        self.plan.order.push(Work::Make(slot));
-        Ok(slot)
+        self.values.insert(name.to_owned(), index);
+        self.plan.order.push(TickStep::Value(index));
+        Ok(index)
     }
 
     pub(super) fn joints(&self, order: &str, key: &str) -> Result<&[String]> {
@@ -201,20 +209,20 @@ impl Builder<'_> {
     }
 
     /// Returns the value of a name that `key` refers to; makes it first.
-    pub(super) fn value(&mut self, name: &str, key: &str) -> Result<Slot> {
-        if let Some(slot) = self.values.get(name) {
-            return Ok(*slot);
+    pub(super) fn value(&mut self, name: &str, key: &str) -> Result<ValueIndex> {
+        if let Some(index) = self.values.get(name) {
+            return Ok(*index);
         }
         if self.open.iter().any(|open| open == name) {
             bail!("{name:?} depends on itself through {}; keep one of them in a [[state]]", self.open.join(", "));
         }
         self.open.push(name.to_owned());
-        let slot = self.make(name, key)?;
+        let index = self.make(name, key)?;
         self.open.pop();
-        Ok(slot)
+        Ok(index)
     }
 
-    fn make(&mut self, name: &str, key: &str) -> Result<Slot> {
+    fn make(&mut self, name: &str, key: &str) -> Result<ValueIndex> {
         let description = self.description;
         if let Some(clock) = description.clocks.iter().find(|clock| clock.name == name) {
             return self.clock(clock);
@@ -230,8 +238,8 @@ impl Builder<'_> {
                 motion.file
             );
             numbers::finite(&array.values).context(key)?;
-            let maker = Maker::Motion { rows: array, lag: motion.lag, end: motion.end };
-            return self.add(name, maker, labels(name, row, None), None);
+            let source = ValueSource::Motion { rows: array, lag: motion.lag, end: motion.end };
+            return self.add(name, source, labels(name, row, None), None);
         }
         if let Some(value) = description.values.iter().find(|value| value.name == name) {
             return self.chain(value);
@@ -243,7 +251,7 @@ impl Builder<'_> {
         bail!("{key} = {name:?}: there is no value of this name; there are {}", self.names.listed())
     }
 
-    fn clock(&mut self, clock: &Clock) -> Result<Slot> {
+    fn clock(&mut self, clock: &Clock) -> Result<ValueIndex> {
         let key = format!("clock {:?}", clock.name);
         ensure!(!clock.start.is_empty(), "{key}: start is empty");
         numbers::finite(&clock.start).with_context(|| format!("{key}: start"))?;
@@ -268,7 +276,7 @@ impl Builder<'_> {
             }
         }
         let labels = labels(&clock.name, clock.start.len(), None);
-        self.add(&clock.name, Maker::Clock(clock.clone(), of), labels, None)
+        self.add(&clock.name, ValueSource::Clock(clock.clone(), of), labels, None)
     }
 
     /// Opens a network and adds the values of its outputs.
@@ -293,10 +301,10 @@ impl Builder<'_> {
                 (Some(_), Some(_)) => bail!("{own}: it is a state, too; remove one of them"),
                 (None, None) => bail!("{own} is missing: name the value of this input, or add it to states"),
                 (Some(value), None) => {
-                    let slot = self.value(value, &own)?;
-                    let given = self.plan.values[slot].labels.len();
+                    let index = self.value(value, &own)?;
+                    let given = self.plan.values[index].labels.len();
                     ensure!(given == *len, "{own} = {value:?} has {given} values, and the graph takes {len}");
-                    Feed::Value(slot)
+                    Feed::Value(index)
                 }
                 (None, Some(output)) => {
                     let at = outputs.iter().position(|o| o == output).unwrap_or(0);
@@ -313,11 +321,11 @@ impl Builder<'_> {
         let number = self.plan.networks.len();
         let inputs = inputs.into_iter().map(|(name, _)| name).collect();
         self.plan.networks.push(PlannedNetwork { compute, feeds, inputs });
-        self.plan.order.push(Work::Run(number));
+        self.plan.order.push(TickStep::Network(number));
         for (i, (output, len)) in outputs.iter().zip(lens).enumerate() {
             let name = format!("{}.{output}", network.name);
             let labels = labels(&name, len, None);
-            self.add(&name, Maker::Output(number, i), labels, None)?;
+            self.add(&name, ValueSource::Output(number, i), labels, None)?;
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use actq::error::{Context as _, Result, bail, ensure};
 
 use super::builder::{Builder, MOST};
 use super::numbers::finite;
-use super::parts::{Arg, Maker, Slot, Step};
+use super::parts::{Arg, ValueIndex, ValueOp, ValueSource};
 use crate::description::{Op, Operand, Order, Orientation, Value};
 use crate::label::Label;
 
@@ -16,14 +16,14 @@ struct Chain {
 
 impl Builder<'_> {
     /// Makes a value and what its operations read.
-    pub(super) fn chain(&mut self, value: &Value) -> Result<Slot> {
+    pub(super) fn chain(&mut self, value: &Value) -> Result<ValueIndex> {
         let own = format!("value {:?}", value.name);
         let names = value.from.names();
         ensure!(!names.is_empty(), "{own}: from is empty");
         let from = names.iter().map(|name| self.value(name, &format!("{own}: from"))).collect::<Result<Vec<_>>>()?;
-        let len: usize = from.iter().map(|slot| self.plan.values[*slot].labels.len()).sum();
+        let len: usize = from.iter().map(|index| self.plan.values[*index].labels.len()).sum();
         ensure!(len <= MOST, "{own}: from has {len} values; at most {MOST} are allowed");
-        let mut labels: Vec<Label> = from.iter().flat_map(|slot| self.plan.values[*slot].labels.clone()).collect();
+        let mut labels: Vec<Label> = from.iter().flat_map(|index| self.plan.values[*index].labels.clone()).collect();
         let mut joints = None;
         if let [only] = from[..] {
             joints.clone_from(&self.plan.values[only].joints);
@@ -37,10 +37,10 @@ impl Builder<'_> {
             let len = chain.labels.len();
             ensure!(0 < len && len <= MOST, "{key}: it gives {len} values; 1 to {MOST} are allowed");
         }
-        self.add(&value.name, Maker::Value(from, steps), chain.labels, chain.joints)
+        self.add(&value.name, ValueSource::Value(from, steps), chain.labels, chain.joints)
     }
 
-    fn op(&mut self, op: &Op, chain: &mut Chain, name: &str, key: &str) -> Result<Step> {
+    fn op(&mut self, op: &Op, chain: &mut Chain, name: &str, key: &str) -> Result<ValueOp> {
         let len = chain.labels.len();
         let fresh = |len| crate::label::labels(name, len, None);
         Ok(match op {
@@ -48,7 +48,7 @@ impl Builder<'_> {
                 let places = self.places(order, chain.joints.as_deref(), len, key)?;
                 chain.labels = places.iter().map(|place| chain.labels[*place].clone()).collect();
                 chain.joints = if let Order::Joints(order) = order { Some(order.clone()) } else { None };
-                Step::Select(places)
+                ValueOp::Select(places)
             }
             Op::Place(order) => {
                 let places = match order {
@@ -70,17 +70,17 @@ impl Builder<'_> {
                 }
                 chain.labels = labels.into_iter().flatten().collect();
                 chain.joints = if let Order::Joints(order) = order { Some(order.clone()) } else { None };
-                Step::Place(places)
+                ValueOp::Place(places)
             }
-            Op::Add(operand) => Step::Add(self.operand(operand, len, key)?),
-            Op::Subtract(operand) => Step::Subtract(self.operand(operand, len, key)?),
-            Op::Scale(operand) => Step::Scale(self.operand(operand, len, key)?),
+            Op::Add(operand) => ValueOp::Add(self.operand(operand, len, key)?),
+            Op::Subtract(operand) => ValueOp::Subtract(self.operand(operand, len, key)?),
+            Op::Scale(operand) => ValueOp::Scale(self.operand(operand, len, key)?),
             Op::Divide(operand) => {
                 let arg = self.operand(operand, len, key)?;
                 if let Arg::Numbers(numbers) = &arg {
                     ensure!(!numbers.contains(&0.0), "{key}: it divides by 0");
                 }
-                Step::Divide(arg)
+                ValueOp::Divide(arg)
             }
             Op::Clip([low, high]) => {
                 let both = [self.operand(low, len, key)?, self.operand(high, len, key)?];
@@ -90,20 +90,20 @@ impl Builder<'_> {
                         bail!("{key}: it clips to {} and {}; give the lower number first", at(low, i), at(high, i));
                     }
                 }
-                Step::Clip(both)
+                ValueOp::Clip(both)
             }
-            Op::Wrap => Step::Wrap,
-            Op::Sin => Step::Sin,
-            Op::Cos => Step::Cos,
+            Op::Wrap => ValueOp::Wrap,
+            Op::Sin => ValueOp::Sin,
+            Op::Cos => ValueOp::Cos,
             Op::Norm => {
                 *chain = Chain { labels: fresh(1), joints: None };
-                Step::Norm
+                ValueOp::Norm
             }
             Op::Gravity(orientation) => {
                 let needed = if *orientation == Orientation::Rpy { 3 } else { 4 };
                 ensure!(len == needed, "{key}: an orientation has {needed} values, and this has {len}");
                 *chain = Chain { labels: fresh(3), joints: None };
-                Step::Gravity(*orientation)
+                ValueOp::Gravity(*orientation)
             }
             Op::History(history) => {
                 ensure!(history.length > 0 && history.stride > 0, "{key}: length and stride must be at least 1");
@@ -112,7 +112,7 @@ impl Builder<'_> {
                 let ages = crate::history::ages(history);
                 let aged = |age: &usize| chain.labels.iter().map(|label| label.older(*age)).collect::<Vec<_>>();
                 *chain = Chain { labels: ages.iter().flat_map(aged).collect(), joints: None };
-                Step::History(*history)
+                ValueOp::History(*history)
             }
         })
     }
@@ -124,10 +124,10 @@ impl Builder<'_> {
             Operand::Name(name) => match self.description.constants.get(name) {
                 Some(list) => list.clone(),
                 None => {
-                    let slot = self.value(name, key)?;
-                    let given = self.plan.values[slot].labels.len();
+                    let index = self.value(name, key)?;
+                    let given = self.plan.values[index].labels.len();
                     ensure!(given == len || given == 1, "{key}: {name:?} has {given} values, and the value {len}");
-                    return Ok(Arg::Slot(slot));
+                    return Ok(Arg::Value(index));
                 }
             },
         };

@@ -5,37 +5,37 @@ use crate::label::{Label, labels};
 use crate::sources::{Array, Compute};
 
 /// Index of a value among all of a description.
-pub(crate) type Slot = usize;
+pub(crate) type ValueIndex = usize;
 
-/// How a value comes about.
-pub(crate) enum Maker {
-    /// The application writes raw input `0`.
+/// Source of a value.
+pub(crate) enum ValueSource {
+    /// Raw input `0`, which the application writes.
     Input(usize),
-    /// It is state `0`.
+    /// State `0`.
     State(usize),
-    /// It is clock `0`, which reads the norms of these values.
-    Clock(Clock, Vec<Slot>),
-    /// It is a row of a table.
+    /// Clock `0`, which reads the norms of these values.
+    Clock(Clock, Vec<ValueIndex>),
+    /// A row of a table.
     Motion { rows: Array, lag: usize, end: End },
-    /// Operations make it of these values, one after the other.
-    Value(Vec<Slot>, Vec<Step>),
-    /// It is output `1` of network `0`.
+    /// Operations on these values, one after the other.
+    Value(Vec<ValueIndex>, Vec<ValueOp>),
+    /// Output `1` of network `0`.
     Output(usize, usize),
 }
 
 /// A value.
 pub(crate) struct Planned {
-    pub(crate) maker: Maker,
+    pub(crate) source: ValueSource,
     /// One for each of its numbers.
     pub(crate) labels: Vec<Label>,
     /// The list of joints that its values are in the order of.
     pub(crate) joints: Option<String>,
 }
 
-/// Where a network's input comes from.
+/// Source of a network's input.
 pub(crate) enum Feed {
     /// A value of this tick.
-    Value(Slot),
+    Value(ValueIndex),
     /// Output number `0` in the tick before, of length `1`; zeros in the first.
     Before(usize, usize),
 }
@@ -51,24 +51,26 @@ pub(crate) struct PlannedNetwork {
 /// A state.
 pub(crate) struct PlannedState {
     pub(crate) start: Vec<f64>,
-    pub(crate) next: Slot,
+    pub(crate) next: ValueIndex,
 }
 
 /// A target.
 pub(crate) struct PlannedTarget {
     pub(crate) kind: TargetKind,
-    pub(crate) slot: Slot,
+    pub(crate) value: ValueIndex,
     /// Its joints, if they are given or known.
     pub(crate) joints: Vec<String>,
     /// Lowest and highest values, if they are given.
     pub(crate) limits: Option<[Vec<f64>; 2]>,
 }
 
-/// A step of a tick.
+/// One computation of a tick.
 #[derive(Clone, Copy)]
-pub(crate) enum Work {
-    Make(Slot),
-    Run(usize),
+pub(crate) enum TickStep {
+    /// Computes a value.
+    Value(ValueIndex),
+    /// Runs a network.
+    Network(usize),
 }
 
 /// A checked description.
@@ -82,8 +84,8 @@ pub struct Plan {
     pub(crate) ranges: Vec<Option<[f64; 2]>>,
     /// Name of each value.
     pub(crate) names: Vec<String>,
-    pub(crate) order: Vec<Work>,
-    pub(crate) action: Slot,
+    pub(crate) order: Vec<TickStep>,
+    pub(crate) action: ValueIndex,
     pub(crate) targets: Vec<PlannedTarget>,
 }
 
@@ -109,7 +111,7 @@ impl Plan {
     pub(crate) fn observation_labels(&self) -> Vec<Label> {
         let feeds = self.networks.iter().flat_map(|network| network.feeds.iter().zip(&network.inputs));
         let labels = feeds.map(|(feed, input)| match feed {
-            Feed::Value(slot) => self.values[*slot].labels.clone(),
+            Feed::Value(index) => self.values[*index].labels.clone(),
             Feed::Before(_, len) => labels(input, *len, None),
         });
         labels.flatten().collect()
@@ -121,11 +123,11 @@ pub(crate) enum Arg {
     /// Numbers, one for all or one for each.
     Numbers(Vec<f64>),
     /// A value.
-    Slot(Slot),
+    Value(ValueIndex),
 }
 
-/// An operation.
-pub(crate) enum Step {
+/// An operation on a value.
+pub(crate) enum ValueOp {
     Select(Vec<usize>),
     Place(Vec<usize>),
     Add(Arg),
@@ -141,14 +143,14 @@ pub(crate) enum Step {
     History(History),
 }
 
-impl Step {
+impl ValueOp {
     /// Returns the values that it reads beside the one that it changes.
-    pub(crate) fn slots(&self) -> Vec<Slot> {
+    pub(crate) fn read_values(&self) -> Vec<ValueIndex> {
         let args: &[Arg] = match self {
             Self::Add(arg) | Self::Subtract(arg) | Self::Scale(arg) | Self::Divide(arg) => std::slice::from_ref(arg),
             Self::Clip(both) => both,
             _ => &[],
         };
-        args.iter().filter_map(|arg| if let Arg::Slot(slot) = arg { Some(*slot) } else { None }).collect()
+        args.iter().filter_map(|arg| if let Arg::Value(index) = arg { Some(*index) } else { None }).collect()
     }
 }

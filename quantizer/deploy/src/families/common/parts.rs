@@ -1,4 +1,4 @@
-//! A description in the making.
+//! A description under construction.
 
 use actq::error::{Result, ensure};
 
@@ -10,7 +10,7 @@ use crate::description::{
 /// Stands for the policy's output until [`Parts::network`] knows its name.
 pub(crate) const ACTION: &str = "policy.ACTION";
 
-/// A description in the making.
+/// A description under construction.
 #[derive(Debug)]
 pub(crate) struct Parts {
     description: Description,

@@ -1,4 +1,4 @@
-//! A description in the making.
+//! A description under construction.
 
 use actq::error::Result;
 
@@ -18,7 +18,7 @@ pub(super) struct Term {
     pub(super) stated: usize,
 }
 
-/// A description in the making.
+/// A description under construction.
 pub(super) struct Reader<'a> {
     pub(super) yaml: &'a Document,
     pub(super) parts: Parts,

@@ -19,8 +19,8 @@ const RESERVED: [&str; 6] = [CLIPPED, "default", "observation", "processed", "ta
 /// Name of the action within its limit.
 const CLIPPED: &str = "clipped_action";
 
-/// A description in the making.
-pub(super) struct Maker<'a> {
+/// A description under construction.
+pub(super) struct Builder<'a> {
     pub(super) policy: &'a Policy,
     pub(super) graph: &'a Graph,
     /// Limit of the action, which the training's wrapper of the environment applies.
@@ -30,7 +30,7 @@ pub(super) struct Maker<'a> {
     pub(super) facts: &'a mut Facts,
 }
 
-impl Maker<'_> {
+impl Builder<'_> {
     pub(super) fn make(mut self, signature: &Signature) -> Result<Description> {
         let policy = self.policy;
         let mut parts = Parts::new("policy", policy.rate.numbers[0]);
@@ -74,7 +74,7 @@ impl Maker<'_> {
             // Isaac Lab adds the positions of each step of the simulation.
             let key = "relative.once";
             let meaning = format!(
-                "Isaac Lab adds a relative action to the joints' positions in each of the {} steps of a tick; shall the image add it one time a tick (true)?",
+                "Isaac Lab adds a relative action to the joints' positions in each of the {} steps of a tick; should the image add it once per tick (true)?",
                 self.policy.decimation
             );
             if self.policy.decimation > 1.0 {

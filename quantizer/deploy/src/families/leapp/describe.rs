@@ -19,8 +19,8 @@ use crate::sources::{Compute, Sources as _};
 /// A model's network, opened for the outputs that are used; `None` if none is.
 type Opened = Option<Box<dyn Compute>>;
 
-/// A description in the making.
-pub(super) struct Maker<'a> {
+/// A description under construction.
+pub(super) struct Builder<'a> {
     models: &'a [Model],
     pipeline: &'a Pipeline,
     facts: &'a mut Facts,
@@ -45,7 +45,7 @@ pub(super) fn describe(
     let rate = rate(yaml, facts)?;
     let initial = Initial::of(bundle, yaml, models, pipeline)?;
     let targets = targets(models, pipeline, facts)?;
-    let mut maker = Maker {
+    let mut builder = Builder {
         models,
         pipeline,
         facts,
@@ -56,43 +56,43 @@ pub(super) fn describe(
         orders: BTreeMap::new(),
     };
     for model in models {
-        let name = maker.free(&model.name);
-        maker.facts.note(&name, model.at.clone());
-        maker.networks.push(name);
+        let name = builder.free(&model.name);
+        builder.facts.note(&name, model.at.clone());
+        builder.networks.push(name);
     }
     let used: BTreeSet<At> = targets.iter().map(|(at, _)| *at).collect();
     for (i, opened) in opened(bundle, models, pipeline, used)?.into_iter().enumerate() {
         if let Some(network) = opened {
-            maker.network(i, network.as_ref())?;
+            builder.network(i, network.as_ref())?;
         }
     }
     let mut values = Vec::new();
     for (at, kind) in targets {
-        let (value, port) = (maker.value(at), &models[at.0].outputs[at.1]);
-        maker.facts.note(&value, port.at.clone());
+        let (value, port) = (builder.value(at), &models[at.0].outputs[at.1]);
+        builder.facts.note(&value, port.at.clone());
         match &port.names {
             Some(names) => {
-                let order = maker.order(&port.name, names);
-                maker.parts.target_joints(kind, &value, &order);
+                let order = builder.order(&port.name, names);
+                builder.parts.target_joints(kind, &value, &order);
             }
-            None => maker.parts.target(kind, &value),
+            None => builder.parts.target(kind, &value),
         }
         values.push(value);
     }
     match &values[..] {
-        [only] => maker.parts.act(only),
+        [only] => builder.parts.act(only),
         several => {
-            let action = maker.free("action");
-            maker.parts.values(&action, &several.iter().map(String::as_str).collect::<Vec<_>>());
-            maker.parts.act(&action);
+            let action = builder.free("action");
+            builder.parts.values(&action, &several.iter().map(String::as_str).collect::<Vec<_>>());
+            builder.parts.act(&action);
         }
     }
     if let Some([stiffness, damping]) = gains(bundle, models, pipeline)? {
-        let joints = (!stiffness.names.is_empty()).then(|| maker.order("gains", &stiffness.names));
-        maker.facts.note("gains", format!("{}; {}", stiffness.at, damping.at));
-        maker.parts.gains(Gains { joints, stiffness: stiffness.values, damping: damping.values });
+        let joints = (!stiffness.names.is_empty()).then(|| builder.order("gains", &stiffness.names));
+        builder.facts.note("gains", format!("{}; {}", stiffness.at, damping.at));
+        builder.parts.gains(Gains { joints, stiffness: stiffness.values, damping: damping.values });
     }
-    Ok(maker.parts.finish())
+    Ok(builder.parts.finish())
 }
 
 fn rate(yaml: &Document, facts: &mut Facts) -> Result<f64> {
@@ -142,7 +142,7 @@ fn read<'a>(model: &'a Model, network: &dyn Compute) -> Vec<(usize, &'a Port)> {
     model.inputs.iter().enumerate().filter(is_read).collect()
 }
 
-impl Maker<'_> {
+impl Builder<'_> {
     /// Returns a name like `wanted` that nothing has yet.
     fn free(&mut self, wanted: &str) -> String {
         // A point separates a network from its output.
