@@ -64,7 +64,7 @@ pub struct Description {
     /// Networks.
     #[serde(default, rename = "network", skip_serializing_if = "Vec::is_empty")]
     pub networks: Vec<Network>,
-    /// What the robot gets.
+    /// Targets for the robot's joints.
     #[serde(default, rename = "target", skip_serializing_if = "Vec::is_empty")]
     pub targets: Vec<Target>,
     /// Gains of the joints' controllers; data for the application, which no operation reads.

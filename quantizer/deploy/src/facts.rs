@@ -1,5 +1,4 @@
-//! What a reader knows, and from where: the bundle's files, the family's profile, or the user's answers. What nothing
-//! states becomes a question.
+//! Facts about a bundle, each with its source. A fact without a source becomes a question.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -33,7 +32,7 @@ pub(crate) struct Profile {
 pub(crate) struct Rule {
     /// Key of the answer.
     pub key: String,
-    /// What it says, as a question's text.
+    /// Text of the question.
     pub meaning: String,
     /// The family's value; none if it differs between the family's policies.
     pub value: Option<toml::Value>,
@@ -77,8 +76,8 @@ impl Answers {
         Ok(answers)
     }
 
-    /// Answers a question by what a person typed: a TOML value, or a text without its quotes. An empty line accepts what the
-    /// profile says.
+    /// Answers a question by what a person typed: a TOML value, or a text without its quotes. An empty line accepts
+    /// what the profile says.
     ///
     /// # Errors
     ///
@@ -94,7 +93,7 @@ impl Answers {
             _ if line.starts_with(['[', '{', '"', '\'']) => None,
             _ => Some(toml::Value::String(line.to_owned())),
         };
-        let value = value.with_context(|| format!("{}: {line:?} is no value of TOML", question.key))?;
+        let value = value.with_context(|| format!("{}: {line:?} is not a TOML value", question.key))?;
         self.0.insert(question.key.clone(), value);
         Ok(())
     }
@@ -122,13 +121,13 @@ impl fmt::Display for Answers {
 pub struct Question {
     /// Key of the answer.
     pub key: String,
-    /// What is asked.
+    /// Text of the question.
     pub meaning: String,
-    /// What the family's profile says, and where it says so.
+    /// Value of the family's profile, and its source.
     pub profile: Option<(String, String)>,
 }
 
-/// What a reader knows.
+/// Facts about a bundle.
 #[derive(Debug)]
 pub(crate) struct Facts {
     profile: Profile,
@@ -145,8 +144,7 @@ impl Facts {
         Self { profile, accepted, answers, used: BTreeSet::new(), questions: Vec::new(), sources: BTreeMap::new() }
     }
 
-    /// Returns a fact of the profile: the answer, or the accepted value of the profile, or else a default that stands
-    /// for it while the questions are collected.
+    /// Returns the answer, else the accepted profile value. While the question is open, returns a placeholder.
     ///
     /// # Errors
     ///
@@ -209,14 +207,14 @@ impl Facts {
         Ok(number)
     }
 
-    /// Returns one of the things that there are, by a rule that names it; the first while it is a question.
+    /// Returns one of `choices`, by the rule `key`; the first while it is a question.
     ///
     /// # Errors
     ///
     /// As [`Self::value_or_default`], or if there is none of this name.
-    pub(crate) fn choose_one_of(&mut self, key: &str, there: &[&str]) -> Result<String> {
-        let name = self.value(key)?.or_else(|| there.first().map(|&name| name.to_owned())).unwrap_or_default();
-        ensure!(there.contains(&name.as_str()), "{key} = {name:?}: there are {}", there.join(", "));
+    pub(crate) fn choose_one_of(&mut self, key: &str, choices: &[&str]) -> Result<String> {
+        let name = self.value(key)?.or_else(|| choices.first().map(|&name| name.to_owned())).unwrap_or_default();
+        ensure!(choices.contains(&name.as_str()), "{key} = {name:?}: there are {}", choices.join(", "));
         Ok(name)
     }
 

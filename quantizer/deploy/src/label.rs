@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// What a number of a value is.
+/// Meaning of a number of a value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Label {
     /// Value that it is part of, as one would name it in an observation.

@@ -1,4 +1,4 @@
-//! What surrounds a robot policy's network: raw inputs, histories, clocks, joint orders and targets.
+//! Surroundings of a robot policy's network: raw inputs, histories, clocks, joint orders and targets.
 #![deny(unsafe_code)]
 
 mod bundle;

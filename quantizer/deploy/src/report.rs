@@ -11,7 +11,7 @@ pub struct Row {
     pub section: &'static str,
     /// Its name.
     pub name: String,
-    /// What it is made of, and how.
+    /// Its inputs and operations.
     pub content: String,
 }
 

@@ -14,7 +14,7 @@ pub struct Tick {
     pub observation: Vec<f64>,
     /// The action as the network gives it.
     pub action: Vec<f64>,
-    /// What the robot gets.
+    /// Targets for the robot's joints.
     pub targets: Vec<(TargetKind, Vec<f64>)>,
 }
 

@@ -11,7 +11,8 @@ pub trait Compute {
     /// Returns the graph's inputs that its outputs depend on, in the graph's order, with their lengths.
     fn inputs(&self) -> &[(String, usize)];
 
-    /// Returns the graph's inputs that recurrent cells keep by themselves, from zero, with the outputs of their next values.
+    /// Returns the graph's inputs that recurrent cells keep by themselves, from zero, with the outputs of their next
+    /// values.
     fn kept(&self) -> &[(String, String)] {
         &[]
     }

@@ -146,8 +146,8 @@ impl Node {
     }
 }
 
-/// Moves closing brackets that begin a line to the right of the line before; `None` if there are none, or the text would
-/// grow to a multiple.
+/// Moves closing brackets that begin a line to the right of the line before; `None` if there are none, or the text
+/// would grow to a multiple.
 fn with_deeper_brackets(text: &str) -> Option<String> {
     let mut deeper = String::with_capacity(text.len());
     let mut before = 0;
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn closing_brackets_may_be_in_the_column_of_their_key() -> Result<()> {
+    fn closing_brackets_may_align_with_their_key() -> Result<()> {
         let text = "a:\n  b: [\n    1,\n    # more\n    2,\n  ] \n  c: {\n    x: [\n      3,\n    ],\n}\n  d: [\n  ]\n  e: 4\n";
         let node = Node::parse(text)?;
         let at = |key: &str| node.get("a").and_then(|a| a.get(key)).cloned();

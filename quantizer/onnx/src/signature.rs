@@ -1,4 +1,4 @@
-//! What a file says about its graph.
+//! The signature of a file: inputs, outputs and metadata of its graph.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -222,7 +222,7 @@ mod tests {
     use super::are_sides;
 
     #[test]
-    fn names_of_a_state_before_and_after_a_step_are_known() {
+    fn names_of_states_before_and_after_steps_pair() {
         for (before, after) in [
             ("h_in", "h_out"),
             ("state_in", "state_out"),

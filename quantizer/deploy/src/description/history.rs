@@ -11,13 +11,13 @@ pub struct History {
     /// Ticks from a frame to the next.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub stride: usize,
-    /// Which frame comes first.
+    /// Frame that comes first.
     #[serde(default)]
     pub first: First,
-    /// What frames before the first tick hold.
+    /// Content before the first tick.
     #[serde(default)]
     pub fill: Fill,
-    /// Whether the newest frame is that of this tick, or of the tick before.
+    /// `true` if the newest frame is this tick's; else the previous tick's.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub current: bool,
 }

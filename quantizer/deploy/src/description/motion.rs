@@ -15,12 +15,12 @@ pub struct Motion {
     /// Ticks by which the rows are late: row 0 is read until tick `lag`.
     #[serde(default)]
     pub lag: usize,
-    /// What follows the last row.
+    /// Continuation after the last row.
     #[serde(default)]
     pub end: End,
 }
 
-/// What follows the last row of a motion.
+/// Continuation after the last row of a motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum End {

@@ -1,14 +1,14 @@
-//! What the robot gets.
+//! Targets for the robot's joints.
 
 use serde::{Deserialize, Serialize};
 
 use super::numbers::Numbers;
 
-/// What the robot gets.
+/// A target for the robot's joints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Target {
-    /// What it is.
+    /// Quantity of its values.
     pub kind: TargetKind,
     /// Its value.
     pub value: String,

@@ -91,7 +91,7 @@ pub enum Order {
     Places(Vec<usize>),
 }
 
-/// How an orientation is given.
+/// Representation of an orientation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Orientation {

@@ -1,4 +1,4 @@
-//! What readers share.
+//! Parts that several families share.
 
 pub(super) mod action;
 mod graph;

@@ -16,7 +16,7 @@ use crate::facts::Facts;
 use crate::family::{Family, Found};
 use crate::yaml::{Data, Node};
 
-/// The family.
+/// Reader of holosoma bundles.
 #[derive(Debug)]
 pub(super) struct Holosoma;
 
@@ -268,10 +268,10 @@ impl Reader<'_> {
             "sin_phase" => ("leg_phases".to_owned(), vec![Op::Sin], self.clock()?),
             "cos_phase" => ("leg_phases".to_owned(), vec![Op::Cos], self.clock()?),
             other => {
-                // Only the application's code says what it is, so it is an input of its own name.
+                // Only the application knows this term, so it becomes a raw input.
                 let len: Option<usize> = self.facts.missing(
                     &format!("raw.{other}"),
-                    &format!("term {other:?} is not known to this reader; how many values does the application give?"),
+                    &format!("term {other:?}: unknown length; how many values does the application give?"),
                 )?;
                 let len = len.unwrap_or(1);
                 ensure!((1..=10_000).contains(&len), "raw.{other} = {len}: give 1 to 10000");

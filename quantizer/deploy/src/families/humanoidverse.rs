@@ -24,7 +24,7 @@ use crate::facts::Facts;
 use crate::family::{Family, Found};
 use crate::yaml::Node;
 
-/// The family.
+/// Reader of humanoidverse bundles.
 #[derive(Debug)]
 pub(super) struct Humanoidverse;
 

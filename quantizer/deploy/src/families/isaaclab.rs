@@ -25,7 +25,7 @@ use crate::facts::Facts;
 use crate::family::{Family, Found};
 use crate::yaml::Node;
 
-/// The family.
+/// Reader of Isaac Lab bundles.
 #[derive(Debug)]
 pub(super) struct IsaacLab;
 
@@ -40,7 +40,8 @@ impl Family for IsaacLab {
     fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
         let (mut exported, mut environments) = (Vec::new(), Vec::new());
         for file in bundle.with_ending("yaml").chain(bundle.with_ending("yml")) {
-            // Only files that name its modules can be of this family; the others need not be YAML that this reader knows.
+            // Only files that name its modules can be of this family; the others need not be YAML that this reader
+            // knows.
             let names_module = |text: &String| MODULES.iter().any(|module| text.contains(module));
             let Some(text) = bundle.text(file).ok().filter(names_module) else { continue };
             let root = Node::parse(&text).context(file.to_owned())?;

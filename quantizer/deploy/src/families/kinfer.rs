@@ -24,7 +24,7 @@ use crate::facts::Facts;
 use crate::family::{Family, Found};
 use crate::yaml::{Data, Node};
 
-/// The family.
+/// Reader of kinfer bundles.
 #[derive(Debug)]
 pub(super) struct Kinfer;
 

@@ -17,7 +17,7 @@ use crate::facts::Facts;
 use crate::family::{Family, Found};
 use crate::yaml::Node;
 
-/// The family.
+/// Reader of LEAPP bundles.
 #[derive(Debug)]
 pub(super) struct Leapp;
 

@@ -1,4 +1,5 @@
-//! Policies of LeRobot that read states only: `config.json` and the processors' files, with an ONNX file of the network.
+//! Policies of LeRobot that read states only: `config.json` and the processors' files, with an ONNX file of the
+//! network.
 
 mod dataset;
 mod feature;
@@ -25,7 +26,7 @@ use crate::facts::Facts;
 use crate::family::{Family, Found};
 use crate::yaml::Node;
 
-/// The family.
+/// Reader of LeRobot bundles.
 #[derive(Debug)]
 pub(super) struct Lerobot;
 
@@ -153,8 +154,8 @@ fn check_policy(config: &Document, facts: &mut Facts) -> Result<usize> {
     Ok(frames.unwrap_or(1))
 }
 
-/// Adds the targets: values whose names end in .pos or .vel are positions or velocities, and a rule says what the others
-/// are.
+/// Adds the targets: values whose names end in .pos or .vel are positions or velocities, and a rule says what the
+/// others are.
 fn targets(parts: &mut Parts, action: &Feature, names: Option<(Vec<String>, String)>, facts: &mut Facts) -> Result<()> {
     let (names, at) = names.unzip();
     let mut kinds = Vec::new();

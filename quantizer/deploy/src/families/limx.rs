@@ -11,7 +11,7 @@ use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
 
-/// The family.
+/// Reader of LimX bundles.
 #[derive(Debug)]
 pub(super) struct Limx;
 
@@ -91,7 +91,8 @@ fn refuse_rotated_imu(yaml: &Document) -> Result<()> {
     Ok(())
 }
 
-/// Returns the number of frames of the history. Refuses other lengths of frames, actions and commands than this reader's.
+/// Returns the number of frames of the history. Refuses other lengths of frames, actions and commands than this
+/// reader's.
 fn history_length(yaml: &Document, joints: usize) -> Result<usize> {
     let path = |name: &str| format!("PointfootCfg.size.{name}");
     let size = |name: &str| yaml.required(&path(name), "a number of values", count);

@@ -23,7 +23,7 @@ use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
 
-/// The family.
+/// Reader of mjlab bundles.
 #[derive(Debug)]
 pub(super) struct Mjlab;
 

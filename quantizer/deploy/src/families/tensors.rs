@@ -37,7 +37,7 @@ pub(super) fn finite(tensor: &Tensor, at: &str) -> Result<Vec<f64>> {
     let wrong = values.iter().position(|value| !(*value as f32).is_finite());
     ensure!(
         wrong.is_none(),
-        "{at}: value {} (the first is 0) is {}; give finite float32 numbers",
+        "{at}: value {} (from 0) is {}; give finite float32 numbers",
         wrong.unwrap_or_default(),
         wrong.map_or(0.0, |i| values[i])
     );

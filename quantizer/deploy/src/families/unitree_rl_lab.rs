@@ -11,7 +11,7 @@ use crate::facts::Facts;
 use crate::family::{Family, Found};
 use crate::yaml::Node;
 
-/// The family.
+/// Reader of unitree_rl_lab bundles.
 #[derive(Debug)]
 pub(super) struct UnitreeRlLab;
 
@@ -216,8 +216,8 @@ fn place(number: f64) -> Option<usize> {
     (number >= 0.0 && number.fract() == 0.0).then_some(number as usize)
 }
 
-/// The joints that a term names by `params.asset_cfg.joint_ids`, in its order. Upstream takes all where that is no list of
-/// numbers (deploy/include/isaaclab/envs/mdp/observations.h).
+/// The joints that a term names by `params.asset_cfg.joint_ids`, in its order. Upstream takes all where that is no list
+/// of numbers (deploy/include/isaaclab/envs/mdp/observations.h).
 fn chosen_joints(yaml: &Document, path: &str, joints: usize) -> Result<Option<Op>> {
     let path = format!("{path}.params.asset_cfg.joint_ids");
     let Some(ids) = yaml.node(&path).and_then(Node::numbers).filter(|ids| !ids.is_empty()) else { return Ok(None) };

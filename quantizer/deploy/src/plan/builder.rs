@@ -347,7 +347,7 @@ impl Builder<'_> {
             }
         };
         if let Some(place) = places.iter().find(|place| **place >= len) {
-            bail!("{key}: there is no place {place} in {len} values (the first is 0)");
+            bail!("{key}: place {place} (from 0) is not in {len} values");
         }
         Ok(places)
     }

@@ -12,7 +12,7 @@ const MOST_NAMES: usize = 1000;
 /// Most names in a message.
 const MOST_LISTED: usize = 20;
 
-/// What each name of a description is.
+/// Names of a description, and the outputs that they read.
 pub(crate) struct Names<'a> {
     /// Inputs, states, clocks, motions and values, in this order.
     own: Vec<&'a str>,

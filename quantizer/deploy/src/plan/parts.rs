@@ -95,8 +95,8 @@ impl Plan {
         &self.inputs
     }
 
-    /// Splits raw values that follow each other, as an image takes them, into the inputs of a tick. Values that are missing
-    /// make the last inputs shorter.
+    /// Splits raw values that follow each other, as an image takes them, into the inputs of a tick. Values that are
+    /// missing make the last inputs shorter.
     pub fn split(&self, raw: &[f32]) -> Vec<Vec<f64>> {
         let mut rest = raw.iter().map(|value| f64::from(*value));
         self.inputs.iter().map(|(_, len)| rest.by_ref().take(*len).collect()).collect()

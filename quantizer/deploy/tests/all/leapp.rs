@@ -117,7 +117,7 @@ fn what_the_file_omits_is_asked() -> Result<()> {
     let reading = files.reading(true, "target.joint_pos = \"velocity\"")?;
     ensure!(reading.description.targets[0].kind == TargetKind::Velocity, "{:?}", reading.description.targets);
     for (answer, expected) in [
-        ("target.joint_pos = \"none\"", "the robot gets none of the outputs"),
+        ("target.joint_pos = \"none\"", "no output is a target of joints"),
         ("target.joint_pos = \"pose\"", "answer target.joint_pos = \"pose\": give \"position\""),
     ] {
         refused(answer, files.reading(true, answer), expected)?;
@@ -200,7 +200,7 @@ fn damaged_files_are_refused() -> Result<()> {
         (
             "policy: [joint_pos, joint_pos_kp_gains, joint_pos_kd_gains]",
             "policy: []",
-            "the robot gets none of the outputs",
+            "no output is a target of joints",
         ),
         ("initial_values: walker_initial", "initial_values: ../../initial", "is not a file of the bundle"),
         ("initial_values: walker_initial", "initial_values: other", "walker/other_values.safetensors"),
@@ -211,7 +211,7 @@ fn damaged_files_are_refused() -> Result<()> {
     }
     let elsewhere = initial(&[("policy/last", SMOOTH)]);
     for (file, bytes, expected) in [
-        (INITIAL, initial(&[("observe/smooth_in", [f32::NAN; 4])]), "value 0 (the first is 0) is NaN"),
+        (INITIAL, initial(&[("observe/smooth_in", [f32::NAN; 4])]), "value 0 (from 0) is NaN"),
         (INITIAL, elsewhere, "\"policy/last\" is not an input that pipeline.feedback_flow names"),
         (INITIAL, b"{}".to_vec(), "not a .safetensors file"),
         ("walker/policy.onnx", b"onnx".to_vec(), "walker/policy.onnx"),

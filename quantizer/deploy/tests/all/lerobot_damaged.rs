@@ -88,7 +88,7 @@ fn edited_files_are_refused() -> Result<()> {
             "state_files",
             "policy_preprocessor.json step 3: it has no min of \"observation.state\"",
         ),
-        (before, "1e-08", "0.0", "value 2 (the first is 0) gives a division by 0"),
+        (before, "1e-08", "0.0", "value 2 (from 0) gives a division by 0"),
         (before, "1e-08", "NaN", "config.eps (line 24) must be a finite number"),
         (before, "1e-08", "2.0", "give a number from 0 to below 1"),
         (
@@ -146,14 +146,9 @@ fn other_files_are_refused() -> Result<()> {
             state("min", &[1.0]),
             "length of \"observation.state\": the bundle contradicts itself",
         ),
-        ("NaN", STATE, state("min", &[0.0, f32::NAN, 0.0]), "observation.state.min: value 1 (the first is 0) is NaN"),
-        ("an endless range", STATE, state("max", &[f32::INFINITY, 1.0, 1.0]), "value 0 (the first is 0) is inf"),
-        (
-            "a reversed range",
-            STATE,
-            state("max", &[2.0, -5.0, 0.25]),
-            "value 1 (the first is 0) is below the other end",
-        ),
+        ("NaN", STATE, state("min", &[0.0, f32::NAN, 0.0]), "observation.state.min: value 1 (from 0) is NaN"),
+        ("an endless range", STATE, state("max", &[f32::INFINITY, 1.0, 1.0]), "value 0 (from 0) is inf"),
+        ("a reversed range", STATE, state("max", &[2.0, -5.0, 0.25]), "value 1 (from 0) is below the other end"),
         ("float16", STATE, half, "is of type float16; use float32, float64 or int64"),
         ("no steps", before, b"{\"steps\": []}".to_vec(), "must be a list of steps"),
         (

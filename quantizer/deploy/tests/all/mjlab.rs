@@ -15,8 +15,8 @@ fn two_orders_of_joints_are_refused() -> Result<()> {
     let error = message(read(&Bundle::open(&folder.join("bundle"))?, true, Answers::default()));
     for part in [
         "contradicts itself",
-        "models/walk_mjlab.onnx metadata: joint_names says joint 0 (the first is 0) is \"r_shoulder_pitch_joint\"",
-        "configs/mjlab_walk_model.yaml: mjlab_walk_node.ros__parameters.joints.ordered_relevant_joint_names says joint 0 (the first is 0) is \"r_hip_pitch_joint\"",
+        "models/walk_mjlab.onnx metadata: joint_names says joint 0 (from 0) is \"r_shoulder_pitch_joint\"",
+        "configs/mjlab_walk_model.yaml: mjlab_walk_node.ros__parameters.joints.ordered_relevant_joint_names says joint 0 (from 0) is \"r_hip_pitch_joint\"",
         "joints.order",
     ] {
         ensure!(error.contains(part), "{part} is not in: {error}");
@@ -119,7 +119,7 @@ fn unknown_terms_are_asked() -> Result<()> {
     let bundle = files(2 + 17 + 3, 2, &terms, "");
     let asked = bundle.reading(true, "rate_hz = 50")?.questions;
     ensure!(asked.len() == 1 && asked[0].key == "raw.height_scan", "{asked:?}");
-    ensure!(asked[0].meaning.contains("17 of the graph's 22 values"), "{}", asked[0].meaning);
+    ensure!(asked[0].meaning.contains("the graph has 17 values for 1 such terms"), "{}", asked[0].meaning);
     let description = bundle.reading(true, "rate_hz = 50\nraw.height_scan = 17")?.description;
     let input = description.inputs.iter().find(|input| input.name == "height_scan");
     ensure!(input.is_some_and(|input| input.len == Some(17)), "{:?}", description.inputs);
@@ -163,7 +163,7 @@ fn bad_bundles_are_refused() -> Result<()> {
     };
     let none = String::new;
     let cases = [
-        ("another order", plain(), yaml("[a, b]", "[b, a]"), "joint 0 (the first is 0) is \"b\""),
+        ("another order", plain(), yaml("[a, b]", "[b, a]"), "joint 0 (from 0) is \"b\""),
         ("another joint", plain(), yaml("[a, b]", "[a, z]"), "names of the joints"),
         ("a joint twice", plain(), yaml("[a, b]", "[a, a]"), "occurs twice"),
         ("too few numbers", plain(), yaml("kp: [1, 2]", "kp: [1]"), "kp has 1 values"),

@@ -15,8 +15,8 @@ pub struct Choice {
     pub output: Option<String>,
     /// Inputs that hold recurrent state, with the outputs of their next values.
     pub states: Vec<(String, String)>,
-    /// `true` if the caller gives each input its value in each step, and takes the values of the output one after the other.
-    /// An input may then hold a state without a cell, and the output's axes mean nothing.
+    /// `true` if the caller gives each input its value in each step, and takes the values of the output one after the
+    /// other. An input may then hold a state without a cell, and the output's axes mean nothing.
     pub is_fed: bool,
 }
 

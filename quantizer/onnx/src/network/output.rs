@@ -129,7 +129,7 @@ mod tests {
     use super::is_action;
 
     #[test]
-    fn what_is_about_actions_is_no_action() {
+    fn names_about_actions_are_not_actions() {
         for name in ["action", "actions", "Action_Mean", "deterministic_action", "masked_actions", "elastic_action"] {
             assert!(is_action(name), "{name}");
         }

@@ -133,8 +133,8 @@ impl Exprs {
         Some(Found { cell: Cell { lstm: false, x, w_ih, w_hh, b_ih, b_hh, states: vec![h] }, next_c: None })
     }
 
-    /// Finds the update gate's operand, the new value and the old state of `(1 - z) n + z h` or `n + z (h - n)`, also with
-    /// `1 - z` as the gate.
+    /// Finds the update gate's operand, the new value and the old state of `(1 - z) n + z h` or `n + z (h - n)`, also
+    /// with `1 - z` as the gate.
     fn mixed(&mut self, next: Id) -> Option<(Id, Id, Run)> {
         let (x, y) = self.sum_of(next)?;
         for (x, y) in [(x, y), (y, x)] {

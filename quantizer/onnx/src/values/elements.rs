@@ -25,7 +25,7 @@ pub(crate) fn each(exprs: &mut Exprs, x: &Tensor, f: &dyn Fn(&mut Exprs, Id) -> 
     Ok(Tensor::of_elements(x.shape.clone(), all))
 }
 
-/// Sorts places by their values, if that gives fewer runs of neighbours: elements that a transpose scattered are then
+/// Sorts places by their values, if that gives fewer runs of neighbours. Elements that a transpose scattered are then
 /// computed in the order of the layer before it, and scattered afterwards.
 pub(crate) fn in_order(at: Vec<usize>, values: &dyn Fn(usize) -> [(Id, usize); 2]) -> Vec<usize> {
     let breaks = |order: &[usize]| {

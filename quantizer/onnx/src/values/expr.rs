@@ -144,8 +144,8 @@ pub(crate) struct Exprs {
     known: HashMap<(std::mem::Discriminant<Expr>, Id, usize), Vec<Id>>,
     /// Values with a limit on one side: the operand and both limits, one of which is infinite.
     pub(crate) limited: HashMap<Id, (Id, f64, f64)>,
-    /// Vectors that are limited on one side, each element by its own number: operand, limits, and 1 for lower ones, -1 for
-    /// upper ones.
+    /// Vectors that are limited on one side, each element by its own number: operand, limits, and 1 for lower ones, -1
+    /// for upper ones.
     pub(crate) limited_each: HashMap<Id, (Id, Vec<f64>, f64)>,
     /// Index of the node that each expression comes from.
     origins: Vec<usize>,

@@ -6,8 +6,8 @@ use super::parts::Parts;
 use crate::description::{Op, Orientation};
 use crate::facts::Facts;
 
-/// Returns the raw input that gives the direction of gravity by a rule, its length, and the operations on it. `open` stands
-/// for the rule while it is a question, and `quaternion` is the family's name of an orientation.
+/// Returns the raw input that gives the direction of gravity by a rule, its length, and the operations on it. `open`
+/// stands for the rule while it is a question, and `quaternion` is the family's name of an orientation.
 pub(crate) fn given_gravity(
     facts: &mut Facts,
     rule: &str,

@@ -1,11 +1,11 @@
-//! How a family keeps histories.
+//! Conventions of a family's histories.
 
 use actq::error::Result;
 
 use crate::description::{Fill, First, History};
 use crate::facts::Facts;
 
-/// How a family keeps histories.
+/// Conventions of a family's histories.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Histories {
     /// All frames of a term, then the next term; otherwise all terms of a frame.

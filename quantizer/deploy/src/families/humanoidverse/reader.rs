@@ -9,7 +9,7 @@ use crate::description::Op;
 use crate::document::Document;
 use crate::facts::Facts;
 
-/// What a term is made of.
+/// A term: its raw value, operations and length.
 pub(super) struct Term {
     pub(super) from: String,
     pub(super) ops: Vec<Op>,

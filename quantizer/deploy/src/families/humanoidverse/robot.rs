@@ -63,7 +63,8 @@ fn same_number(yaml: &Document, n: usize, key: &str, len: usize, what: &str) -> 
     ))
 }
 
-/// Asks for the order of the application's values if the motors have another order than the joints, or move in parallel.
+/// Asks for the order of the application's values if the motors have another order than the joints, or move in
+/// parallel.
 fn ask_for_order(yaml: &Document, facts: &mut Facts) -> Result<()> {
     let mut reordered = false;
     for key in ["JOINT2MOTOR", "MOTOR2JOINT"] {

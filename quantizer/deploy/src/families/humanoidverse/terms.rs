@@ -80,7 +80,7 @@ impl Reader<'_> {
             "cos_phase" => from(&self.phase()?, vec![Op::Scale(Operand::Number(TAU)), Op::Cos], 1),
             "ref_motion_phase" => self.motion_phase()?,
             other => {
-                // Only the application's code says what it is, so it is an input of its own name.
+                // Only the application knows this term, so it becomes a raw input.
                 self.facts.of_application(
                     &format!("raw.{other}"),
                     &format!("term {other:?} is not known to this reader; does the application compute it (true)?"),

@@ -8,7 +8,7 @@ use crate::bundle::{Bundle, beside};
 use crate::document::Document;
 use crate::yaml::Node;
 
-/// What a learner's configuration says of the policy.
+/// Facts about the policy in a learner's configuration.
 #[derive(Debug, Default)]
 pub(super) struct Agent {
     /// Limit of the action, which the learner's wrapper of the environment applies.

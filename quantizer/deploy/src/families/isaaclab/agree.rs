@@ -16,7 +16,8 @@ const DECIMALS: f64 = 5.1e-4;
 /// Gives what is compared of a term with this number of values.
 type OfTerm = fn(&Term, usize) -> Vec<f64>;
 
-/// Checks an environment by the exported descriptors of it, and takes from them the lengths of terms that only they have.
+/// Checks an environment by the exported descriptors of it, and takes from them the lengths of terms that only they
+/// have.
 pub(super) fn with_descriptors(environment: &mut Policy, descriptors: &Policy) -> Result<()> {
     same("ticks a second", &environment.rate, &descriptors.rate, F32)?;
     same("default positions", &environment.default, &descriptors.default, F32)?;
@@ -116,8 +117,8 @@ fn of_actions(own: &[Action], others: &[Action]) -> Result<()> {
     Ok(())
 }
 
-/// Checks a policy by the metadata that some exporters store in the ONNX file. `named` is set if the terms have the names
-/// of an environment.
+/// Checks a policy by the metadata that some exporters store in the ONNX file. `named` is set if the terms have the
+/// names of an environment.
 pub(super) fn with_metadata(policy: &Policy, meta: &Document, named: bool) -> Result<()> {
     let list = |key: &str| -> Result<Option<Given>> {
         Ok(numbers(meta, key)?.map(|numbers| Given { numbers, from: meta.location(key) }))
@@ -177,7 +178,7 @@ fn same(what: &str, own: &Given, other: &Given, most: f64) -> Result<()> {
     }
     let differs = |(_, (a, b)): &(usize, (&f64, &f64))| (*a - *b).abs() > most * (1.0 + a.abs());
     if let Some((i, (a, b))) = own.numbers.iter().zip(&other.numbers).enumerate().find(differs) {
-        let shown = |number: f64| format!("{number} for value {i} (the first is 0)");
+        let shown = |number: f64| format!("{number} for value {i} (from 0)");
         return Err(Facts::contradiction(what, (&own.from, &shown(*a)), (&other.from, &shown(*b))));
     }
     Ok(())
@@ -188,7 +189,7 @@ pub(super) fn orders(own: &super::patterns::Joints, other: &super::patterns::Joi
     let place = (0..own.len().max(other.len())).find(|place| own.names.get(*place) != other.names.get(*place));
     let Some(place) = place else { return Ok(()) };
     let shown = |joints: &super::patterns::Joints| match joints.names.get(place) {
-        Some(name) => format!("joint {place} (the first is 0) is {name:?}: {}", joints.names.join(", ")),
+        Some(name) => format!("joint {place} (from 0) is {name:?}: {}", joints.names.join(", ")),
         None => format!("{} joints: {}", joints.len(), joints.names.join(", ")),
     };
     Err(Facts::contradiction("order of the joints", (&own.from, &shown(own)), (&other.from, &shown(other))))

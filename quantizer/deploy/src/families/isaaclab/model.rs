@@ -1,4 +1,4 @@
-//! What Isaac Lab's files say of a policy, whichever of them says it.
+//! A policy as Isaac Lab's files describe it; each file gives some or all of it.
 
 use actq::error::{Result, ensure};
 

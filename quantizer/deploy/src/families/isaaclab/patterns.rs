@@ -1,5 +1,5 @@
-//! Joints by regular expressions, with the rules of Isaac Lab: a pattern matches a whole name, each pattern matches at least
-//! one joint, and each joint at most one pattern.
+//! Joints by regular expressions, with the rules of Isaac Lab. A pattern matches a whole name, each pattern matches at
+//! least one joint, and each joint at most one pattern.
 
 use actq::error::{Error, Result, ensure};
 use actq::text::printable;

@@ -1,4 +1,4 @@
-//! Inputs and outputs of the graph, and what the outputs are.
+//! Inputs and outputs of the graph, and the use of the outputs.
 
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
@@ -71,7 +71,7 @@ impl Graph {
     }
 }
 
-/// What the outputs are.
+/// Outputs by their use.
 pub(super) struct Outputs {
     pub(super) action: String,
     pub(super) scaled: String,

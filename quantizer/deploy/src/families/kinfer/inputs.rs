@@ -26,7 +26,7 @@ pub(super) fn inputs(
         let len = *len;
         if let Some(expected) = expected_len(base(input), n) {
             let at = inputs.at(input);
-            ensure!(len == expected, "{at} has {len} values; with {n} joints, {expected} are needed");
+            ensure!(len == expected, "{at} has {len} values; {expected} are needed for {n} joints");
         }
         if !inputs.add_state(&mut network, input, len)? {
             let value = inputs.value(input, len)?;

@@ -13,7 +13,7 @@ const MOST_XML_NODES: u32 = 100_000;
 /// Most levels of its bodies.
 const MOST_XML_LEVELS: usize = 256;
 
-/// What a MuJoCo file says of the policy's joints.
+/// The policy's joints in a MuJoCo file.
 pub(super) struct Robot {
     pub(super) file: String,
     /// Names of the policy's joints, in the order of `qpos`.

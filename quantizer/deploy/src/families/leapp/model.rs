@@ -134,8 +134,8 @@ fn port(yaml: &Document, path: &str) -> Result<Port> {
     Ok(Port { graph: name.clone(), name, shape, len, kind: text("kind")?, unit: text("units")?, names, is_series, at })
 }
 
-/// Reads the names of a port's values, and whether an axis is time. Up to schema 1.3, `element_names` has them, and from 1.4
-/// on, `axes`.
+/// Reads the names of a port's values, and whether an axis is time. Up to schema 1.3, `element_names` has them, and
+/// from 1.4 on, `axes`.
 fn names(yaml: &Document, path: &str, shape: &[usize], len: usize) -> Result<(Option<Vec<String>>, bool)> {
     let mut lists: Vec<Vec<String>> = Vec::new();
     let mut is_series = false;

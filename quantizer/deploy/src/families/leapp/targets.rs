@@ -1,4 +1,4 @@
-//! What the robot gets of a pipeline's outputs.
+//! Targets and gains of the joints among a pipeline's outputs.
 
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
@@ -34,7 +34,7 @@ pub(super) fn targets(models: &[Model], pipeline: &Pipeline, facts: &mut Facts) 
     }
     ensure!(
         !targets.is_empty(),
-        "pipeline.outputs: the robot gets none of the outputs; export one of the kind target/joint/position, velocity or torques"
+        "pipeline.outputs: no output is a target of joints; export one of the kind target/joint/position, velocity or torques"
     );
     Ok(targets)
 }
@@ -44,8 +44,7 @@ fn asked(port: &Port, facts: &mut Facts) -> Result<Option<TargetKind>> {
     let key = format!("target.{}", port.name);
     let kind = if port.kind.is_empty() { "none" } else { &port.kind };
     let meaning = format!(
-        "what of joints is the output {:?}, whose kind is {:?}: \"position\", \"velocity\", \"torque\", or \"none\" of them, which \
-         leaves it out?",
+        "which target of joints is the output {:?} of the kind {:?}: \"position\", \"velocity\", \"torque\", or \"none\"?",
         printable(&port.name),
         printable(kind)
     );

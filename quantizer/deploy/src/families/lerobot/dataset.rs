@@ -1,4 +1,4 @@
-//! What the files of the training say beside the policy: the rate, and the names of values.
+//! Facts in the files of the training: the rate, and the names of values.
 
 use actq::error::{Result, ensure};
 use actq::text::printable;

@@ -10,7 +10,7 @@ use crate::description::{Op, Operand};
 /// Largest relative difference of two normalizations that are the same.
 const SAME: f64 = 1e-3;
 
-/// How a vector is normalized: LeRobot's `NormalizationMode`.
+/// Method that normalizes a vector: LeRobot's `NormalizationMode`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mode {
     Identity,
@@ -43,7 +43,7 @@ impl Mode {
     }
 }
 
-/// What keeps a normalizer from a division by 0.
+/// Guard against division by 0.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Eps {
     pub(super) value: f64,
@@ -56,11 +56,11 @@ pub(super) struct Eps {
 #[derive(Debug)]
 pub(super) struct Normalizer {
     mode: Mode,
-    /// What is subtracted: means, or lower ends.
+    /// Numbers to subtract: means, or lower ends.
     center: Vec<f64>,
-    /// What a normalization divides by.
+    /// Divisors of the normalization.
     divisor: Vec<f64>,
-    /// What its reverse multiplies by.
+    /// Factors of its reverse.
     factor: Vec<f64>,
     /// The files and keys that state it.
     pub(super) source: String,
@@ -83,7 +83,7 @@ impl Normalizer {
         };
         let what = if is_range { "below the other end" } else { "negative" };
         let wrong = width.iter().position(|width| *width < 0.0);
-        ensure!(wrong.is_none(), "{second_at}: value {} (the first is 0) is {what}", wrong.unwrap_or_default());
+        ensure!(wrong.is_none(), "{second_at}: value {} (from 0) is {what}", wrong.unwrap_or_default());
         let replaced = |width: &f64| if *width == 0.0 { eps.value } else { *width };
         let added = |width: &f64| width + eps.value;
         let (divisor, factor): (Vec<f64>, Vec<f64>) = match (is_range, eps.added) {
@@ -94,7 +94,7 @@ impl Normalizer {
         let zero = divisor.iter().position(|divisor| *divisor < f64::from(f32::MIN_POSITIVE));
         ensure!(
             zero.is_none(),
-            "{second_at}: value {} (the first is 0) gives a division by 0 with eps = {}; give eps = 1e-8",
+            "{second_at}: value {} (from 0) gives a division by 0 with eps = {}; give eps = 1e-8",
             zero.unwrap_or_default(),
             eps.value
         );

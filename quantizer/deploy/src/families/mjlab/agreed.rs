@@ -1,4 +1,4 @@
-//! What the metadata and the YAML file both state: they must agree, or the user decides.
+//! Facts that both the metadata and the YAML file give. If they differ, the user decides.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,8 @@ const ROUNDING: f64 = 5.1e-4;
 /// Numbers by joint, and where they are.
 pub(super) type ByJoint = (BTreeMap<String, f64>, String);
 
-/// Returns the policy's order of joints, and where it is. The metadata and the YAML file must agree, or the user decides.
+/// Returns the policy's order of joints, and where it is. The metadata and the YAML file must agree, or the user
+/// decides.
 pub(super) fn order(
     raw: &[String],
     meta: &str,
@@ -38,7 +39,7 @@ pub(super) fn order(
     };
     let shown = |names: &[String]| {
         let name = names.get(i).map(|name| printable(name));
-        format!("joint {i} (the first is 0) is {:?}: {}", name.unwrap_or_default(), names.join(", "))
+        format!("joint {i} (from 0) is {:?}: {}", name.unwrap_or_default(), names.join(", "))
     };
     let dispute = Dispute {
         key: "joints.order",
@@ -52,13 +53,13 @@ pub(super) fn order(
 struct Dispute<'a> {
     key: &'a str,
     text: &'a str,
-    /// What both state.
+    /// Name of the fact that both state.
     what: &'a str,
 }
 
 impl Dispute<'_> {
-    /// Returns what the metadata or the file says, by the answer, and where it is. A statement has its value, its place and
-    /// what a message shows of it. Without an answer both contradict each other.
+    /// Returns what the metadata or the file says, by the answer, and where it is. A statement has its value, its place
+    /// and what a message shows of it. Without an answer both contradict each other.
     fn decide<T>(&self, meta: (T, &str, &str), file: (T, &str, &str), facts: &mut Facts) -> Result<(T, String)> {
         let Self { key, text, what } = self;
         let (value, at, _) = match facts.missing::<String>(key, text)?.as_deref() {

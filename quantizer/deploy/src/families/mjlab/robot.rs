@@ -202,7 +202,8 @@ struct Given<'a> {
 }
 
 impl Given<'_> {
-    /// Returns numbers by joint of the metadata, and of the YAML file. With `one`, a single number is that of all joints.
+    /// Returns numbers by joint of the metadata, and of the YAML file. With `one`, a single number is that of all
+    /// joints.
     fn pair(&self, own: &str, yaml: &str, one: bool) -> Result<(Option<ByJoint>, Option<ByJoint>)> {
         Ok((self.of_metadata(own, one)?, self.of_ros(yaml)?))
     }

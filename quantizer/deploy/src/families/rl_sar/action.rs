@@ -65,7 +65,7 @@ fn clip(config: &Config<'_>) -> Result<Option<[Vec<f64>; 2]>> {
     };
     if let Some(i) = (0..low.len()).find(|&i| low[i] > high[i]) {
         return Err(Facts::contradiction(
-            &format!("limits of action {i} (the first is 0)"),
+            &format!("limits of action {i} (from 0)"),
             (&config.location(keys[0]), &low[i].to_string()),
             (&config.location(keys[1]), &high[i].to_string()),
         ));

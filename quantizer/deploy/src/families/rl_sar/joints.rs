@@ -167,7 +167,7 @@ fn names(config: &Config<'_>) -> Result<Option<Names>> {
         if let (Some(own), Some(base)) = (&own, &base) {
             // The policy's list may end before the robot's.
             if let Some(i) = own.list.iter().zip(&base.list).position(|(own, base)| own != base) {
-                let joint = |names: &Names| format!("joint {i} (the first is 0) is {:?}", names.list[i]);
+                let joint = |names: &Names| format!("joint {i} (from 0) is {:?}", names.list[i]);
                 return Err(Facts::contradiction(
                     "order of the joints",
                     (&own.source, &joint(own)),

@@ -14,7 +14,7 @@ use crate::description::{Clock, Op, Operand, When};
 use crate::facts::Facts;
 use crate::yaml::Node;
 
-/// What the observation is made of.
+/// Terms of the observation under construction.
 pub(super) struct Terms<'a, 'b> {
     pub(super) config: &'a Config<'b>,
     pub(super) joints: &'a Joints,
@@ -44,7 +44,7 @@ impl Terms<'_, '_> {
         let mut all = Some(0);
         for (i, name) in terms.iter().enumerate() {
             let shown = config.location("observations");
-            ensure!(is_plain(name), "{shown}: term {i} (the first is 0) is no name: use letters, digits, _ - /");
+            ensure!(is_plain(name), "{shown}: term {i} (from 0) is not a name: use letters, digits, _ - /");
             ensure!(!terms[..i].contains(name), "{shown}: {name:?} occurs twice");
             let mut term = self.term(name)?;
             term.ops.push(clip_to(clip));
@@ -182,10 +182,9 @@ impl Terms<'_, '_> {
     /// Begins a term that is not one of the deploy code's, so that only the application knows it.
     fn unknown(&mut self, name: &str) -> Result<Term> {
         let key = format!("raw.{}", last_part(name));
-        let len: Option<usize> = self.facts.missing(
-            &key,
-            &format!("term {name:?} is not known to this reader; how many values does the application give?"),
-        )?;
+        let len: Option<usize> = self
+            .facts
+            .missing(&key, &format!("term {name:?}: unknown length; how many values does the application give?"))?;
         ensure!(len.is_none_or(|len| (1..=10_000).contains(&len)), "{key}: give 1 to 10000");
         let ops = self.parts.input(last_part(name), len.unwrap_or(1), "");
         Ok(Term { len, ops, source: self.facts.source(&key) })

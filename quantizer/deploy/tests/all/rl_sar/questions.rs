@@ -83,13 +83,13 @@ fn bad_bundles_are_refused() -> Result<()> {
         ("  ang_vel_scale: 0.25\n", "", "walk/config.yaml: dog/walk.ang_vel_scale is missing"),
         ("  clip_obs: 1.5\n", "  clip_obs: 1.5\n  observations: []\n", "key \"observations\" occurs twice"),
         ("\"dof_vel\"", "\"dof_pos\"", "\"dof_pos\" occurs twice"),
-        ("\"dof_vel\"", "\"dof\\e[2J\"", "term 4 (the first is 0) is no name"),
+        ("\"dof_vel\"", "\"dof\\e[2J\"", "term 4 (from 0) is not a name"),
         (
             "num_observations: 21",
             "num_observations: 20",
             "num_observations says 20, and walk/config.yaml: dog/walk.observations says terms of 21 values",
         ),
-        ("upper: [0.6, 0.65, 0.7, 0.8]", "upper: [0.6, -0.65, 0.7, 0.8]", "limits of action 1 (the first is 0)"),
+        ("upper: [0.6, 0.65, 0.7, 0.8]", "upper: [0.6, -0.65, 0.7, 0.8]", "limits of action 1 (from 0)"),
         ("  clip_actions_upper: [0.6, 0.65, 0.7, 0.8]\n", "", "clip_actions_lower is there without clip_actions_upper"),
         ("[2, 0, 3, 1]", "[2, 0, 2, 1]", "joint_mapping: joint 2 occurs twice"),
         (
@@ -106,7 +106,7 @@ fn bad_bundles_are_refused() -> Result<()> {
         (
             "  rl_kp",
             "  joint_names: [fl_leg]\n  rl_kp",
-            "dog/walk.joint_names says joint 0 (the first is 0) is \"fl_leg\", and base.yaml: dog.joint_names says joint 0 (the first is 0) is \"fr_leg\"",
+            "dog/walk.joint_names says joint 0 (from 0) is \"fl_leg\", and base.yaml: dog.joint_names says joint 0 (from 0) is \"fr_leg\"",
         ),
         ("\"fr_foot\"", "\"fr_leg\"", "dog.joint_names: \"fr_leg\" occurs twice"),
         ("\"fr_foot\"", "\"fr\\u202e\"", "is not a name"),

@@ -57,8 +57,8 @@ impl Exprs {
         }
     }
 
-    /// Returns `true` if a run is a whole layer or norm that can absorb the factors and offsets. `ones` means no factors,
-    /// `zeros` no offsets.
+    /// Returns `true` if a run is a whole layer or norm that can absorb the factors and offsets. `ones` means no
+    /// factors, `zeros` no offsets.
     fn absorbs(&self, run: &Run, ones: bool, zeros: bool) -> bool {
         let of_kind = match self.get(run.of) {
             Expr::Linear(..) => ones,
