@@ -124,7 +124,7 @@ impl Bundle {
         let path = self.path(file)?;
         let read = || -> Result<String> {
             let bytes = fs::metadata(&path)?.len();
-            ensure!(bytes <= MOST_TEXT, "it has {bytes} bytes, and at most {MOST_TEXT} are read");
+            ensure!(bytes <= MOST_TEXT, "it has {bytes} bytes; at most {MOST_TEXT} are allowed");
             Ok(fs::read_to_string(&path)?)
         };
         read().with_context(|| file.to_owned())

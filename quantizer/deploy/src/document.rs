@@ -150,7 +150,7 @@ fn find<'a>(node: &'a Node, path: &str) -> Option<&'a Node> {
     })
 }
 
-/// Returns `true` if a path is, or is below, what a pattern names.
+/// Returns `true` if a path is, or is below, one that a pattern names.
 fn fits(pattern: &str, path: &str) -> bool {
     let mut parts = path.split('.');
     pattern.split('.').all(|wanted| parts.next().is_some_and(|part| wanted == "*" || wanted == part))

@@ -12,7 +12,7 @@ pub(crate) trait Family: Sync {
     /// Returns its profile's text (TOML), whose `family` is its name.
     fn profile(&self) -> &'static str;
 
-    /// Finds what it reads in a bundle; `None` if the bundle is of another family.
+    /// Finds the files that it reads in a bundle; `None` if the bundle is of another family.
     ///
     /// # Errors
     ///

@@ -104,7 +104,7 @@ impl Output {
     }
 }
 
-/// Applies what the importer put into the contract of the graph's last operations.
+/// Applies the contract that the importer made of the graph's last operations.
 fn action(contract: &ActionContract, i: usize, value: f32) -> f32 {
     let of = |array: &Option<Vec<f32>>| array.as_ref().map(|array| array[i]);
     let value = value * of(&contract.scale).unwrap_or(1.0) + of(&contract.offset).unwrap_or(0.0);

@@ -54,7 +54,7 @@ impl Runner {
         runner
     }
 
-    /// Returns what it runs.
+    /// Returns its plan.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }

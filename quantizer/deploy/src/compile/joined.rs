@@ -56,7 +56,7 @@ pub(super) fn has_weights(part: Part<'_>) -> bool {
     !part.policy.graph.matrices.is_empty()
 }
 
-/// Returns what a network reads by a feed whose first value is at `from`: the feed, and the parts that it is made of.
+/// Returns the sources of a feed whose first value is at `from`: the feed itself, and its parts.
 pub(super) fn sources(plan: &Plan, network: usize, feed: &Feed, from: usize) -> Vec<(Source, usize)> {
     let index = match feed {
         Feed::Before(output, _) => return vec![(Source::Before((network, *output)), from)],
@@ -207,7 +207,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Returns what an output's network reads, one after the other.
+    /// Returns the sources that an output's network reads, one after the other.
     fn reads(&self, output: Output) -> Result<Vec<Source>> {
         let mut reads = Vec::new();
         for read in part(self.plan, output)?.reads {
@@ -228,7 +228,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Collects what an output's network, and those before it, read.
+    /// Collects the sources that an output's network, and those before it, read.
     fn read(&mut self, output: Output, seen: &mut Vec<Output>) -> Result<()> {
         if seen.contains(&output) {
             return Ok(());

@@ -18,7 +18,7 @@ pub(super) fn tensors(bundle: &Bundle, file: &str, keep: impl Fn(&str) -> bool) 
     let path = bundle.path(file)?;
     let read = || -> Result<_> {
         let bytes = fs::metadata(&path).context("cannot read the file")?.len();
-        ensure!(bytes <= MOST_BYTES, "it has {bytes} bytes, and at most {MOST_BYTES} are read");
+        ensure!(bytes <= MOST_BYTES, "it has {bytes} bytes; at most {MOST_BYTES} are allowed");
         let bytes = fs::read(&path).context("cannot read the file")?;
         let tensors = TensorFile::new(&bytes).context("not a .safetensors file, or a truncated one")?;
         let names = tensors.names().into_iter().filter(|name| keep(name));

@@ -13,7 +13,7 @@ use crate::description::{Clock, Description, Order, SCHEMA, Target};
 use crate::label::{Label, labels};
 use crate::sources::Sources;
 
-/// Most values that one name may have: what an image can address.
+/// Most values that one name may have; an image can address no more.
 pub(super) const MOST: usize = u16::MAX as usize;
 /// Most values of all names together.
 const MOST_IN_ALL: usize = 1 << 18;

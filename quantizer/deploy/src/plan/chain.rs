@@ -15,7 +15,7 @@ struct Chain {
 }
 
 impl Builder<'_> {
-    /// Makes a value and what its operations read.
+    /// Makes a value, after those that its operations read.
     pub(super) fn chain(&mut self, value: &Value) -> Result<ValueIndex> {
         let own = format!("value {:?}", value.name);
         let names = value.from.names();
@@ -101,7 +101,7 @@ impl Builder<'_> {
             }
             Op::Gravity(orientation) => {
                 let needed = if *orientation == Orientation::Rpy { 3 } else { 4 };
-                ensure!(len == needed, "{key}: an orientation has {needed} values, and this has {len}");
+                ensure!(len == needed, "{key}: an orientation has {needed} values; this value has {len}");
                 *chain = Chain { labels: fresh(3), joints: None };
                 ValueOp::Gravity(*orientation)
             }

@@ -19,6 +19,6 @@ pub(super) fn each(numbers: &Numbers, len: usize) -> Result<Vec<f64>> {
         Numbers::Each(numbers) => numbers.clone(),
     };
     finite(&numbers)?;
-    ensure!(numbers.len() == len, "it has {} numbers, and there are {len} values", numbers.len());
+    ensure!(numbers.len() == len, "it has {} numbers; {len} are needed", numbers.len());
     Ok(numbers)
 }

@@ -189,7 +189,7 @@ fn mistakes_are_refused_by_their_keys() {
         ("{ add = \"phase\" }", "{ clip = [1.0, -1.0] }", "give the lower number first"),
         ("{ add = \"phase\" }", "{ select = [0, 2] }", "place 2 (from 0) is not in 2 values"),
         ("{ add = \"phase\" }", "{ place = [1, 1] }", "not a permutation"),
-        ("{ add = \"phase\" }", "{ gravity = \"wxyz\" }", "an orientation has 4 values, and this has 2"),
+        ("{ add = \"phase\" }", "{ gravity = \"wxyz\" }", "an orientation has 4 values; this value has 2"),
         ("{ add = \"phase\" }", "{ history = { length = 0 } }", "length and stride must be at least 1"),
         ("{ add = \"phase\" }", "{ history = { length = 99999999999 } }", "it keeps more than"),
         ("{ add = \"phase\" }", "{ history = { length = 2 } }", "\"motion\" has 2 values, and the value 4"),

@@ -162,7 +162,7 @@ impl Builder {
         }
     }
 
-    /// Returns what a region holds.
+    /// Returns the content of a region.
     ///
     /// # Errors
     ///

@@ -42,7 +42,7 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Vec<Tenso
     };
     ensure!(
         rows == order.len() * hidden,
-        "has {rows} rows of weights for {hidden} values of state, {} are needed",
+        "has {rows} rows of weights for {hidden} values of state; {} are needed",
         order.len() * hidden
     );
     ensure!(x.shape.len() == 3, "reads the shape {:?}, not [step, batch, value]", x.shape);
@@ -68,7 +68,7 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Vec<Tenso
     let (w_ih, w_hh) = (matrix(w, 1, cols)?, matrix(r, 2, hidden)?);
     let (b_ih, b_hh) = if call.optional(3).is_some() {
         let b = call.reals(3, "a bias")?;
-        ensure!(b.len() == 2 * rows, "has {} biases, {} are needed", b.len(), 2 * rows);
+        ensure!(b.len() == 2 * rows, "has {} biases; {} are needed", b.len(), 2 * rows);
         (gated(&b[..rows], 1), gated(&b[rows..], 1))
     } else {
         (vec![0.0; rows], vec![0.0; rows])

@@ -143,7 +143,7 @@ impl Reader<'_> {
     fn places(&self, mask: &[f64], key: &str) -> Result<Vec<usize>> {
         let n = self.robot.len();
         let at = self.yaml.location(key);
-        ensure!(mask.len() == n, "{at} has {} values, but there are {n} joints", mask.len());
+        ensure!(mask.len() == n, "{at} has {} values; {n} are needed, one for each joint", mask.len());
         ensure!(mask.iter().all(|flag| *flag == 0.0 || *flag == 1.0), "{at} must hold 0 and 1 only");
         let places: Vec<usize> = (0..n).filter(|i| mask[*i] == 1.0).collect();
         ensure!(!places.is_empty(), "{at} selects no joint");

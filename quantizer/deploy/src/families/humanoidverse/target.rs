@@ -50,7 +50,12 @@ impl Reader<'_> {
             && self.facts.value("target.clip")?.unwrap_or(true)
         {
             for (key, list) in limits.iter().zip([&low, &high]) {
-                ensure!(list.len() == n, "{} has {} values, but there are {n} joints", yaml.location(key), list.len());
+                ensure!(
+                    list.len() == n,
+                    "{} has {} values; {n} are needed, one for each joint",
+                    yaml.location(key),
+                    list.len()
+                );
             }
             ops.push(Op::Clip([Operand::List(low), Operand::List(high)]));
             source = format!("{source}; {}", yaml.location(limits[0]));
@@ -129,7 +134,12 @@ impl Reader<'_> {
         let list = |key: &str| yaml.optional(key, "a list of finite numbers", Node::numbers);
         if let (Some(stiffness), Some(damping)) = (list("MOTOR_KP")?, list("MOTOR_KD")?) {
             for (key, list) in [("MOTOR_KP", &stiffness), ("MOTOR_KD", &damping)] {
-                ensure!(list.len() == n, "{} has {} values, but there are {n} joints", yaml.location(key), list.len());
+                ensure!(
+                    list.len() == n,
+                    "{} has {} values; {n} are needed, one for each joint",
+                    yaml.location(key),
+                    list.len()
+                );
             }
             let joints = self.robot.by_name.then(|| "robot".to_owned());
             self.parts.gains(Gains { joints, stiffness, damping });

@@ -271,7 +271,7 @@ impl Environment<'_> {
         })
     }
 
-    /// Returns what a term is, and whether a default is subtracted from it.
+    /// Returns a term's content, and `true` if a default is subtracted from it.
     fn what(&self, name: &str, function: &str, path: &str, actions: &[Action]) -> Result<(What, bool)> {
         let yaml = self.yaml;
         let unknown = |why: String| Ok((What::Unknown(why, None), false));

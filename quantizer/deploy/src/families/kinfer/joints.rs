@@ -15,7 +15,12 @@ pub(super) fn joint_names(meta: &Document, robot: Option<&Robot>, n: usize, fact
     let path = "joint_names";
     let stated = meta.optional(path, "a list of names", Node::texts)?;
     if let Some(stated) = &stated {
-        ensure!(stated.len() == n, "{} has {} names, and there are {n} actions", meta.location(path), stated.len());
+        ensure!(
+            stated.len() == n,
+            "{} has {} names; {n} are needed, one for each action",
+            meta.location(path),
+            stated.len()
+        );
     }
     let (names, source) = match (robot, stated) {
         (Some(robot), None) => (robot.joints.clone(), robot.file.clone()),
@@ -40,7 +45,7 @@ pub(super) fn joint_names(meta: &Document, robot: Option<&Robot>, n: usize, fact
                 "the bundle has no MuJoCo file (.xml) of the robot; which joints does the policy have, in order?",
             )?;
             let names = names.unwrap_or_else(|| (0..n).map(|i| format!("joint_{i}")).collect());
-            ensure!(names.len() == n, "joints.names has {} names, and there are {n} actions", names.len());
+            ensure!(names.len() == n, "joints.names has {} names; {n} are needed, one for each action", names.len());
             (names, facts.source("joints.names"))
         }
     };
@@ -94,7 +99,11 @@ pub(super) fn default_pose(meta: &Document, robot: Option<&Robot>, n: usize, fac
         Some(Pose::Of(of)) => bail!("{key} = {of:?}: give \"keyframe\", \"default_standing\" or a list of numbers"),
         None => (vec![0.0; n], facts.source(key)),
     };
-    ensure!(pose.len() == n, "the default pose ({source}) has {} values, and there are {n} actions", pose.len());
+    ensure!(
+        pose.len() == n,
+        "the default pose ({source}) has {} values; {n} are needed, one for each action",
+        pose.len()
+    );
     let differs = standing.is_some_and(|standing| standing != pose);
     let other = if differs {
         format!(" ({} differs, and is not used)", meta.location("default_standing"))

@@ -15,7 +15,7 @@ use crate::yaml::Node;
 
 /// Most models of a pipeline.
 const MOST_MODELS: usize = 64;
-/// Most values of a port: what an image can address.
+/// Most values of a port; an image can address no more.
 const MOST_VALUES: usize = u16::MAX as usize;
 /// Stands for an axis of times in `element_names`.
 const TIME: &str = "__temporal_axis__";

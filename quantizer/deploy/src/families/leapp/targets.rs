@@ -39,7 +39,7 @@ pub(super) fn targets(models: &[Model], pipeline: &Pipeline, facts: &mut Facts) 
     Ok(targets)
 }
 
-/// Asks what an output of another kind is; `None` if the robot does not get it.
+/// Asks for the target that an output of another kind is; `None` if it is none.
 fn asked(port: &Port, facts: &mut Facts) -> Result<Option<TargetKind>> {
     let key = format!("target.{}", port.name);
     let kind = if port.kind.is_empty() { "none" } else { &port.kind };

@@ -8,7 +8,7 @@ use super::ros::Ros;
 use crate::description::{Gains, Op, Operand, Order, TargetKind};
 use crate::facts::Facts;
 
-/// Adds the target: the scaled action, and what it is added to.
+/// Adds the target: the scaled action, added to its base.
 pub(super) fn target(parts: &mut Parts, robot: &Robot, ros: Option<&Ros<'_>>, facts: &mut Facts) -> Result<()> {
     let mut ops = vec![Op::Scale(Operand::Name("action_scale".to_owned()))];
     let base: Option<String> = facts.value("target.base")?;
