@@ -71,7 +71,7 @@ pub fn quantize(
     let recipe = Recipe::new(Widening::of(windows.recurrent()));
     let mut choosing = |share, error| progress(Progress::Choosing { share, error });
     let first = Candidate::new(goal, recipe)?;
-    let (candidate, chosen) = if options.learns() && first.task(goal, recipe).is_rest_of(windows) {
+    let (candidate, chosen) = if options.learns() && first.task(goal, recipe).has_lost_half(windows) {
         choose_recipe(goal, first, recipe, &mut choosing)
     } else {
         let feedback =
@@ -123,9 +123,9 @@ pub fn quantize(
         let expected = widths.iter().enumerate().map(|(r, width)| rows.expected(r, *width)).collect();
         let Rows { energy, removal, .. } = rows;
         // The rows of removed units count as rows without bits.
-        let [removal, expected] = [removal, expected].map(|of: Vec<f64>| cut.whole(m, of, cut.error_of_row()));
-        let energy = cut.whole(m, energy, 0.0);
-        let widths = cut.whole(m, widths, None);
+        let [removal, expected] = [removal, expected].map(|of: Vec<f64>| cut.expand(m, of, cut.error_of_row()));
+        let energy = cut.expand(m, energy, 0.0);
+        let widths = cut.expand(m, widths, None);
         let (rows, columns) = (compacted.rows[m].clone(), compacted.columns[m].clone());
         let allocation = RowAllocation { widths, energy, removal, expected, inputs: inputs[m].clone(), rows, columns };
         outcome.allocation = Some(allocation);

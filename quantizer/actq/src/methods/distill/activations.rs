@@ -15,44 +15,49 @@ use crate::methods::packing::{Activations, Packing};
 use crate::methods::quantized::{Quantized, dequantized};
 use crate::random::Random;
 
-/// Least share of the error that an int16 input must remove, more for matrices with a larger share of the weights: its
-/// kernel takes 1.3 to 1.7 times as long.
-const WORTH: f32 = 0.03;
-const WORTH_OF_ALL: f32 = 0.12;
+/// Least share of the error that an int16 input must remove, and the addition per share of the weights: its kernel takes
+/// 1.3 to 1.7 times as long.
+const MIN_ERROR_SHARE: f32 = 0.03;
+const EXTRA_SHARE_PER_WEIGHT_SHARE: f32 = 0.12;
 /// Ratio of bytes, int8 layout over int16 layout, above which a matrix of few columns and mostly 8-bit rows gets int16:
 /// int8 pads columns to 8, int16 to 4.
-const PADDED: f64 = 1.15;
+const MIN_PADDING_RATIO: f64 = 1.15;
 /// Divisor of all weights; a small matrix has at most this share.
-const SMALL: usize = 10;
+const SMALL_DIVISOR: usize = 10;
 const INT8: u16 = Activations::Int8.limit();
 const INT16: u16 = Activations::Int16.limit();
 /// Batches that the choice is measured on, and samples in each.
-const MEASURED: usize = 8;
-const SAMPLES: usize = 256;
+const ERROR_BATCHES: usize = 8;
+const BATCH_SAMPLES: usize = 256;
 
 /// Allocates widths for all rows, and the activations' magnitudes of learning: int8 unless requested otherwise, or
 /// int16 if it takes so many fewer bytes that other rows can use them. `size` does not reserve room for any layout yet.
 pub(super) fn allocated(size: Size<'_>, rows: &[Rows], options: &Options, allowed: f64) -> Result<(Widths, Vec<u16>)> {
-    let asked = vec![options.activations.limit(); size.graph.matrices.len()];
+    let requested = vec![options.activations.limit(); size.graph.matrices.len()];
     let within = |limits: &[u16]| {
-        let roomy = Size { packings: roomy(size.graph, limits, options), ..size.clone() };
-        allocate(&roomy, rows, allowed)
+        let size = Size { packings: reserved_packings(size.graph, limits, options), ..size.clone() };
+        allocate(&size, rows, allowed)
     };
-    let Ok(widths) = within(&asked) else { return tight(size, rows, options, allowed) };
+    let Ok(widths) = within(&requested) else { return allocated_in_smallest_layouts(size, rows, options, allowed) };
     let takes = |m: usize, limit: u16| size.matrix(&widths, m, Packing::of(limit, options.group)) as f64;
     let limit = |(m, &limit): (usize, &u16)| match options.activations.are_asked_for() {
-        false if takes(m, INT8) >= PADDED * takes(m, INT16) => INT16,
+        false if takes(m, INT8) >= MIN_PADDING_RATIO * takes(m, INT16) => INT16,
         _ => limit,
     };
-    let limits: Vec<u16> = asked.iter().enumerate().map(limit).collect();
-    if limits == asked {
+    let limits: Vec<u16> = requested.iter().enumerate().map(limit).collect();
+    if limits == requested {
         return Ok((widths, limits));
     }
-    Ok(within(&limits).map_or((widths, asked), |widths| (widths, limits)))
+    Ok(within(&limits).map_or((widths, requested), |widths| (widths, limits)))
 }
 
 /// Does the same if there is room for one layout only: the one that can take the fewest bytes.
-fn tight(size: Size<'_>, rows: &[Rows], options: &Options, allowed: f64) -> Result<(Widths, Vec<u16>)> {
+fn allocated_in_smallest_layouts(
+    size: Size<'_>,
+    rows: &[Rows],
+    options: &Options,
+    allowed: f64,
+) -> Result<(Widths, Vec<u16>)> {
     let forced: Vec<Option<Width>> = rows.iter().map(|rows| rows.forced).collect();
     let limits = smallest_limits(&size, options, &forced);
     let widths = allocate(&Size { packings: packed(&limits, options), ..size }, rows, allowed)?;
@@ -68,12 +73,12 @@ pub(super) fn least_bytes(size: &Size<'_>, options: &Options, forced: &[Option<W
 
 /// Returns the activations' magnitude of every matrix with which it can take the fewest bytes.
 fn smallest_limits(size: &Size<'_>, options: &Options, forced: &[Option<Width>]) -> Vec<u16> {
-    let asked = vec![options.activations.limit(); forced.len()];
+    let requested = vec![options.activations.limit(); forced.len()];
     if options.activations.are_asked_for() {
-        return asked;
+        return requested;
     }
     let least = |m: usize, limit: u16| {
-        let mut limits = asked.clone();
+        let mut limits = requested.clone();
         limits[m] = limit;
         let size = Size { packings: packed(&limits, options), ..size.clone() };
         size.bytes(&size.smallest(forced))
@@ -88,11 +93,11 @@ pub(super) fn packed(limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
 
 /// Returns the layouts that room is reserved for: that of every matrix's limit, and int16 for matrices that are still
 /// undecided and likely to need it, such as the first and the last layer.
-fn roomy(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
+fn reserved_packings(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
     let mut packings = packed(limits, options);
     for ((matrix, packings), limit) in graph.matrices.iter().zip(&mut packings).zip(limits) {
         let open = !options.activations.are_asked_for() && *limit == INT8;
-        if open && SMALL * matrix.data.len() <= graph.weights() {
+        if open && SMALL_DIVISOR * matrix.data.len() <= graph.weights() {
             packings.push(Packing::of(INT16, options.group));
         }
     }
@@ -112,13 +117,13 @@ pub fn choose_activations(
     let weights = dequantized(graph, quantized);
     let error = |x_max: &[u16], measured: usize| -> f32 {
         let network = Network::rounded(graph, x_max);
-        let samples = (SAMPLES / windows.window).max(8);
+        let samples = (BATCH_SAMPLES / windows.window).max(8);
         let batches = (0..measured).map(|i| windows.batch(samples, None, &mut Random::new(seed + i as u64)));
         losses(&network, &weights, windows, batches).sum()
     };
     let choices = 1 + quantized.len();
-    let measured = allowance.map_or(MEASURED, |allowance| {
-        let batches = allowance.fits(1, || _ = error(least, 1), choices, choices * MEASURED);
+    let measured = allowance.map_or(ERROR_BATCHES, |allowance| {
+        let batches = allowance.fits(1, || _ = error(least, 1), choices, choices * ERROR_BATCHES);
         batches / choices
     });
     let before = error(least, measured);
@@ -131,8 +136,8 @@ pub fn choose_activations(
             }
             let mut x_max = least.to_vec();
             x_max[m] = INT16;
-            let worth = WORTH + WORTH_OF_ALL * weights_of(&quantized[m]) / all;
-            if before - error(&x_max, measured) > worth * before { INT16 } else { least[m] }
+            let least_share = MIN_ERROR_SHARE + EXTRA_SHARE_PER_WEIGHT_SHARE * weights_of(&quantized[m]) / all;
+            if before - error(&x_max, measured) > least_share * before { INT16 } else { least[m] }
         })
         .collect()
 }
@@ -145,7 +150,7 @@ mod tests {
     use crate::methods::Method;
 
     #[test]
-    fn int16_is_taken_where_int8_pads_more() {
+    fn int16_is_taken_if_int8_pads_more() {
         let mut graph = Graph::new(18);
         for cols in [18, 320] {
             graph.matrices.push(WeightMatrix { name: "m".into(), rows: 64, cols, data: vec![0.0; 64 * cols] });

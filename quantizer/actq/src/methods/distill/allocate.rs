@@ -10,7 +10,7 @@ use actq_kernels::Width;
 
 use super::dimension::{Dimension, Widths};
 use super::size::{Price, Size};
-use crate::budget::{BudgetTooSmall, USED};
+use crate::budget::{BudgetTooSmall, MIN_USED_SHARE};
 use crate::error::Result;
 use crate::graph::WeightMatrix;
 
@@ -98,7 +98,7 @@ fn at_price(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
     };
     fill(&mut widths, size, rows, limit, WORTH * multiplier);
     // Rows without effect on the actions may take bytes that are left, but no time.
-    if size.cycles.is_none() && (size.bytes(&widths) as f64) < USED * limit {
+    if size.cycles.is_none() && (size.bytes(&widths) as f64) < MIN_USED_SHARE * limit {
         fill(&mut widths, size, rows, limit, 0.0);
     }
     Ok(widths)

@@ -2,9 +2,9 @@
 //! have lost most of their weights: feedback makes up for rounding, and not for rows that were removed.
 //!
 //! Each has three quarters of the episodes, and learning an eighth of its steps. The error is measured on the other
-//! episodes, at the recorded observations and at widened ones. A feed-forward network takes what has the lower error at
-//! the recorded observations, a recurrent one what has the lower error at widened ones. Which widening learns best
-//! cannot be found in this way: the differences are chance (docs/records/2026-11-26-cells.md).
+//! episodes, at the recorded observations and at widened ones. The lower error at the recorded observations decides for
+//! a feed-forward network, that at widened ones for a recurrent network. The best widening for learning cannot be found
+//! in this way: the differences are chance (docs/records/2026-11-26-cells.md).
 
 use nalgebra::DMatrix;
 
@@ -21,8 +21,8 @@ use crate::methods::quantized::{Quantized, dequantized};
 /// Least steps of which a part is spent on choices.
 pub(super) const LEAST_STEPS: usize = 3000;
 /// Divisor of the steps, and of the time, for one choice.
-const STEPS: usize = 8;
-const TIME: u32 = 12;
+const TRIAL_STEP_DIVISOR: usize = 8;
+const TRIAL_TIME_DIVISOR: u32 = 12;
 /// Predicted ratio of the errors after all steps and after an eighth of them: 0.6 to 1.15, 0.81 on average
 /// (docs/records/2026-11-22-choice.md).
 const ERROR_RATIO: f64 = 0.8;
@@ -55,7 +55,7 @@ impl Chosen {
 }
 
 /// Share of a trial in all the work.
-const SHARE: f64 = 1.0 / (STEPS + 1) as f64;
+const TRIAL_SHARE: f64 = 1.0 / (TRIAL_STEP_DIVISOR + 1) as f64;
 
 /// Tries all choices. If no episode can be held out, or few steps are to be learned, it tries nothing. It does not try
 /// feedback for an iterative head, since moments over all denoising steps take longer than the result is worth.
@@ -74,10 +74,10 @@ pub fn choose(
     if few || !learns && iterative {
         return untried;
     }
-    let Some((learned_from, left_out)) = windows.split() else { return untried };
+    let Some((learned_from, held_out)) = windows.split() else { return untried };
     let mut tried = Vec::new();
     let mut try_out = |choice, (quantized, graph): (Vec<Quantized>, Graph)| {
-        let [recorded, widened] = errors(task, &graph, &quantized, &left_out);
+        let [recorded, widened] = errors(task, &graph, &quantized, &held_out);
         tried.push(Tried { choice, recorded, widened });
     };
     if !iterative {
@@ -87,22 +87,25 @@ pub fn choose(
         }
     }
     if learns {
-        let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
+        let bounds = Bounds {
+            steps: steps.map(|steps| steps / TRIAL_STEP_DIVISOR),
+            time: time.map(|time| time / TRIAL_TIME_DIVISOR),
+        };
         let trial = Task { bounds, watched: None, ..task.clone() };
-        let learned = distill(&trial, &learned_from, &mut |now| progress(SHARE * now.share, now.error));
+        let learned = distill(&trial, &learned_from, &mut |now| progress(TRIAL_SHARE * now.share, now.error));
         try_out(Choice::Learning(task.recipe), (learned.quantized, learned.graph));
     }
-    let choice = best(&tried, windows.recurrent()).map_or(untried.choice, |best| best.choice);
-    let left = time.map(|time| time - time / TIME);
-    Chosen { choice, bounds: Bounds { steps, time: left }, tried, share: SHARE }
+    let choice = lowest_error(&tried, windows.recurrent()).map_or(untried.choice, |best| best.choice);
+    let remaining = time.map(|time| time - time / TRIAL_TIME_DIVISOR);
+    Chosen { choice, bounds: Bounds { steps, time: remaining }, tried, share: TRIAL_SHARE }
 }
 
-/// Returns the best choice: among those whose errors on the path differ by chance only, the one with the lowest error
-/// off it. Feedback is complete here, whereas learning has had an eighth of its steps.
-pub(super) fn best(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
-    let left = |tried: &Tried| if matches!(tried.choice, Choice::Learning(_)) { ERROR_RATIO } else { 1.0 };
-    let widened = |tried: &Tried| left(tried) * tried.widened;
-    let expected = |tried: &Tried| if recurrent { widened(tried) } else { left(tried) * tried.recorded };
+/// Returns the trial with the lowest expected error. Among those whose errors on the path differ by chance only, it is
+/// the one with the lowest error off it. Feedback is complete here, whereas learning has had an eighth of its steps.
+pub(super) fn lowest_error(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
+    let remaining = |tried: &Tried| if matches!(tried.choice, Choice::Learning(_)) { ERROR_RATIO } else { 1.0 };
+    let widened = |tried: &Tried| remaining(tried) * tried.widened;
+    let expected = |tried: &Tried| if recurrent { widened(tried) } else { remaining(tried) * tried.recorded };
     let lowest = tried.iter().map(expected).min_by(f64::total_cmp)?;
     let alike = tried.iter().filter(|tried| expected(tried) <= (1.0 + CHANCE) * lowest);
     alike.min_by(|a, b| widened(a).total_cmp(&widened(b)))
@@ -138,14 +141,14 @@ mod tests {
     fn without_learning_the_better_damping_is_taken() {
         let Learning { steps, choice, tried } = chosen(4, 0);
         assert_eq!((steps, tried.len()), (0, DAMPINGS.len()));
-        assert_eq!(best(&tried, false).map(|tried| tried.choice), Some(choice));
+        assert_eq!(lowest_error(&tried, false).map(|tried| tried.choice), Some(choice));
     }
 
     #[test]
     fn with_enough_steps_feedback_competes_with_learning() {
         let Learning { steps, choice, tried } = chosen(4, LEAST_STEPS);
         assert_eq!(tried.len(), DAMPINGS.len() + 1);
-        assert_eq!(best(&tried, false).map(|tried| tried.choice), Some(choice));
+        assert_eq!(lowest_error(&tried, false).map(|tried| tried.choice), Some(choice));
         assert_eq!(steps > 0, matches!(choice, Choice::Learning(_)));
     }
 
@@ -157,7 +160,7 @@ mod tests {
         };
         let fed_back = |recorded| Tried { choice: Choice::Feedback { damping: 0.01 }, recorded, widened: 9.0 };
         let [a, b] = [learned(0.1, 1.2, 2.0), learned(0.2, 1.0, 3.0)];
-        let choice = |tried: &[Tried], recurrent| best(tried, recurrent).map(|tried| tried.choice);
+        let choice = |tried: &[Tried], recurrent| lowest_error(tried, recurrent).map(|tried| tried.choice);
         assert_eq!([choice(&[a, b], false), choice(&[a, b], true)], [Some(b.choice), Some(a.choice)]);
         let [worse, better] = [fed_back(0.85), fed_back(0.75)];
         assert_eq!(choice(&[worse, a, b], false), Some(b.choice));

@@ -7,8 +7,8 @@ use crate::graph::narrow::{Narrowed, narrowed};
 use crate::graph::ties::Ties;
 use crate::graph::{Graph, WeightMatrix};
 
-/// Returns the number of a units in a share.
-fn kept_of(units: &Units, share: f64) -> usize {
+/// Returns the number of units in a share.
+fn kept_units(units: &Units, share: f64) -> usize {
     ((units.len as f64 * share).ceil() as usize).clamp(1, units.len)
 }
 
@@ -34,24 +34,30 @@ impl Cut {
         Self { graph: graph.clone(), rows: all(|m| m.rows), columns: all(|m| m.cols), former, error: 0.0 }
     }
 
-    /// Keeps the given share of all units, whichever, and only to count bytes.
-    pub(super) fn outline(graph: &Graph, share: f64) -> Self {
+    /// Keeps the given share of all units, the first ones: for counting bytes only.
+    pub(super) fn for_size(graph: &Graph, share: f64) -> Self {
         let ties = Ties::of(graph);
         let mut kept = ties.whole();
-        units(graph, &ties).iter().for_each(|units| kept[units.group].truncate(kept_of(units, share)));
+        units(graph, &ties).iter().for_each(|units| kept[units.group].truncate(kept_units(units, share)));
         Self::nothing(graph).keep(&ties, &kept)
     }
 
     /// Keeps the given share of all units: those with the largest `removals`. The contribution of the others
     /// is estimated from these by the moments of every matrix's input.
-    pub(super) fn to(graph: &Graph, units: &[Units], removals: &[Vec<f64>], share: f64, moments: &[&Moments]) -> Self {
+    pub(super) fn keep_share(
+        graph: &Graph,
+        units: &[Units],
+        removals: &[Vec<f64>],
+        share: f64,
+        moments: &[&Moments],
+    ) -> Self {
         let ties = Ties::of(graph);
         let mut kept = ties.whole();
         let mut cut = Self::nothing(graph);
         for (units, removals) in units.iter().zip(removals) {
             let mut ranked: Vec<usize> = (0..units.len).collect();
             ranked.sort_by(|&a, &b| removals[b].total_cmp(&removals[a]));
-            let gone = ranked.split_off(kept_of(units, share));
+            let gone = ranked.split_off(kept_units(units, share));
             ranked.sort_unstable();
             cut.error += gone.iter().map(|&unit| removals[unit]).sum::<f64>();
             kept[units.group] = ranked;
@@ -81,10 +87,10 @@ impl Cut {
     }
 
     /// Returns values of the rows of matrix `m` before the cut, with `gone` for removed ones.
-    pub(super) fn whole<T: Copy>(&self, m: usize, values: Vec<T>, gone: T) -> Vec<T> {
-        let mut whole = vec![gone; self.former[m]];
-        self.rows[m].iter().zip(values).for_each(|(&row, value)| whole[row] = value);
-        whole
+    pub(super) fn expand<T: Copy>(&self, m: usize, values: Vec<T>, gone: T) -> Vec<T> {
+        let mut all = vec![gone; self.former[m]];
+        self.rows[m].iter().zip(values).for_each(|(&row, value)| all[row] = value);
+        all
     }
 }
 
@@ -113,14 +119,14 @@ mod tests {
             let removals = set.removals(&graph, &moments, &g);
             let kept = set.len - gone.len();
             let share = kept as f64 / set.len as f64;
-            let cut = Cut::to(&graph, std::slice::from_ref(&set), &[removals], share, &moments);
+            let cut = Cut::keep_share(&graph, std::slice::from_ref(&set), &[removals], share, &moments);
             assert_eq!(cut.graph.state_len() * set.len, graph.state_len() * kept);
             assert!(cut.error < 1e-9, "{}", cut.error);
             for (a, b) in outputs(&graph).iter().flatten().zip(outputs(&cut.graph).iter().flatten()) {
                 assert!((a - b).abs() < 1e-5, "{a} and {b}");
             }
             let m = ties.rows.iter().position(|(_, layout)| layout.contains(&set.group)).expect("a matrix makes them");
-            let rows = cut.whole(m, vec![true; cut.rows[m].len()], false);
+            let rows = cut.expand(m, vec![true; cut.rows[m].len()], false);
             assert!((0..rows.len()).all(|row| rows[row] != gone.contains(&(row % set.len))));
         }
     }

@@ -1,5 +1,5 @@
-//! Batches with the f32 network's answers. The f32 network is often larger than the one that learns, so each of its
-//! answers is learned from several times, in different company.
+//! Batches with the f32 network's outputs. Each output is computed one time and learned from several times, in
+//! different batches. The f32 network is often larger than the one that learns.
 
 use ndarray::Array2;
 
@@ -7,13 +7,13 @@ use crate::calibrate::windows::{Batch, Windows};
 use crate::graph::{Graph, Network, State, Weights};
 use crate::random::Random;
 
-/// Times that an answer is learned from, on average.
-const USES: usize = 4;
+/// Times that an output is learned from, on average.
+const USES_PER_LESSON: usize = 4;
 /// Most lessons that are kept, and most values in all of them.
-const KEPT: usize = 256;
-const VALUES: usize = 1 << 23;
+const MAX_LESSONS: usize = 256;
+const MAX_VALUES: usize = 1 << 23;
 /// Least lessons that are kept.
-const LEAST_KEPT: usize = 16;
+const MIN_LESSONS: usize = 16;
 
 /// Observations, the state before the first, and the f32 network's outputs.
 #[derive(Debug)]
@@ -25,7 +25,7 @@ pub struct Lesson {
 }
 
 impl Lesson {
-    /// Asks the f32 network about a batch for the network `graph`, whose `states` are those of the episodes.
+    /// Runs the f32 network on a batch for the network `graph`, whose `states` are those of the episodes.
     pub fn of(windows: &Windows, batch: Batch, graph: &Graph, states: &[State]) -> Self {
         let target = windows.teach(&batch);
         Self { state: batch.state_of(graph, states), frames: batch.frames, target }
@@ -55,7 +55,7 @@ pub enum Source {
     Kept(usize),
 }
 
-/// The lessons of late.
+/// The latest lessons.
 #[derive(Debug)]
 pub struct Lessons {
     kept: Vec<Lesson>,
@@ -76,7 +76,7 @@ impl Lessons {
         let mut next = || {
             self.parts += 1;
             // The first batches are new, so that no lesson counts much more often than others.
-            if self.kept.len() < LEAST_KEPT || self.parts.is_multiple_of(USES) {
+            if self.kept.len() < MIN_LESSONS || self.parts.is_multiple_of(USES_PER_LESSON) {
                 Source::New(self.random.bits())
             } else {
                 Source::Kept(self.random.below(self.kept.len()))
@@ -90,12 +90,12 @@ impl Lessons {
         &self.kept[index]
     }
 
-    /// Keeps a lesson, in place of the oldest one if there are enough.
+    /// Keeps a lesson; above the limit, it replaces the oldest one.
     pub fn keep(&mut self, lesson: Lesson) {
-        let room = (VALUES / lesson.values().max(1)).clamp(LEAST_KEPT, KEPT);
-        match self.kept.len() < room {
+        let limit = (MAX_VALUES / lesson.values().max(1)).clamp(MIN_LESSONS, MAX_LESSONS);
+        match self.kept.len() < limit {
             true => self.kept.push(lesson),
-            false => self.kept[self.drawn % room] = lesson,
+            false => self.kept[self.drawn % limit] = lesson,
         }
         self.drawn += 1;
     }

@@ -1,13 +1,14 @@
 //! The expected error of removing elements of a hidden vector, together.
 //!
-//! An element that others repeat costs nothing to remove, but not all that repeat each other. So elements are ranked:
-//! the first explains most of the vector's effect, the next most of the rest, and so on (column subset selection by a
-//! pivoted Cholesky factorization; the criterion is that of Optimal Brain Surgeon, Hassibi, Stork 1993, for several
-//! weights). Each element's error is what it adds to those ranked before it. Whatever is kept down to a rank, the sum
-//! over the removed elements is the error of removing all of them, with least squares from the kept ones in their place.
+//! If several elements carry the same information, removing one costs nothing and removing all does. So elements are
+//! ranked: the first explains most of the vector's effect, the next most of the rest, and so on. This is column subset
+//! selection by a pivoted Cholesky factorization, with the criterion of Optimal Brain Surgeon (Hassibi, Stork 1993) for
+//! several weights. Each element's error is its addition to those ranked before it. If the elements down to any rank are
+//! kept, the sum over the others is the error of removing all of them, with least squares from the kept ones in their
+//! place.
 //!
-//! A recording has few frames for so many correlations. So an element costs at least its own effect, with compensation
-//! half as far (in logarithms) as the recording allows ([`importance`]).
+//! A recording has too few frames to estimate all correlations. So an element costs at least its own effect, with
+//! compensation half as far (in logarithms) as the recording allows ([`importance`]).
 
 use std::ops::Range;
 
@@ -83,25 +84,25 @@ pub(super) fn together(effects: &[Effect]) -> Vec<f64> {
     ranked(effects).into_iter().enumerate().map(|(j, joint)| joint.max(at_least(j))).collect()
 }
 
-/// Returns errors of removing elements as they are expected of a network that will be much smaller. `removals` are the measured
-/// ones, `whole` is the error of a network that always gives the mean action.
+/// Returns errors of removal in which every hidden vector costs the same, for networks that lose nearly all elements.
+/// `removals` are the measured ones; `mean_action_error` is the error of a network that always gives the mean action.
 ///
-/// Measured errors are those of small changes: linear in the elements, and with the other vectors as they are. Their sum
-/// over a vector can be a thirtieth of `whole`, although nothing is left of the action without the vector; and they hardly
-/// fall from rank to rank, so that widths that alternate between few and many elements look cheapest. Here every vector
-/// costs `whole`, and an element costs the geometric mean of what was measured and of a law by which `k` elements leave a
-/// `k + 1`-th of the error.
-pub(super) fn evened(removals: &[f64], whole: f64) -> Vec<f64> {
+/// Measured errors are those of small changes: linear in the elements, and with the other vectors unchanged. Their sum
+/// over a vector can be a thirtieth of `mean_action_error`, although the action is lost without the vector. And they
+/// hardly fall from rank to rank, so that widths that alternate between few and many elements look cheapest. Here every
+/// vector costs `mean_action_error`. An element costs the geometric mean of its measured error and of a law by which `k`
+/// elements leave a `k + 1`-th of the error.
+pub(super) fn even_layer_errors(removals: &[f64], mean_action_error: f64) -> Vec<f64> {
     let mut ranked: Vec<usize> = (0..removals.len()).collect();
     ranked.sort_by(|&a, &b| removals[b].total_cmp(&removals[a]));
-    let mut evened = vec![0.0; removals.len()];
+    let mut means = vec![0.0; removals.len()];
     for (rank, &j) in ranked.iter().enumerate() {
         let by_law = 1.0 / ((rank + 1) * (rank + 2)) as f64;
-        evened[j] = (removals[j] * by_law).sqrt();
+        means[j] = (removals[j] * by_law).sqrt();
     }
-    let sum = evened.iter().sum::<f64>();
-    let factor = if sum > 0.0 { whole / sum } else { 0.0 };
-    evened.iter().map(|error| error * factor).collect()
+    let sum = means.iter().sum::<f64>();
+    let factor = if sum > 0.0 { mean_action_error / sum } else { 0.0 };
+    means.iter().map(|error| error * factor).collect()
 }
 
 /// Returns the errors of the rows of a matrix without bits, if their elements stay: each then always gives its mean, and
@@ -267,17 +268,17 @@ mod tests {
     }
 
     #[test]
-    fn evened_errors_keep_their_order_and_add_up_to_the_whole() {
+    fn even_layer_errors_keep_order_and_sum() {
         let measured = [0.03, 0.0, 0.02, 0.05, 0.02];
-        let even = evened(&measured, 12.0);
+        let even = even_layer_errors(&measured, 12.0);
         assert!((even.iter().sum::<f64>() - 12.0).abs() < 1e-9, "{even:?}");
         for (a, b) in (0..measured.len()).flat_map(|a| (0..measured.len()).map(move |b| (a, b))) {
             assert!(measured[a] <= measured[b] || even[a] > even[b], "{even:?}");
         }
         // The first of equal elements costs sqrt(3) times as much as the second.
-        let of_equal = evened(&[0.1; 2], 1.0);
+        let of_equal = even_layer_errors(&[0.1; 2], 1.0);
         assert!((of_equal[0] / of_equal[1] - 3f64.sqrt()).abs() < 1e-9, "{of_equal:?}");
-        assert_eq!(evened(&[0.0; 3], 12.0), [0.0; 3]);
+        assert_eq!(even_layer_errors(&[0.0; 3], 12.0), [0.0; 3]);
     }
 
     #[test]

@@ -12,36 +12,37 @@ use crate::graph::Graph;
 use crate::methods::options::Effort;
 
 /// Share of the steps at the full rate.
-const HELD: f64 = 0.7;
-/// Most steps of a network of [`USUAL`] weights. The steps of others follow the square root of the size: a small
-/// network learns longer, a large one keeps its time. A step costs more for an iterative head, where a frame is one of
-/// every denoising step, and four times as much for a batch of a recurrent network's windows.
-const STEPS: f64 = 8_000.0;
-const DENOISING_STEPS: f64 = 5_000.0;
+const FULL_RATE_SHARE: f64 = 0.7;
+/// Most steps of a network of [`REFERENCE_WEIGHTS`] weights. The steps of others follow the square root of the size: a
+/// small network learns longer, and the time of a large one does not grow as much. A step costs more for an iterative
+/// head, where a frame is one of every denoising step, and four times as much for a batch of a recurrent network's
+/// windows.
+const FRAME_STEPS: f64 = 8_000.0;
+const DENOISING_HEAD_STEPS: f64 = 5_000.0;
 const WINDOW_STEPS: f64 = 4_000.0;
-const USUAL: f64 = 200_000.0;
+const REFERENCE_WEIGHTS: f64 = 200_000.0;
 /// Most steps of any network.
-const MOST: f64 = 10_000.0;
-/// Parts of the most steps whose mean errors form the error's course, and least steps of a part.
-const PARTS: usize = 16;
-const LEAST_PART: usize = 100;
-/// Least relative fall below the lowest part before; learning ends after several parts in a row without it.
-const FALLEN: f64 = 0.01;
-const FLAT: usize = 2;
+const MAX_STEPS: f64 = 10_000.0;
+/// Parts of the most steps; the mean error of each shows whether the error falls. Least steps of a part.
+const ERROR_PARTS: usize = 16;
+const MIN_PART_STEPS: usize = 100;
+/// Least relative fall below the lowest earlier part. Learning ends after [`MAX_FLAT_PARTS`] parts in a row without it.
+const MIN_FALL: f64 = 0.01;
+const MAX_FLAT_PARTS: usize = 2;
 
 /// Returns the most steps of a network.
 pub fn most_steps(graph: &Graph, effort: Effort) -> usize {
     let usual = match graph.state_len() > 0 {
         true => WINDOW_STEPS,
-        false if graph.denoising_steps() > 1 => DENOISING_STEPS,
-        false => STEPS,
+        false if graph.denoising_steps() > 1 => DENOISING_HEAD_STEPS,
+        false => FRAME_STEPS,
     };
     (effort.factor() * scaled(usual, graph.weights()) as f64) as usize
 }
 
 /// Returns the steps of a network of this many weights.
 fn scaled(usual: f64, weights: usize) -> usize {
-    (usual * (USUAL / weights.max(1) as f64).sqrt()).min(MOST) as usize
+    (usual * (REFERENCE_WEIGHTS / weights.max(1) as f64).sqrt()).min(MAX_STEPS) as usize
 }
 
 /// Limits of learning.
@@ -58,7 +59,7 @@ pub struct Bounds {
 pub struct Schedule {
     bounds: Bounds,
     started: Instant,
-    /// Steps in a part of the error's course.
+    /// Steps of a part.
     part: usize,
     step: usize,
     /// Steps at the full rate, as soon as the rate falls.
@@ -74,7 +75,7 @@ pub struct Schedule {
 impl Schedule {
     /// Starts at the first step; `usual` is the number of steps for the size of the network.
     pub fn new(bounds: Bounds, usual: usize) -> Self {
-        let part = (bounds.steps.unwrap_or(usual) / PARTS).max(LEAST_PART);
+        let part = (bounds.steps.unwrap_or(usual) / ERROR_PARTS).max(MIN_PART_STEPS);
         Self {
             bounds,
             started: Instant::now(),
@@ -93,7 +94,7 @@ impl Schedule {
         self.step
     }
 
-    /// Returns `true` if a part of the error's course has just ended.
+    /// Returns `true` if a part has just ended.
     pub fn is_at_part(&self) -> bool {
         self.step.is_multiple_of(self.part)
     }
@@ -105,11 +106,11 @@ impl Schedule {
 
     /// Returns the factor of the rates for the next step; `None` at the end.
     pub fn rate(&mut self) -> Option<f32> {
-        if self.held.is_none() && (self.flat >= FLAT || self.share() >= HELD) {
+        if self.held.is_none() && (self.flat >= MAX_FLAT_PARTS || self.share() >= FULL_RATE_SHARE) {
             self.held = Some(self.step);
         }
         let Some(held) = self.held else { return Some(1.0) };
-        let falls = ((held as f64 * (1.0 - HELD) / HELD).round() as usize).max(1);
+        let falls = ((held as f64 * (1.0 - FULL_RATE_SHARE) / FULL_RATE_SHARE).round() as usize).max(1);
         let fallen = self.step - held;
         let most = self.bounds.steps.unwrap_or(usize::MAX);
         if fallen >= falls || self.step >= most {
@@ -125,7 +126,7 @@ impl Schedule {
         if self.is_at_part() {
             let mean = self.sum / self.part as f64;
             (self.sum, self.last) = (0.0, Some(mean));
-            self.flat = if mean < (1.0 - FALLEN) * self.lowest { 0 } else { self.flat + 1 };
+            self.flat = if mean < (1.0 - MIN_FALL) * self.lowest { 0 } else { self.flat + 1 };
             self.lowest = self.lowest.min(mean);
         }
     }
@@ -133,7 +134,7 @@ impl Schedule {
     /// Returns the share that is done: of the limit at the full rate, of the remaining steps while it falls.
     pub fn share(&self) -> f64 {
         if let Some(held) = self.held {
-            return (self.step as f64 * HELD / held.max(1) as f64).min(1.0);
+            return (self.step as f64 * FULL_RATE_SHARE / held.max(1) as f64).min(1.0);
         }
         let of_steps = self.bounds.steps.map_or(0.0, |most| self.step as f64 / most.max(1) as f64);
         let of_time = self.bounds.time.map_or(0.0, |time| self.started.elapsed().as_secs_f64() / time.as_secs_f64());
@@ -190,6 +191,6 @@ mod tests {
     #[test]
     fn small_networks_take_more_steps() {
         assert_eq!(scaled(WINDOW_STEPS, 50_000), 8_000);
-        assert_eq!([10, 200_000, 800_000].map(|weights| scaled(STEPS, weights)), [10_000, 8_000, 4_000]);
+        assert_eq!([10, 200_000, 800_000].map(|weights| scaled(FRAME_STEPS, weights)), [10_000, 8_000, 4_000]);
     }
 }

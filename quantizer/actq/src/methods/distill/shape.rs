@@ -32,21 +32,20 @@ pub(super) struct Shape {
     pub(super) cut: Cut,
     /// Hidden vectors of its graph.
     pub(super) dimensions: Vec<Dimension>,
-    /// Reasons and widths of its rows.
+    /// Expected errors and widths of its rows.
     pub(super) rows: Vec<Rows>,
     pub(super) widths: Widths,
     /// Activation magnitude of every matrix.
     pub(super) limits: Vec<u16>,
-    /// Cycles of its rows, without those that removed units save elsewhere, if the rate limits them.
+    /// Cycles of its rows; removed units' savings elsewhere are subtracted. `None` without a time limit.
     pub(super) cycles: Option<f64>,
 }
 
 /// Shares of the units to choose from.
 const SHARES: [f64; 11] = [1.0, 0.875, 0.75, 0.625, 0.5, 0.4375, 0.375, 0.3125, 0.25, 0.1875, 0.125];
 
-/// Chooses the units, and the widths of all rows. Units are removed together where something is learned and no width is
-/// forced: of several shares of them, the one with the lowest expected error stays. The
-/// recipe says how errors are expected.
+/// Chooses the units, and the widths of all rows. Units are removed if the network learns and no width is forced: of
+/// several shares of them, the one with the lowest expected error is kept. The recipe determines the expected errors.
 pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, recipe: Recipe) -> Result<Shape> {
     let Recipe { rounding, even, .. } = recipe;
     let RowStatistics { inputs, outputs, moments, .. } = statistics;
@@ -81,7 +80,7 @@ pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, recipe: Recipe
         return of_cut(Cut::nothing(graph));
     }
     let shapes: Vec<Result<Shape>> =
-        SHARES.par_iter().map(|share| of_cut(Cut::to(graph, units, &of_units, *share, &of_inputs))).collect();
+        SHARES.par_iter().map(|share| of_cut(Cut::keep_share(graph, units, &of_units, *share, &of_inputs))).collect();
     // The last error names the fewest bytes: those of the fewest units.
     let most = rate.cycles();
     let best = shapes.into_iter().reduce(|best, next| match (&best, &next) {
@@ -94,12 +93,12 @@ pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, recipe: Recipe
 
 impl Shape {
     /// Returns `true` if another shape has the same units, widths and activations.
-    pub(super) fn is(&self, other: &Self) -> bool {
+    pub(super) fn equals(&self, other: &Self) -> bool {
         self.cut.rows == other.cut.rows && self.widths == other.widths && self.limits == other.limits
     }
 
-    /// Returns `true` if it takes fewer cycles above the limit than another shape, or as many and has a lower expected
-    /// error.
+    /// Returns `true` if this shape exceeds the limit on cycles by less than the other one, or equally and has a lower
+    /// expected error.
     fn is_better(&self, other: &Self, most: Option<f64>) -> bool {
         let above = |shape: &Self| shape.cycles.zip(most).map_or(0.0, |(cycles, most)| (cycles - most).max(0.0));
         above(self).total_cmp(&above(other)).then(self.error().total_cmp(&other.error())).is_lt()
@@ -124,7 +123,7 @@ pub(super) fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize
         least(&Size::new(graph, &dimensions, values(graph, rate, options)), options, &forced)
     };
     match loses_units(options, &forced) {
-        true => SHARES.iter().map(|share| of(&Cut::outline(graph, *share).graph)).min().unwrap_or_default(),
+        true => SHARES.iter().map(|share| of(&Cut::for_size(graph, *share).graph)).min().unwrap_or_default(),
         false => of(graph),
     }
 }
@@ -155,7 +154,7 @@ mod tests {
     use crate::testing::{dataset, lstm};
 
     #[test]
-    fn a_matrix_may_differ_from_the_width_of_all() {
+    fn one_matrix_may_have_another_width() {
         let graph = lstm();
         let recording = dataset(&graph, 4, 60);
         let method = PreparedMethod::new(&graph, Method::Distill, Some(&recording), |_| {}).expect("statistics");

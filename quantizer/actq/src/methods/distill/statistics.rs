@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 
 use super::balance::{MixedUnits, balance, mixed_units};
 use super::dimension::{Dimension, dimensions};
-use super::removal::{Effect, Reading, evened, in_place};
+use super::removal::{Effect, Reading, even_layer_errors, in_place};
 use super::schedule::{Bounds, most_steps};
 use super::units::{Units, units};
 use crate::calibrate::allowance::Allowance;
@@ -23,9 +23,9 @@ use crate::graph::{Graph, WeightMatrix};
 use crate::methods::options::Options;
 
 /// Least frames to learn from.
-const LEAST_FRAMES: usize = 200;
+const MIN_FRAMES: usize = 200;
 /// Most held-out frames to watch.
-const WATCHED: usize = 2048;
+const MAX_WATCHED_FRAMES: usize = 2048;
 /// Seed of the statistics, the same for every budget.
 const SEED: u64 = 1;
 
@@ -37,11 +37,10 @@ pub struct RowStatistics {
     /// Importance of every matrix's columns; of its rows.
     pub(super) inputs: Vec<Vec<f64>>,
     pub(super) outputs: Vec<Vec<f64>>,
-    /// Errors of the rows of every matrix without bits, where they are removed one by one and, when needed, together; `None`
-    /// for their energies.
+    /// Errors of removing each row of every matrix: one by one, and together when needed. `None`: use the rows' energies.
     alone: Vec<Option<Vec<f64>>>,
     together: OnceLock<Vec<Option<Vec<f64>>>>,
-    /// Units that can only be removed whole, each set with the errors of their removal.
+    /// Units, each set with its errors of removal.
     units: OnceLock<(Vec<Units>, Vec<Vec<f64>>)>,
     /// Moments of every matrix's input, and `G`.
     pub(super) moments: Vec<(Moments, DMatrix<f64>)>,
@@ -62,7 +61,7 @@ impl RowStatistics {
         (mut moments, frames): (Vec<Moments>, usize),
         allowance: Option<Allowance>,
     ) -> Result<Self> {
-        dataset.require_frames(LEAST_FRAMES, "learning from fewer overfits")?;
+        dataset.require_frames(MIN_FRAMES, "learning from fewer overfits")?;
         let every = if allowance.is_some() { dataset.frames().div_ceil(frames.max(1)) } else { 1 };
         let windows = Windows::new(graph.clone(), dataset, every);
         ensure!(
@@ -92,7 +91,7 @@ impl RowStatistics {
     /// Reports errors on some of a held-out recording while something is learned.
     pub fn watch(&mut self, held_out: &Dataset) {
         let graph = self.graph().clone();
-        let some = held_out.thinned(WATCHED / graph.denoising_steps(), graph.state_len() > 0);
+        let some = held_out.thinned(MAX_WATCHED_FRAMES / graph.denoising_steps(), graph.state_len() > 0);
         self.watched = (some.frames() > 0).then(|| Windows::new(graph, &some, 1));
     }
 
@@ -101,9 +100,9 @@ impl RowStatistics {
         &self.windows.graph
     }
 
-    /// Returns the error of each row of every matrix without bits; `None` for their energies. Without learning those of
-    /// single rows count: the gain of the others is small then, and small networks get more uneven errors. If `even`, those
-    /// of rows that disappear are [`evened`].
+    /// Returns each row's error of removal; `None`: use its energy. Without learning, errors of single rows apply: joint
+    /// errors gain little then, and make those of small networks more uneven. If `even`, the errors of rows that disappear
+    /// are [`even_layer_errors`].
     pub(super) fn removals(&self, learns: bool, even: bool) -> Cow<'_, [Option<Vec<f64>>]> {
         let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
         let together = || removals(self.graph(), &of_inputs, &self.outputs, Effect::together);
@@ -113,12 +112,12 @@ impl RowStatistics {
         }
         let mut removals = measured.to_vec();
         for Dimension { maker, .. } in dimensions(self.graph()) {
-            removals[maker] = measured[maker].as_ref().map(|of| evened(of, self.whole()));
+            removals[maker] = measured[maker].as_ref().map(|of| even_layer_errors(of, self.mean_action_error()));
         }
         removals.into()
     }
 
-    /// Returns the units that can only be removed whole, with the errors of their removal, [`evened`] if asked for.
+    /// Returns the units with their errors of removal, [`even_layer_errors`] if `even`.
     pub(super) fn units(&self, even: bool) -> (&[Units], Cow<'_, [Vec<f64>]>) {
         let (units, removals) = self.units.get_or_init(|| {
             let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
@@ -126,12 +125,12 @@ impl RowStatistics {
             let removals = units.iter().map(|units| units.removals(self.graph(), &of_inputs, &self.outputs)).collect();
             (units, removals)
         });
-        let evened = || removals.iter().map(|of| evened(of, self.whole())).collect();
+        let evened = || removals.iter().map(|of| even_layer_errors(of, self.mean_action_error())).collect();
         (units, if even { Cow::Owned(evened()) } else { removals.into() })
     }
 
     /// Returns the error of a network that always gives the mean action.
-    fn whole(&self) -> f64 {
+    fn mean_action_error(&self) -> f64 {
         self.windows.output_variance.iter().filter(|variance| **variance > 0.0).count() as f64
     }
 
@@ -148,8 +147,8 @@ impl RowStatistics {
     }
 }
 
-/// Returns the errors of the rows of every matrix without bits: by `of` if they disappear, else by what they give. `None` for
-/// the gates of a cell: a gate is the sum of two products, and what one lacks, the other can learn.
+/// Returns the errors of removal of every matrix's rows: by `of` if the rows disappear, else by their output's variance.
+/// `None` for the gates of a cell: a gate is the sum of two products, and one can learn to replace the other's part.
 fn removals(graph: &Graph, moments: &[&Moments], g: &[Vec<f64>], of: fn(&Effect) -> Vec<f64>) -> Vec<Option<Vec<f64>>> {
     let dimensions = dimensions(graph);
     let cells = graph.nodes.iter().map(|node| node.kind.products()).filter(|products| products.len() > 1);

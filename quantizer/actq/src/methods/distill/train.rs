@@ -36,26 +36,26 @@ struct Rates {
 
 /// Rates of feed-forward networks. With higher ones, they fit the recording better and held-out episodes worse.
 const OF_FRAMES: Rates = Rates { latent: 4e-3, scale: 3e-3, vector: 1e-3, strides: Strides::Equal };
-/// Rates of those that [`Task::is_rest_of`] the trained one.
-const OF_REST: Rates = Rates { latent: 8e-3, scale: 6e-3, vector: 2e-3, strides: Strides::ByWidth };
+/// Rates of networks that lost more than half of the weights.
+const OF_SMALL: Rates = Rates { latent: 8e-3, scale: 6e-3, vector: 2e-3, strides: Strides::ByWidth };
 /// Rates of recurrent networks, which take fewer steps: with the rates above, g1_lstm64 ends at 1.6 times the error
 /// (docs/records).
 const OF_WINDOWS: Rates = Rates { latent: 3e-2, scale: 1e-2, vector: 1e-2, strides: Strides::ByWidth };
 /// Samples of a batch: frames, or windows of a recurrent network.
 const FRAMES: usize = 256;
 const WINDOWS: usize = 16;
-/// Parts of a batch, whatever the number of threads, so that sums have one order. The fewer windows in a part, the
+/// Parts of a batch, independent of the number of threads, so that sums have one order. The fewer windows in a part, the
 /// slower the products with a recurrent matrix, which have a row for each.
 const FRAME_SHARDS: usize = 4;
 const WINDOW_SHARDS: usize = 2;
-/// Least steps after which a recurrent network's own states are renewed, and frames of the recording for each step.
-const RENEWED: usize = 100;
-const FRAMES_A_STEP: usize = 50;
+/// Least steps between two runs for a recurrent network's own states, and frames of the recording for each step.
+const MIN_STEPS_BETWEEN_STATE_RUNS: usize = 100;
+const RECORDED_FRAMES_PER_STEP: usize = 50;
 /// Batches that an error is measured on, and frames in each.
-const MEASURED: usize = 16;
-const MEASURED_FRAMES: usize = 512;
+const ERROR_BATCHES: usize = 16;
+const ERROR_FRAMES: usize = 512;
 /// Largest norm of a recurrent network's gradient.
-const CLIP: f32 = 1.0;
+const MAX_GRADIENT_NORM: f32 = 1.0;
 
 /// Parameters of a distillation.
 #[derive(Clone, Debug)]
@@ -83,15 +83,13 @@ pub struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Returns `true` if the network has lost more than half of the weights. Then it does not have to adapt only, but to
-    /// learn anew.
-    pub fn is_rest_of(&self, windows: &Windows) -> bool {
+    /// Returns `true` if the network has lost more than half of the weights. Then it must learn anew, not only adapt.
+    pub fn has_lost_half(&self, windows: &Windows) -> bool {
         2 * self.weights() < windows.graph.weights()
     }
 
-    /// Returns `true` if the network keeps less than a quarter of the weights: it is not the trained one any more, but a
-    /// small one.
-    pub fn is_small_beside(&self, windows: &Windows) -> bool {
+    /// Returns `true` if the network keeps less than a quarter of the weights.
+    pub fn keeps_less_than_a_quarter(&self, windows: &Windows) -> bool {
         4 * self.weights() < windows.graph.weights()
     }
 
@@ -121,7 +119,7 @@ pub struct Present {
     pub share: f64,
     /// Error on the widened inputs.
     pub error: f64,
-    /// Error on the watched observations, of late.
+    /// Latest error on the watched observations.
     pub held_out: Option<f64>,
 }
 
@@ -138,7 +136,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Pres
     let (size, shards) = batch_size(task.graph, windows);
     let rates = match windows.recurrent() {
         true => OF_WINDOWS,
-        false if task.is_rest_of(windows) => OF_REST,
+        false if task.has_lost_half(windows) => OF_SMALL,
         false => OF_FRAMES,
     };
     let objective = Objective::new(&windows.output_variance, task.frames);
@@ -215,9 +213,10 @@ pub fn batch_size(graph: &Graph, windows: &Windows) -> (usize, usize) {
     }
 }
 
-/// Returns `true` if a recurrent network runs over the recording anew before this step.
+/// Returns `true` if a recurrent network runs over the recording again before this step, to renew its states.
 pub fn renews_states(windows: &Windows, step: usize) -> bool {
-    windows.recurrent() && step.is_multiple_of(RENEWED.max(windows.frames() / FRAMES_A_STEP))
+    windows.recurrent()
+        && step.is_multiple_of(MIN_STEPS_BETWEEN_STATE_RUNS.max(windows.frames() / RECORDED_FRAMES_PER_STEP))
 }
 
 /// Computes the loss on a lesson, and its derivatives by the (rounded) weights.
@@ -255,17 +254,17 @@ pub fn recorded_error(
     widening: Option<Widening>,
     seed: u64,
 ) -> f64 {
-    let size = (MEASURED_FRAMES / windows.window).max(1);
+    let size = (ERROR_FRAMES / windows.window).max(1);
     let mut random = Random::new(seed);
-    let batches = (0..MEASURED).map(|_| windows.batch(size, widening, &mut random));
-    losses(network, weights, windows, batches).map(f64::from).sum::<f64>() / MEASURED as f64
+    let batches = (0..ERROR_BATCHES).map(|_| windows.batch(size, widening, &mut random));
+    losses(network, weights, windows, batches).map(f64::from).sum::<f64>() / ERROR_BATCHES as f64
 }
 
 /// Scales the derivatives so that their norm is at most 1.
 pub fn clip(matrices: &mut [Array2<f32>], vectors: &mut Vectors) {
     let square: f32 = matrices.iter().map(|m| m.iter().map(|g| g * g).sum::<f32>()).sum::<f32>()
         + vectors.iter().flatten().flatten().map(|g| g * g).sum::<f32>();
-    let factor = CLIP / square.sqrt().max(CLIP);
+    let factor = MAX_GRADIENT_NORM / square.sqrt().max(MAX_GRADIENT_NORM);
     matrices.iter_mut().for_each(|m| m.mapv_inplace(|g| g * factor));
     vectors.iter_mut().flatten().flatten().for_each(|g| *g *= factor);
 }

@@ -1,39 +1,42 @@
 //! Chooses how to learn a network that has lost most of its weights, by short learning trials.
 //!
-//! Three things cannot be predicted. One is the learning rate, which may be several times as high for a small network as
-//! for a large one. Another is how much of the error of rounding such a network can learn to make up for. It decides
-//! between many rows of few bits and few rows of many: a factor on that error gives several shapes for one budget.
-//! The third is which vectors lose most: measured errors of removal say little where nearly all elements go ([`evened`]).
-//! First come the rates, then the shapes at the best rate: by measured errors, and by evened ones with the best factor
-//! and its neighbours. After a tenth of the steps their order is nearly that of the
-//! end. All trials learn from all episodes, and their errors are those at the recorded observations: shapes of one
-//! budget overfit alike, and the differences on a quarter of the episodes are mostly chance. Higher rates are
-//! tried where less than a quarter of the weights is left: larger networks overfit more at them, which trials do not
-//! see, and gain little (docs/records/2026-11-26-trials.md).
+//! Short trials choose three things: the learning rate, the factor on rounding error (many narrow rows or few wide
+//! ones), and the ranking of hidden vectors. None can be predicted. The best rate of a small network may be several
+//! times that of a large one. A network can learn to compensate a part of its rounding error; a factor on that error
+//! gives several shapes for one budget. And if nearly all elements are removed, measured errors of removal do not rank
+//! the vectors well ([`even_layer_errors`]).
+//!
+//! The rates come first, then the shapes at the best rate: by measured errors, and by those of even layers with the best
+//! factor and its neighbours. After a tenth of the steps, the order of the trials is nearly the final one. All trials
+//! learn from all episodes, and their errors are those at the recorded observations. Shapes of one budget overfit alike,
+//! and the differences on a quarter of the episodes are mostly chance. Higher rates are tried if less than a quarter of
+//! the weights is left. Larger networks overfit more at them, which trials do not show, and gain little
+//! (docs/records/2026-11-26-trials.md).
 
 use super::candidate::Candidate;
-use super::choose::{Chosen, LEAST_STEPS, best, errors};
+use super::choose::{Chosen, LEAST_STEPS, errors, lowest_error};
 #[cfg(doc)]
-use super::removal::evened;
+use super::removal::even_layer_errors;
 use super::schedule::Bounds;
 use super::shape::Goal;
 use super::train::{Present, Task, distill};
 use crate::methods::learning::{Choice, Recipe, Tried};
 
-/// Factors on the learning rates. Of recurrent networks, the first: their rates hardly depend on the size. Evened errors
-/// gave them the same shapes, or no better ones, and their trials take longest.
+/// Factors on the learning rates. Recurrent networks use only the first, since their rates hardly depend on the size.
+/// Even layers gave them the same shapes, or no better ones, and their trials take longest.
 const RATES: [f32; 3] = [1.0, 4.0, 8.0];
-/// Factors on the error of rounding, each times [`NEXT`].
-const ROUNDINGS: [f64; 4] = [1.0, NEXT, NEXT * NEXT, NEXT * NEXT * NEXT];
-const NEXT: f64 = 4.0;
-/// Most of these factors with evened errors.
-const EVEN: usize = 3;
+/// Factors on the rounding error: powers of 4.
+const ROUNDINGS: [f64; 4] = [1.0, ROUNDING_RATIO, ROUNDING_RATIO * ROUNDING_RATIO, MAX_ROUNDING];
+const ROUNDING_RATIO: f64 = 4.0;
+const MAX_ROUNDING: f64 = ROUNDING_RATIO * ROUNDING_RATIO * ROUNDING_RATIO;
+/// Most trials with even layers.
+const MAX_EVEN_TRIALS: usize = 3;
 /// Divisor of the steps, and of the time, for a trial.
-const STEPS: usize = 10;
-const TIME: u32 = 20;
+const TRIAL_STEP_DIVISOR: usize = 10;
+const TRIAL_TIME_DIVISOR: u32 = 20;
 
 /// Chooses the learning rate and the shape of a network, whose first shape is given. If few steps are to be learned, it
-/// tries nothing.
+/// runs no trials.
 pub(super) fn choose_recipe(
     goal: Goal<'_>,
     first: Candidate,
@@ -45,19 +48,23 @@ pub(super) fn choose_recipe(
     if steps.is_some_and(|steps| steps < LEAST_STEPS) {
         return (first, Chosen::untried(Choice::Learning(recipe), Bounds { steps, time }));
     }
-    let small = first.task(goal, recipe).is_small_beside(windows);
+    let small = first.task(goal, recipe).keeps_less_than_a_quarter(windows);
     let rates = if small && !windows.recurrent() { &RATES[..] } else { &RATES[..1] };
-    let laws = if windows.recurrent() { &[false][..] } else { &[false, true] };
-    let most = (STEPS + rates.len() + ROUNDINGS.len() - 1 + (laws.len() - 1) * EVEN) as f64;
-    let bounds = Bounds { steps: steps.map(|steps| steps / STEPS), time: time.map(|time| time / TIME) };
+    let evenness = if windows.recurrent() { &[false][..] } else { &[false, true] };
+    let most_trials = rates.len() + ROUNDINGS.len() - 1 + (evenness.len() - 1) * MAX_EVEN_TRIALS;
+    let work = (TRIAL_STEP_DIVISOR + most_trials) as f64;
+    let bounds = Bounds {
+        steps: steps.map(|steps| steps / TRIAL_STEP_DIVISOR),
+        time: time.map(|time| time / TRIAL_TIME_DIVISOR),
+    };
     let mut attempt = |candidate: &Candidate, recipe: Recipe, before: usize| {
         let task = Task { bounds, watched: None, ..candidate.task(goal, recipe) };
-        let mut progress = |now: Present| progress((before as f64 + now.share) / most, now.error);
+        let mut progress = |now: Present| progress((before as f64 + now.share) / work, now.error);
         let learned = distill(&task, windows, &mut progress);
         let [recorded, widened] = errors(&task, &learned.graph, &learned.quantized, windows);
         Tried { choice: Choice::Learning(recipe), recorded, widened }
     };
-    let chosen = |tried: &[Tried]| match best(tried, windows.recurrent()) {
+    let chosen = |tried: &[Tried]| match lowest_error(tried, windows.recurrent()) {
         Some(Tried { choice: Choice::Learning(recipe), .. }) => *recipe,
         _ => recipe,
     };
@@ -69,15 +76,15 @@ pub(super) fn choose_recipe(
     let mut of_shapes: Vec<Tried> =
         tried.iter().filter(|tried| tried.choice == Choice::Learning(recipe)).copied().collect();
     let mut candidates = vec![(recipe, first)];
-    for &even in laws {
+    for &even in evenness {
         let Recipe { rounding: best, .. } = chosen(&of_shapes);
-        let near: [f64; EVEN] = [best / NEXT, best, NEXT * best];
+        let near: [f64; MAX_EVEN_TRIALS] = [best / ROUNDING_RATIO, best, ROUNDING_RATIO * best];
         let roundings = if even { &near[..] } else { &ROUNDINGS[1..] };
         for &rounding in roundings.iter().filter(|rounding| **rounding >= ROUNDINGS[0]) {
             let recipe = Recipe { rounding, even, ..recipe };
             // A shape that does not fit is none.
             let Ok(candidate) = Candidate::new(goal, recipe) else { continue };
-            if candidates.iter().all(|(_, other)| !other.shape.is(&candidate.shape)) {
+            if candidates.iter().all(|(_, other)| !other.shape.equals(&candidate.shape)) {
                 let of_shape = attempt(&candidate, recipe, tried.len());
                 tried.push(of_shape);
                 of_shapes.push(of_shape);
@@ -88,9 +95,9 @@ pub(super) fn choose_recipe(
     let recipe = chosen(&of_shapes);
     let index = candidates.iter().position(|(of, _)| *of == recipe).unwrap_or_default();
     let (_, candidate) = candidates.swap_remove(index);
-    let share = tried.len() as f64 / (STEPS + tried.len()) as f64;
-    let left = time.map(|time| time - time / TIME * tried.len() as u32);
-    (candidate, Chosen { choice: Choice::Learning(recipe), bounds: Bounds { steps, time: left }, tried, share })
+    let share = tried.len() as f64 / (TRIAL_STEP_DIVISOR + tried.len()) as f64;
+    let remaining = time.map(|time| time - time / TRIAL_TIME_DIVISOR * tried.len() as u32);
+    (candidate, Chosen { choice: Choice::Learning(recipe), bounds: Bounds { steps, time: remaining }, tried, share })
 }
 
 #[cfg(test)]
@@ -133,14 +140,14 @@ mod tests {
             of_rates.iter().map(|recipe| (recipe.rate, recipe.rounding)).collect::<Vec<_>>(),
             RATES.map(|r| (r, 1.0))
         );
-        let Recipe { rate, .. } = recipe(best(&tried[..RATES.len()], false).expect("a best").choice);
+        let Recipe { rate, .. } = recipe(lowest_error(&tried[..RATES.len()], false).expect("a best").choice);
         assert!(!of_shapes.is_empty() && of_shapes.iter().all(|recipe| recipe.rate == rate), "{of_shapes:?}");
-        let even = of_shapes.iter().position(|recipe| recipe.even).expect("evened errors are tried");
-        let (measured, evened) = of_shapes.split_at(even);
+        let first_even = of_shapes.iter().position(|recipe| recipe.even).expect("even layers are tried");
+        let (measured, even) = of_shapes.split_at(first_even);
         assert!(measured.iter().all(|of| ROUNDINGS[1..].contains(&of.rounding)), "{measured:?}");
-        assert!(evened.len() <= EVEN && evened.iter().all(|of| of.even), "{evened:?}");
+        assert!(even.len() <= MAX_EVEN_TRIALS && even.iter().all(|of| of.even), "{even:?}");
         let at_rate: Vec<Tried> = tried.iter().filter(|tried| recipe(tried.choice).rate == rate).copied().collect();
-        assert_eq!(best(&at_rate, false).map(|tried| tried.choice), Some(choice));
+        assert_eq!(lowest_error(&at_rate, false).map(|tried| tried.choice), Some(choice));
     }
 
     #[test]

@@ -1,7 +1,6 @@
-//! Elements of hidden vectors that can only be removed together ([`Ties`]): the units of a recurrent cell, those of vectors
-//! that are added, multiplied or normalized, as the residual stream of a network, and those of parts of a concatenation.
-//! A unit has a row in every matrix that makes such a vector, one for each gate of a cell, and a column in every matrix
-//! that reads one. So a network with fewer units is far smaller than one that lacks as many rows.
+//! Units: elements that can only be removed together ([`Ties`]). They are cell units, residual-stream elements, and
+//! concatenated elements. A unit has a row in every matrix that makes such a vector, one for each gate of a cell, and a
+//! column in every matrix that reads one. So a network with fewer units is far smaller than one that lacks as many rows.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +18,7 @@ pub(super) struct Units {
     pub(super) group: usize,
     /// Number of units.
     pub(super) len: usize,
-    /// What reads them; of a cell, its state comes first.
+    /// Readers of their vectors; of a cell, its state comes first.
     pub(super) readers: Vec<Reading>,
 }
 
@@ -76,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_residual_streams_and_parts_of_concatenations_have_units() {
+    fn cells_residual_streams_and_concatenations_have_units() {
         let forms = |graph: &Graph| found(graph).iter().map(form).collect::<Vec<_>>();
         assert_eq!(forms(&lstm()), [(3, vec![(vec![1, 2], 0)])]);
         for normed in [false, true] {
