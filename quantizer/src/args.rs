@@ -237,7 +237,7 @@ pub(crate) struct ImportArgs {
     pub(crate) force: bool,
 }
 
-/// How a deploy bundle is read.
+/// Options for reading a deploy bundle.
 #[derive(clap::Args, Clone)]
 pub(crate) struct ReadingArgs {
     /// Bundle: the answers to the questions of an earlier run, a TOML file of their keys
@@ -309,7 +309,7 @@ pub struct QuantizeArgs {
     pub(crate) save_stats: Option<PathBuf>,
 }
 
-/// What an image may take.
+/// Budget of an image.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct BudgetArgs {
     /// Bits of every weight: 2, 3, 4 or 8 [default: 3]
@@ -425,7 +425,7 @@ pub(crate) struct ExportCArgs {
     /// The folder for the files; created if it does not exist
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// What the files and their names begin with
+    /// Prefix of the files and of the names in them
     #[arg(long, default_value = "policy")]
     pub(crate) name: String,
     /// A recording: also write NAME_golden.c, its first observations with the bits of this host's actions, which a

@@ -10,17 +10,17 @@ use clap::{Arg, Command, CommandFactory as _, Error, FromArgMatches as _};
 use crate::args::Cli;
 
 /// The most letters of an option that may be missing, wrong, extra, or swapped with their neighbour.
-const MOST_TYPOS: usize = 1;
+const MAX_TYPOS: usize = 1;
 
-/// Parses the command line. Prints an error, or the help or version that is asked for, and returns the exit status.
+/// Parses the command line. Prints an error, or the requested help or version, and returns the exit status.
 pub(crate) fn parse() -> Result<Cli, ExitCode> {
     let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
     parsed.map_err(|mut error| {
         suggest(&mut error);
-        let is_asked_for = !error.use_stderr();
+        let is_requested = !error.use_stderr();
         match error.print().and_then(|()| io::stdout().flush()) {
             // A reader that has closed its end is not an error.
-            Err(failure) if is_asked_for && failure.kind() != io::ErrorKind::BrokenPipe => {
+            Err(failure) if is_requested && failure.kind() != io::ErrorKind::BrokenPipe => {
                 eprintln!("actq: cannot write to standard output: {failure}");
                 ExitCode::FAILURE
             }
@@ -29,8 +29,7 @@ pub(crate) fn parse() -> Result<Cli, ExitCode> {
     })
 }
 
-/// Returns the command line's definition. A negative number is a value of an option, which tells what it takes, and not
-/// an unknown option.
+/// Returns the command line's definition. Negative numbers count as option values.
 fn command() -> Command {
     fn with_numbers(command: Command) -> Command {
         let takes_numbers = |arg: &Arg| arg.get_action().takes_values() && !arg.is_positional();
@@ -52,7 +51,7 @@ fn suggest(error: &mut Error) {
     error.insert(ContextKind::SuggestedArg, ContextValue::String(format!("--{meant}")));
 }
 
-/// Returns the nearest option of the subcommand, if it differs by at most [`MOST_TYPOS`] letters.
+/// Returns the nearest option of the subcommand, if it differs by at most [`MAX_TYPOS`] letters.
 fn nearest(given: &str) -> Option<String> {
     let mut command = command();
     for word in env::args_os().skip(1) {
@@ -60,5 +59,5 @@ fn nearest(given: &str) -> Option<String> {
     }
     let longs = command.get_arguments().filter_map(|arg| arg.get_long());
     let distances = longs.map(|long| (strsim::osa_distance(given, long), long));
-    distances.min().filter(|(distance, _)| *distance <= MOST_TYPOS).map(|(_, long)| long.to_owned())
+    distances.min().filter(|(distance, _)| *distance <= MAX_TYPOS).map(|(_, long)| long.to_owned())
 }

@@ -50,7 +50,7 @@ pub struct TimeLimit {
 }
 
 /// The least used share of a budget, if more bits fit and reduce the error.
-pub const USED: f64 = 0.97;
+pub const MIN_USED_SHARE: f64 = 0.97;
 
 /// The bits or bytes that the weights may take; every method works to a rate.
 #[derive(Clone, Copy, Debug, PartialEq)]

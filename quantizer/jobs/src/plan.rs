@@ -45,7 +45,7 @@ pub fn jobs(spec: &Spec, host: &dyn Host) -> Result<Vec<Job>> {
     let named = |(name, number)| if number == 1 { name } else { format!("{name} ({number})") };
     let policies = names.into_iter().map(named).collect();
     let merge = Work::Merge(Merge { clock_hz: spec.clock, policies, rows });
-    let seconds = estimate::merging(jobs.list.len());
+    let seconds = estimate::merge_seconds(jobs.list.len());
     jobs.add("merge".to_owned(), merge, Vec::new(), (1, 64, seconds))?;
     jobs.finish()
 }
@@ -136,7 +136,7 @@ impl Plan<'_> {
         let calib: &[Input] = if needs_calib { &source.calib } else { &[] };
         ensure!(!needs_calib || !calib.is_empty(), "{}", Recording::Calib.missing(&name));
         let title = format!("{}, {name} at {}, seed {}", source.policy.name, make.budget, make.seed);
-        let seconds = estimate::making(graph, &method, make.steps, make.effort);
+        let seconds = estimate::quantize_seconds(graph, &method, make.steps, make.effort);
         let recordings = if needs_calib { source.calib_bytes } else { 0 };
         let size = (spec.cpus, estimate::memory_mib(graph, recordings), seconds);
         // A search for an error measures it.
@@ -180,7 +180,7 @@ impl Plan<'_> {
             let title = format!("{title}: evaluate episodes {}", range(episodes));
             let evaluate = Evaluate { image: row.image.clone(), policy: Some(source.path.clone()), episodes };
             let part = &source.lengths[episodes.first as usize..][..episodes.count as usize];
-            let seconds = estimate::evaluating(&source.policy.graph, part.iter().sum());
+            let seconds = estimate::evaluate_seconds(&source.policy.graph, part.iter().sum());
             let memory = estimate::memory_mib(&source.policy.graph, 0);
             let inputs = source.with([&source.heldout]);
             row.evaluations.push(self.jobs.add(title, Work::Evaluate(evaluate), inputs, (1, memory, seconds))?);

@@ -46,21 +46,21 @@ pub enum Ended {
 /// Numbers of jobs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// With a result.
+    /// Jobs with a result.
     pub done: usize,
-    /// That run now.
+    /// Running jobs.
     pub running: usize,
-    /// Without a result, after the last try.
+    /// Jobs without a result after the last try.
     pub failed: usize,
-    /// That need a failed job.
+    /// Jobs whose dependency failed.
     pub skipped: usize,
-    /// All.
+    /// All jobs.
     pub all: usize,
 }
 
 impl<'a> Schedule<'a> {
-    /// Begins with the jobs of a checked plan ([`crate::order::check`]); `is_done` says which have results, and is asked once
-    /// for each: another process may be writing some. A job is tried at most `tries` times.
+    /// Begins with the jobs of a checked plan ([`crate::order::check`]). `is_done` returns `true` for those with results; it
+    /// is called one time for each, since another process may be writing some. A job is tried at most `tries` times.
     pub fn new(jobs: &'a [Job], is_done: impl Fn(&Job) -> bool, tries: usize) -> Self {
         let index: BTreeMap<&str, usize> = jobs.iter().enumerate().map(|(i, job)| (job.address.as_str(), i)).collect();
         let state: Vec<State> = jobs

@@ -99,7 +99,7 @@ pub(super) fn jobs(plan: &Plan, entrants: &[Entrant]) -> Result<Vec<Job>> {
                 };
                 let work = Custom { name: MAKE.to_owned(), options: serde_json::to_value(making)?, needs: Vec::new() };
                 let steps = if method == Contender::DistillNotLearned { Some(0) } else { plan.steps };
-                let seconds = estimate::making(&policy.graph, &method.method(), steps, Effort::Default);
+                let seconds = estimate::quantize_seconds(&policy.graph, &method.method(), steps, Effort::Default);
                 let inputs = files.iter().chain(&recordings).cloned().collect();
                 let title = format!("{}: make", key.title());
                 let made = jobs.add(title, Work::Custom(work), inputs, (1, memory, seconds))?;

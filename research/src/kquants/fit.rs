@@ -60,7 +60,7 @@ pub(super) fn codes(
 }
 
 /// Returns the candidate whose codes, with the best scale and min for them, have the least error.
-fn best(
+fn best_candidate(
     weights: &[f32],
     importance: &[f64],
     limits: (i32, i32),
@@ -94,7 +94,7 @@ pub(super) fn linear(weights: &[f32], importance: &[f64], limits: (i32, i32)) ->
     // There is one more code below zero: the outermost weight may have either sign.
     let widest = largest / f64::from(limits.0);
     let candidates = factors().flat_map(|factor| [factor * widest, -factor * widest]).map(|s| (s, 0.0));
-    best(weights, importance, limits, 0.0, candidates).0
+    best_candidate(weights, importance, limits, 0.0, candidates).0
 }
 
 /// Fits the scale and min, both at least 0, of codes from 0 to `high`.
@@ -110,7 +110,7 @@ pub(super) fn affine(weights: &[f32], importance: &[f64], high: i32) -> (f64, f6
         let cut = (1.0 - factor) * (top - low);
         [0.0, 0.5, 1.0].map(|share| (factor * widest, (-low - share * cut).max(0.0)))
     });
-    let (s, m) = best(weights, importance, (0, high), 1.0, candidates);
+    let (s, m) = best_candidate(weights, importance, (0, high), 1.0, candidates);
     // If the min alone represents all weights best, for example when they are equal.
     (s.max(0.0), m)
 }

@@ -1,4 +1,4 @@
-//! Chooses what a rival learns from and how, by its error on held-out episodes of the calibration recording.
+//! Chooses a rival's start and its way of learning, by its error on held-out episodes of the calibration recording.
 
 use actq::calibrate::widening::Widening;
 use actq::calibrate::windows::Windows;
@@ -8,11 +8,11 @@ use actq::methods::distill::train::recorded_error;
 use super::fit::{Fit, fit};
 
 /// Divisor of the steps for one trial: as in the method distill.
-pub const TRIAL: usize = 8;
+pub const TRIAL_STEP_DIVISOR: usize = 8;
 /// Relative difference of errors that counts as chance: as there.
 const CHANCE: f64 = 0.05;
 
-/// What a network learns from: weights to start with, and units of their columns.
+/// Start of learning: weights, and units of their columns.
 #[derive(Clone, Debug)]
 pub struct Start {
     /// The network.
@@ -26,7 +26,7 @@ pub struct Start {
 pub struct Chosen {
     /// Index of the start.
     pub start: usize,
-    /// How to learn; its steps are those of a trial.
+    /// Way of learning; its steps are those of a trial.
     pub fit: Fit,
     /// The network that the trial made; `None` without one.
     pub tried: Option<Graph>,
@@ -49,9 +49,9 @@ pub fn choose(
     fold: Option<&(Windows, Windows)>,
     progress: &mut dyn FnMut(f64),
 ) -> Chosen {
-    let first = Fit { steps: by.steps / TRIAL, rate: rates.first().copied().unwrap_or(by.rate), ..by };
+    let first = Fit { steps: by.steps / TRIAL_STEP_DIVISOR, rate: rates.first().copied().unwrap_or(by.rate), ..by };
     let untried = Chosen { start: 0, fit: first, tried: None };
-    let Some((learned_from, left_out)) = fold else { return untried };
+    let Some((learned_from, held_out)) = fold else { return untried };
     let all = starts.len() + rates.len().saturating_sub(1);
     let mut trials: Vec<Trial> = Vec::new();
     let mut attempt = |start: usize, fit_by: Fit, trials: &mut Vec<Trial>| {
@@ -60,10 +60,11 @@ pub fn choose(
         let learned = fit(graph, units, learned_from, fit_by, &mut |share| progress((done + share) / all as f64));
         let (network, weights) = (Network::new(&learned), Weights::of(&learned));
         let [recorded, widened] = [None, Some(Widening::WIDE)]
-            .map(|widening| recorded_error(&network, &weights, left_out, widening, by.seed));
+            .map(|widening| recorded_error(&network, &weights, held_out, widening, by.seed));
         trials.push(Trial { chosen: Chosen { start, fit: fit_by, tried: Some(learned) }, recorded, widened });
     };
-    let best_of = |trials: &[Trial]| best(trials, left_out.recurrent()).map_or(untried.clone(), |t| t.chosen.clone());
+    let best_of =
+        |trials: &[Trial]| lowest_error(trials, held_out.recurrent()).map_or(untried.clone(), |t| t.chosen.clone());
     (0..starts.len()).for_each(|start| attempt(start, first, &mut trials));
     for &rate in rates.iter().skip(1) {
         let best = best_of(&trials);
@@ -72,9 +73,10 @@ pub fn choose(
     best_of(&trials)
 }
 
-/// Returns the best trial, by the rule of the method distill: of those whose errors on the path differ by chance only, the
-/// one with the lowest error off it; of a recurrent policy's, the one with the lowest error off the path.
-fn best(trials: &[Trial], recurrent: bool) -> Option<&Trial> {
+/// Returns the trial with the lowest error, by the rule of the method distill. Of those whose errors on the path differ by
+/// chance only, it is the one with the lowest error off it. Of a recurrent policy's trials, it is the one with the lowest
+/// error off the path.
+fn lowest_error(trials: &[Trial], recurrent: bool) -> Option<&Trial> {
     let expected = |trial: &Trial| if recurrent { trial.widened } else { trial.recorded };
     // A trial that diverged has no number for an error.
     let lowest = trials.iter().map(expected).filter(|error| error.is_finite()).min_by(f64::total_cmp)?;

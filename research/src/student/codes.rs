@@ -13,16 +13,16 @@ use actq::random::Random;
 use actq_kernels::Width;
 
 /// Frames, or windows, that a column's mean square is taken over.
-const MEASURED: usize = 512;
+const MAX_FRAMES: usize = 512;
 /// Activation magnitude of int8.
 const INT8: u16 = 127;
 
-/// How codes are made.
+/// Way of making codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coding {
     /// Rounded after learning.
     Rounded,
-    /// Learned, from the f32 network's weights on, for so many steps.
+    /// Learned, from the f32 network's weights on, for this many steps.
     Learned(usize),
 }
 
@@ -46,7 +46,7 @@ impl Coded {
     }
 }
 
-/// What codes are made with.
+/// Settings of the codes.
 #[derive(Clone, Copy, Debug)]
 pub struct Coder {
     /// Width of all rows.
@@ -95,12 +95,12 @@ impl Coder {
         fold: Option<&(Windows, Windows)>,
         (trial, steps): (usize, usize),
     ) -> Coding {
-        let (Some(graph), Some((learned_from, left_out))) = (tried, fold) else { return Coding::Learned(steps) };
+        let (Some(graph), Some((learned_from, held_out))) = (tried, fold) else { return Coding::Learned(steps) };
         let x_max = vec![INT8; graph.matrices.len()];
         let [rounded, learned] = [Coding::Rounded, Coding::Learned(trial)].map(|coding| {
             let coded = self.code(graph, coding, learned_from, &mut |_| {});
             let network = Network::rounded(&coded.graph, &x_max);
-            recorded_error(&network, &coded.weights(), left_out, None, self.seed)
+            recorded_error(&network, &coded.weights(), held_out, None, self.seed)
         });
         if rounded <= learned { Coding::Rounded } else { Coding::Learned(steps) }
     }
@@ -114,7 +114,7 @@ impl Coder {
 
 /// Returns the mean square of each column of each matrix's operand at recorded observations.
 pub fn column_squares(graph: &Graph, windows: &Windows, seed: u64) -> Vec<Vec<f64>> {
-    let samples = (MEASURED / windows.window).max(1);
+    let samples = (MAX_FRAMES / windows.window).max(1);
     let batch = windows.batch(samples, None, &mut Random::new(seed));
     let network = Network::new(graph);
     let pass = network.forward(&Weights::of(graph), batch.frames, &mut zero_state(graph, samples));

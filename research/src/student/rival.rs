@@ -14,7 +14,7 @@ use actq::methods::{Effort, Method, Options, Outcome};
 use actq::pipeline::QuantizedPolicy;
 use actq::policy::Policy;
 
-use super::choice::{Start, TRIAL, choose};
+use super::choice::{Start, TRIAL_STEP_DIVISOR, choose};
 use super::codes::{Coded, Coder, Coding, column_squares};
 use super::fit::{Fit, fit};
 use super::form::{Form, Limits, Taken, milliseconds, taken};
@@ -119,7 +119,7 @@ impl<'a> Teacher<'a> {
         let Some(width) = form.width() else { return Ok(Rival { network, image: None, description: described }) };
         let coder = Coder { width, widening: by.widening, frames, seed: settings.seed };
         let coding = match form {
-            Form::Int8 => coder.coding(chosen.tried.as_ref(), fold.as_ref(), (steps / TRIAL, steps / 2)),
+            Form::Int8 => coder.coding(chosen.tried.as_ref(), fold.as_ref(), (steps / TRIAL_STEP_DIVISOR, steps / 2)),
             _ => Coding::Learned(steps),
         };
         let windows = &self.windows;

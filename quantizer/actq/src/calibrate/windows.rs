@@ -188,8 +188,8 @@ impl Windows {
 
     /// Splits the windows into those of three in four episodes and those of the others; `None` if there are too few.
     pub fn split(&self) -> Option<(Self, Self)> {
-        let part = |left_out: bool| {
-            let of = |e: &usize| (e % HELD_OUT == HELD_OUT - 1) == left_out;
+        let part = |is_held_out: bool| {
+            let of = |e: &usize| (e % HELD_OUT == HELD_OUT - 1) == is_held_out;
             let chosen: Vec<usize> = (0..self.episodes.len()).filter(of).collect();
             (!chosen.is_empty()).then(|| Self {
                 graph: self.graph.clone(),

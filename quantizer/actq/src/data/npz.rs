@@ -15,15 +15,15 @@ use crate::error::{Context, Result, bail, ensure};
 use crate::import::values::Tensor;
 
 /// Inflated bytes that the members of any archive may have.
-const ROOM: u64 = 64 << 20;
+const MIN_INFLATED_LIMIT: u64 = 64 << 20;
 /// Inflated bytes that a larger archive may have, per byte of its own. Recorded motions keep most of their size when
 /// deflated; data that keeps less than a sixty-fourth hardly changes.
-const RATIO: u64 = 64;
+const INFLATED_PER_BYTE: u64 = 64;
 
 /// End record of the format: signature, and length without the variable part.
-const END: ([u8; 4], usize) = (*b"PK\x05\x06", 22);
-const ENTRY: ([u8; 4], usize) = (*b"PK\x01\x02", 46);
-const LOCAL: ([u8; 4], usize) = (*b"PK\x03\x04", 30);
+const END_RECORD: ([u8; 4], usize) = (*b"PK\x05\x06", 22);
+const DIRECTORY_ENTRY: ([u8; 4], usize) = (*b"PK\x01\x02", 46);
+const LOCAL_HEADER: ([u8; 4], usize) = (*b"PK\x03\x04", 30);
 
 /// An archive and its directory.
 pub(super) struct Archive {
@@ -69,19 +69,19 @@ impl Archive {
             return Ok(None);
         };
         self.inflated += size;
-        let limit = ROOM.max(RATIO.saturating_mul(self.bytes));
+        let limit = MIN_INFLATED_LIMIT.max(INFLATED_PER_BYTE.saturating_mul(self.bytes));
         ensure!(
             self.inflated <= limit,
-            "it has {size} bytes, and all arrays up to it {}; an archive of {} bytes may hold {limit} ({RATIO} times its size, \
+            "it has {size} bytes, and all arrays up to it {}; an archive of {} bytes may hold {limit} ({INFLATED_PER_BYTE} times its size, \
              at least {} MiB); save it uncompressed, with numpy.savez",
             self.inflated,
             self.bytes,
-            ROOM >> 20
+            MIN_INFLATED_LIMIT >> 20
         );
         ensure!(!encrypted, "it is encrypted; save it without a password");
-        let local = read_at(&mut self.file, at, LOCAL.1 as u64).context("truncated")?;
-        ensure!(local.starts_with(&LOCAL.0), "the directory does not point to a local header");
-        let data = at + (LOCAL.1 + u16_at(&local, 26) + u16_at(&local, 28)) as u64;
+        let local = read_at(&mut self.file, at, LOCAL_HEADER.1 as u64).context("truncated")?;
+        ensure!(local.starts_with(&LOCAL_HEADER.0), "the directory does not point to a local header");
+        let data = at + (LOCAL_HEADER.1 + u16_at(&local, 26) + u16_at(&local, 28)) as u64;
         ensure!(data + packed <= self.bytes, "truncated: the array extends beyond the file");
         self.file.seek(SeekFrom::Start(data))?;
         let stream = BufReader::new((&self.file).take(packed));
@@ -104,10 +104,12 @@ impl Archive {
 fn directory(file: &mut File) -> Result<(u64, Vec<(String, Member)>)> {
     let bytes = file.seek(SeekFrom::End(0))?;
     // The end record is followed by a comment of at most 65535 bytes.
-    let tail_at = bytes.saturating_sub((END.1 + usize::from(u16::MAX)) as u64);
+    let tail_at = bytes.saturating_sub((END_RECORD.1 + usize::from(u16::MAX)) as u64);
     let tail = read_at(file, tail_at, bytes - tail_at)?;
-    let is_end = |at: &usize| tail[*at..].starts_with(&END.0) && u16_at(&tail, at + 20) == tail.len() - at - END.1;
-    let end = (0..(tail.len() + 1).saturating_sub(END.1)).rev().find(is_end).context("the directory is missing")?;
+    let is_end =
+        |at: &usize| tail[*at..].starts_with(&END_RECORD.0) && u16_at(&tail, at + 20) == tail.len() - at - END_RECORD.1;
+    let end =
+        (0..(tail.len() + 1).saturating_sub(END_RECORD.1)).rev().find(is_end).context("the directory is missing")?;
     let (count, len, at) = (u16_at(&tail, end + 10), u32_at(&tail, end + 12), u32_at(&tail, end + 16));
     // ZIP64 stores numbers elsewhere that do not fit.
     ensure!(count < 0xffff && at < 0xffff_ffff, "archives of 4 GiB or 65535 members are not supported");
@@ -126,10 +128,10 @@ fn directory(file: &mut File) -> Result<(u64, Vec<(String, Member)>)> {
 impl Member {
     /// Parses the first entry of a directory; returns it with its name and the bytes that follow.
     fn parse(bytes: &[u8]) -> Option<(String, Self, &[u8])> {
-        let entry = bytes.get(..ENTRY.1).filter(|entry| entry.starts_with(&ENTRY.0))?;
+        let entry = bytes.get(..DIRECTORY_ENTRY.1).filter(|entry| entry.starts_with(&DIRECTORY_ENTRY.0))?;
         let name_len = u16_at(entry, 28);
-        let name = String::from_utf8_lossy(bytes.get(ENTRY.1..ENTRY.1 + name_len)?);
-        let following = bytes.get(ENTRY.1 + name_len + u16_at(entry, 30) + u16_at(entry, 32)..)?;
+        let name = String::from_utf8_lossy(bytes.get(DIRECTORY_ENTRY.1..DIRECTORY_ENTRY.1 + name_len)?);
+        let following = bytes.get(DIRECTORY_ENTRY.1 + name_len + u16_at(entry, 30) + u16_at(entry, 32)..)?;
         let member = Self {
             encrypted: u16_at(entry, 8) & 1 != 0,
             method: u16_at(entry, 10),

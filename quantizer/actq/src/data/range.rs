@@ -5,9 +5,9 @@ use super::dataset::Dataset;
 /// Margin around the calibrated range, as a share of its width, within which a value counts as inside.
 const MARGIN: f32 = 0.1;
 /// Share of observations outside the range above which a warning is given.
-const WORTH: f64 = 0.05;
+const MIN_OUTSIDE_SHARE: f64 = 0.05;
 /// Most dimensions that a warning names.
-const NAMED: usize = 5;
+const MAX_NAMED: usize = 5;
 
 /// Smallest and largest recorded value of each dimension of an observation.
 #[derive(Clone, Debug)]
@@ -82,12 +82,12 @@ impl Range {
     pub fn warning(&self, dataset: &Dataset) -> Option<String> {
         let Outside { frames, outside, dimensions } = self.outside(dataset);
         let percent = |n: usize| format!("{:.1}%", 100.0 * n as f64 / frames.max(1) as f64);
-        if outside as f64 <= WORTH * frames as f64 {
+        if outside as f64 <= MIN_OUTSIDE_SHARE * frames as f64 {
             return None;
         }
         let worst: Vec<String> =
-            dimensions.iter().take(NAMED).map(|(dimension, n)| format!("{dimension} ({})", percent(*n))).collect();
-        let more = dimensions.len().saturating_sub(NAMED);
+            dimensions.iter().take(MAX_NAMED).map(|(dimension, n)| format!("{dimension} ({})", percent(*n))).collect();
+        let more = dimensions.len().saturating_sub(MAX_NAMED);
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         Some(format!(
             "{} of the observations in {} leave the range of {} by more than 10% of it, in dimensions {}{more}: values \

@@ -25,8 +25,8 @@ pub struct Program {
     pub state: Region,
     /// Observation.
     pub observation: Region,
-    /// Operations that run once, before those of the denoising steps; 0 if all run every time.
-    pub once: usize,
+    /// First operation of the denoising steps. Earlier ones run one time per evaluation; 0 if all run every time.
+    pub first_denoising_op: usize,
     /// The network's output.
     pub output: Region,
     /// Action.
@@ -74,7 +74,7 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
     lower_nodes(before, &mut lowering);
     let read: Vec<ValueId> =
         of_step.iter().flat_map(|node| node.inputs.iter().copied()).filter(|value| *value <= denoising.first).collect();
-    let once = lowering.begin_steps(iterate, &read);
+    let first_denoising_op = lowering.begin_steps(iterate, &read);
     lower_nodes(of_step, &mut lowering);
     let mut constants = vec![denoising.limit, f32::from_bits(0)];
     constants.extend(denoising.steps.iter().flat_map(|step| step.to_array()));
@@ -82,7 +82,7 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
     let data =
         StepData::Denoise { constants, noise: denoising.draws().then_some(Slice { offset: denoising.len, ..iterate }) };
     lowering.emit(OpKind::Denoise, iterate, Some(velocity), Some(read_next), data);
-    Arena { lowering, kept_len, work_len }.assign(OBSERVATION, once, iterate, act_len)
+    Arena { lowering, kept_len, work_len }.assign(OBSERVATION, first_denoising_op, iterate, act_len)
 }
 
 /// Returns an operation after the network, whose output has its place now.
@@ -107,7 +107,13 @@ struct Arena {
 
 impl Arena {
     /// Assigns every buffer its offset.
-    fn assign(self, observation: BufferId, once: usize, output: Slice, act_len: usize) -> Result<Program> {
+    fn assign(
+        self,
+        observation: BufferId,
+        first_denoising_op: usize,
+        output: Slice,
+        act_len: usize,
+    ) -> Result<Program> {
         let Lowering { steps, buffers, .. } = &self.lowering;
         let mut offsets = vec![0; buffers.len()];
         let mut top = 0;
@@ -168,7 +174,7 @@ impl Arena {
             steps: steps.collect(),
             state: Region { offset: 0, len: state_len },
             observation: whole(observation),
-            once,
+            first_denoising_op,
             output: region(output),
             action,
             work: Region { offset: work_offset, len: self.work_len },

@@ -201,7 +201,7 @@ impl Writer {
             work: program.work,
             matrices: Records { offset: self.matrices, count: matrices.len() },
             ops: Records { offset: ops, count: program.steps.len() },
-            first_denoising_op: program.once,
+            first_denoising_op: program.first_denoising_op,
             denoising_steps: policy.graph.denoising.as_ref().map_or(0, |denoising| denoising.steps.len()),
             contract,
             contract_flags: flags,
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn a_self_test_has_more_than_one_step_where_actions_depend_on_earlier_steps() {
+    fn stateful_policies_get_longer_self_tests() {
         let feed_forward = Policy::of("mlp", testing::mlp());
         assert_eq!(self_test_steps(&feed_forward), 1);
         assert_eq!(self_test_steps(&Policy::of("lstm", testing::lstm())), 3);

@@ -64,9 +64,9 @@ pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denois
         iterate: 0,
         len: steps.len,
     };
-    hoist.once()?;
+    hoist.add_observation_nodes()?;
     let first = hoist.graph.nodes.len();
-    hoist.of_step()?;
+    hoist.add_step_nodes()?;
     let mut graph = hoist.graph;
     graph.denoising = Some(Denoising { first, ..steps });
     Ok(graph)
@@ -126,12 +126,12 @@ struct Hoist<'a> {
 
 impl Hoist<'_> {
     /// Adds nodes of the observation alone, and the observation's columns of split layers.
-    fn once(&mut self) -> Result<()> {
+    fn add_observation_nodes(&mut self) -> Result<()> {
         let flat = self.flat;
         for (i, node) in flat.nodes.iter().enumerate() {
             if self.needs[i + 1] == Needs::Observation {
                 self.copy(i)?;
-            } else if let Some((linear, parts)) = self.cut(node) {
+            } else if let Some((linear, parts)) = self.split_layer(node) {
                 // The biases are in the table if there is one, else here.
                 let biased = parts.iter().all(|(.., needs)| *needs != Needs::Time);
                 self.condition[i + 1] = self.columns(linear, &parts, Needs::Observation, biased)?;
@@ -141,14 +141,14 @@ impl Hoist<'_> {
     }
 
     /// Adds all remaining nodes except those of the time alone.
-    fn of_step(&mut self) -> Result<()> {
+    fn add_step_nodes(&mut self) -> Result<()> {
         let flat = self.flat;
         self.iterate = self.graph.add(Iterate { len: self.len }, &[])?;
         for (i, node) in flat.nodes.iter().enumerate() {
-            if self.needs[i + 1] != Needs::Step || self.only_cut(i) {
+            if self.needs[i + 1] != Needs::Step || self.feeds_only_split_layers(i) {
                 continue;
             }
-            let Some((linear, parts)) = self.cut(node) else {
+            let Some((linear, parts)) = self.split_layer(node) else {
                 self.copy(i)?;
                 continue;
             };
@@ -175,17 +175,17 @@ impl Hoist<'_> {
     }
 
     /// Returns `true` if only split layers read the parts that this node concatenates.
-    fn only_cut(&self, i: usize) -> bool {
+    fn feeds_only_split_layers(&self, i: usize) -> bool {
         let readers = self.flat.readers(i + 1);
         matches!(self.flat.nodes[i].kind, NodeKind::Concat(_))
             && !readers.is_empty()
             && i + 1 != self.flat.output()
-            && readers.iter().all(|&reader| self.cut(&self.flat.nodes[reader]).is_some())
+            && readers.iter().all(|&reader| self.split_layer(&self.flat.nodes[reader]).is_some())
     }
 
     /// Returns a linear layer over parts of different dependence, with the parts: value, span, dependence.
     #[expect(clippy::type_complexity, reason = "the line above names the parts")]
-    fn cut<'n>(&self, node: &'n Node) -> Option<(&'n Linear, Vec<(ValueId, Span, Needs)>)> {
+    fn split_layer<'n>(&self, node: &'n Node) -> Option<(&'n Linear, Vec<(ValueId, Span, Needs)>)> {
         let NodeKind::Linear(linear) = &node.kind else { return None };
         let input = node.inputs.first()?.checked_sub(1)?;
         let NodeKind::Concat(Concat(spans)) = &self.flat.nodes[input].kind else { return None };

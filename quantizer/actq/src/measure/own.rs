@@ -25,7 +25,7 @@ pub fn own_path(image: Image<'_>, files: &[PathBuf], source: Option<&Policy>) ->
         }
         ensure!(
             !is_link_log(file)?,
-            "{name}: is a log of actq link stream, whose observations this image did not lead to; record it with actq serve --record"
+            "{name}: is a log of actq link stream, recorded by another controller; record a rollout with actq serve --record"
         );
         let mut dataset = Dataset::load(file, Sizes::of_image(&image))?;
         fill_actions(&mut dataset, source)?;

@@ -14,9 +14,9 @@ use crate::methods::{Activations, Method, Options, Progress};
 const MOST_BITS: f64 = 10.0;
 /// Tries between the least and the most bits; the last two differ by a hundredth of a bit.
 const TRIES: usize = 10;
-/// Tries to find the cycles of the rest of a step, and the share of the limit by which it may vary.
+/// Tries to find the cycles of everything but the rows, and the share of the limit by which they may vary.
 const REST_TRIES: usize = 2;
-const SPARE: f64 = 0.001;
+const REST_MARGIN: f64 = 0.001;
 
 /// Predicts the step of an image.
 fn predict(quantized: &QuantizedPolicy, limit: TimeLimit) -> Result<StepTime> {
@@ -61,15 +61,14 @@ impl Draft<'_> {
         self.quantizer.at(rate, self.options, &mut |_| {})
     }
 
-    /// Finds the most cycles that the method may decide on: those that the rest of a step leaves, which takes nearly the
-    /// same time whatever the rows.
+    /// Finds the cycles that rows may take: the limit less the cycles of everything else, which hardly depend on the rows.
     fn cycles(&self) -> Result<Rate> {
         let TimeLimit { milliseconds, clock_hz, image_bytes } = self.limit;
         // More than any step takes, and small enough for sums.
         let allowed = (milliseconds * clock_hz / 1e3).min(1e18);
         let bytes = image_bytes.map(|bytes| flash::room(self.quantizer, self.options, bytes)).transpose()?;
         let Quantizer { method, .. } = self.quantizer;
-        // The cycles of a whole step, and those of its rest.
+        // The cycles of a whole step, and those of everything but the rows.
         let taken = |rate: Rate| -> Result<(f64, f64)> {
             let network = method.quantize(rate, self.options, |_| {})?;
             let counted = network.cycles.unwrap_or_default();
@@ -82,7 +81,7 @@ impl Draft<'_> {
         for _ in 0..REST_TRIES {
             rest = taken(Rate::Within { bytes, cycles: (allowed - rest).max(0.0) })?.1.max(rest);
         }
-        Ok(Rate::Within { bytes, cycles: (allowed - rest - SPARE * allowed).max(0.0) })
+        Ok(Rate::Within { bytes, cycles: (allowed - rest - REST_MARGIN * allowed).max(0.0) })
     }
 
     /// Finds the most bits per weight.
@@ -179,7 +178,7 @@ mod tests {
             };
             let rests: Vec<f64> = (0..12).map(|i| rest(500.0 * f64::from(i * i))).collect();
             let (least, most) = rests.iter().fold((f64::MAX, 0.0f64), |(a, b), rest| (a.min(*rest), b.max(*rest)));
-            assert!(most - least <= SPARE * 168e3, "{rests:?}");
+            assert!(most - least <= REST_MARGIN * 168e3, "{rests:?}");
         }
     }
 }

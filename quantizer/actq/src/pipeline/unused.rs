@@ -3,7 +3,7 @@
 use actq_kernels::Width;
 
 use super::quantizer::QuantizedPolicy;
-use crate::budget::{Budget, USED};
+use crate::budget::{Budget, MIN_USED_SHARE};
 use crate::methods::distill::balance::balance_bytes;
 use crate::methods::{Method, Options, Outcome};
 
@@ -41,7 +41,7 @@ impl Unused {
             Budget::BitsPerWeight(bits) => (bits_per_weight(found), bits),
             Budget::Width(_) | Budget::MaxNmse(_) | Budget::Time(_) => return None,
         };
-        (used < USED * allowed).then(|| Self { used, allowed, reason: reason(found, options) })
+        (used < MIN_USED_SHARE * allowed).then(|| Self { used, allowed, reason: reason(found, options) })
     }
 }
 
