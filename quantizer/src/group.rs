@@ -1,4 +1,5 @@
-//! The process groups of the commands that this process runs, as that of `--drive`. The processes of a group end together.
+//! The process groups of the commands that this process runs, as that of `--drive`. The processes of a group end
+//! together.
 
 use std::collections::BTreeSet;
 use std::io;

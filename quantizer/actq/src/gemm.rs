@@ -1,7 +1,7 @@
 //! Products of matrices, with the same bits on every processor.
 //!
-//! An element of `C + A B` is one chain of fused multiply-adds, `c = fma(a[i][k], b[k][j], c)` for k = 0, 1, ... It does
-//! not depend on the number of threads, the length of vectors, or the other rows: a batch gives the bits of its
+//! An element of `C + A B` is one chain of fused multiply-adds, `c = fma(a[i][k], b[k][j], c)` for k = 0, 1, ... It
+//! does not depend on the number of threads, the length of vectors, or the other rows: a batch gives the bits of its
 //! samples. Processors without the instruction compute it exactly by other means, slowly.
 //!
 //! Goto, van de Geijn: Anatomy of high-performance matrix multiplication, ACM TOMS 34 (2008), has the method: `B` lies

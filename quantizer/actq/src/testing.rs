@@ -66,8 +66,8 @@ pub(crate) fn gru(hidden: usize) -> Graph {
     graph
 }
 
-/// Makes a network 3 -> `len` relu, to which two blocks `len` -> `len` relu add, the second after a norm if wanted; then
-/// -> 2.
+/// Makes a network 3 -> `len` relu, to which two blocks `len` -> `len` relu add, the second after a norm if wanted;
+/// then -> 2.
 pub(crate) fn residual(len: usize, normed: bool) -> Graph {
     let mut random = Random::new(7);
     let mut graph = Graph::new(3);

@@ -7,12 +7,13 @@ use actq::methods::{Effort, Method};
 
 /// Seconds of a job that does almost nothing: the start of the process, and reading.
 const LEAST_SECONDS: f64 = 0.02;
-/// Seconds per weight of rounding and packing, of these with statistics of a recording, and of two-sided error feedback.
+/// Seconds per weight of rounding and packing, of these with statistics of a recording, and of two-sided error
+/// feedback.
 const ROUNDING: f64 = 3e-6;
 const STATISTICS: f64 = 7e-6;
 const FEEDBACK: f64 = 2.6e-5;
-/// Seconds per weight of a step of distillation, on one core: between 3.1e-8 if most rows are removed and 7e-8 if none is.
-/// Removed rows count, though most steps do not compute them.
+/// Seconds per weight of a step of distillation, on one core: between 3.1e-8 if most rows are removed and 7e-8 if none
+/// is. Removed rows count, though most steps do not compute them.
 const STEP: f64 = 5e-8;
 /// Seconds per weight of one observation, in the executor on a host.
 const OBSERVATION: f64 = 2e-10;

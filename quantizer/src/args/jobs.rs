@@ -26,12 +26,12 @@ pub struct JobArgs {
     /// The folder of the results
     #[arg(long, value_name = "DIR")]
     pub(crate) store: PathBuf,
-    /// Threads, at most 256, 0 for the default; results do not depend on their number [default: the job's cpus, or fewer if this process may
-    /// not use as many]
+    /// Threads, at most 256, 0 for the default; results do not depend on their number [default: the job's cpus, or
+    /// fewer if this process may not use as many]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = threads)]
     pub(crate) threads: u16,
-    /// Print the progress to standard output, one JSON object a line: work and share (0 to 1); at the end address, cached
-    /// and seconds
+    /// Print the progress to standard output, one JSON object a line: work and share (0 to 1); at the end address,
+    /// cached and seconds
     #[arg(long)]
     pub(crate) progress: bool,
 }

@@ -63,8 +63,8 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     print(&format!("written   {}\n", written.join(", ")))
 }
 
-/// Checks a description that stays from an import before: its bundle and answers must be readable, and it must agree with the
-/// reference, if there is one.
+/// Checks a description that stays from an import before: its bundle and answers must be readable, and it must agree
+/// with the reference, if there is one.
 pub(crate) fn check_kept(bundle: &Path, policy: &Path, args: &ReadingArgs) -> Result<()> {
     Bundle::open(bundle)?;
     read_answers(args)?;

@@ -30,8 +30,8 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
         "--policy labels recordings, but {} takes raw inputs, whose recordings have no labels; remove --policy",
         args.image.display()
     );
-    // An action of raw values has no label: `actq quantize` makes the networks' observations of them. Neither has one from
-    // noise: whoever reads the recording draws noise, and labels the observations with it.
+    // An action of raw values has no label: `actq quantize` makes the networks' observations of them. Neither has one
+    // from noise: whoever reads the recording draws noise, and labels the observations with it.
     let is_labelled = !image.has_around() && image.noise_len() == 0;
     let source = if image.has_around() { None } else { source(args, &image)? };
     if source.is_none() && is_labelled {

@@ -13,8 +13,8 @@ use super::time::conditions;
 /// Columns of every table, from left to right.
 const HEADER: [&str; 9] = ["round", "episodes", "frames", "bytes", "ms", "f32 path", "own path", "success", "seconds"];
 
-/// Formats a row for each image: the recordings it learned from, its bytes, time and errors, and the outcome of its rollout. Each
-/// tracking error that the command printed has a column.
+/// Formats a row for each image: the recordings it learned from, its bytes, time and errors, and the outcome of its
+/// rollout. Each tracking error that the command printed has a column.
 pub fn table(tuned: &Tuned) -> String {
     let mut tracking: Vec<&str> = tuned.rounds.iter().flat_map(|round| round.driven.keys()).collect();
     tracking.retain(|key| key.starts_with("tracking_error"));

@@ -36,8 +36,9 @@ pub struct Made {
     pub nmse: f64,
     /// Predicted milliseconds of a step at the default clock; `None` if no kernel computes the format.
     pub milliseconds: Option<f64>,
-    /// The same with products by CMSIS-NN's int8 kernel ([`cmsis_nn_milliseconds`](crate::student::form::cmsis_nn_milliseconds));
-    /// `None` for other codes, and in results of earlier versions.
+    /// The same with products by CMSIS-NN's int8 kernel
+    /// ([`cmsis_nn_milliseconds`](crate::student::form::cmsis_nn_milliseconds)); `None` for other codes, and in results
+    /// of earlier versions.
     #[serde(default)]
     pub cmsis_nn_milliseconds: Option<f64>,
     /// Bits per weight, everything counted.

@@ -8,8 +8,8 @@ use super::allowed::Allowed;
 use super::cell::{Cell, Made};
 use super::plan::Contender;
 
-/// Writes the fewest bytes and the fewest milliseconds at which each method keeps f32's success: that of the image is not
-/// below the interval of f32's. Writes nothing if f32 was not driven.
+/// Writes the fewest bytes and the fewest milliseconds at which each method keeps f32's success: that of the image is
+/// not below the interval of f32's. Writes nothing if f32 was not driven.
 pub(super) fn write(
     text: &mut String,
     methods: &[Contender],

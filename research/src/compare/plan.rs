@@ -143,8 +143,8 @@ pub struct Plan {
         default_value = "go1_mlp,g1_lstm256,g1_lstm64,fetch_pickplace,ur3"
     )]
     pub policies: Vec<String>,
-    /// Methods; distill-0 is distill with --steps 0, not learned; actquant-authors, actquant-k-half, students and pruned are
-    /// not in the default
+    /// Methods; distill-0 is distill with --steps 0, not learned; actquant-authors, actquant-k-half, students and
+    /// pruned are not in the default
     #[arg(
         long,
         value_name = "LIST",
@@ -152,8 +152,8 @@ pub struct Plan {
         default_value = "rtn,gptq,actquant,actquant-k,distill-0,distill"
     )]
     pub methods: Vec<Contender>,
-    /// Allowed bits per weight, everything counted; or flash of the whole image, in KiB as 12K or in bytes as 12000B; or
-    /// time of a step, in milliseconds at 168 MHz as 0.25ms
+    /// Allowed bits per weight, everything counted; or flash of the whole image, in KiB as 12K or in bytes as 12000B;
+    /// or time of a step, in milliseconds at 168 MHz as 0.25ms
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Allowed::parse, default_value = "1.5,2,2.3,2.5,3,4")]
     pub budgets: Vec<Allowed>,
     /// Closed-loop episodes of each cell

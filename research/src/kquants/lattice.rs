@@ -40,7 +40,8 @@ struct Grid([[f32; POINTS]; GROUP]);
 static GRID: LazyLock<Grid> = LazyLock::new(Grid::new);
 
 impl Grid {
-    /// Takes the 512 points of least norm whose number of middle magnitudes is even, in lexicographic order among equals.
+    /// Takes the 512 points of least norm whose number of middle magnitudes is even, in lexicographic order among
+    /// equals.
     ///
     /// With 1, 3 and 5 for the magnitudes and an even number of negative signs, these are points of the lattice E8, the
     /// densest packing in eight dimensions: all coordinates are odd, and their sum is a multiple of 4. (QuIP#, arXiv

@@ -73,9 +73,9 @@ pub fn choose(
     best_of(&trials)
 }
 
-/// Returns the trial with the lowest error, by the rule of the method distill. Of those whose errors on the path differ by
-/// chance only, it is the one with the lowest error off it. Of a recurrent policy's trials, it is the one with the lowest
-/// error off the path.
+/// Returns the trial with the lowest error, by the rule of the method distill. Of those whose errors on the path differ
+/// by chance only, it is the one with the lowest error off it. Of a recurrent policy's trials, it is the one with the
+/// lowest error off the path.
 fn lowest_error(trials: &[Trial], recurrent: bool) -> Option<&Trial> {
     let expected = |trial: &Trial| if recurrent { trial.widened } else { trial.recorded };
     // A trial that diverged has no number for an error.

@@ -11,12 +11,12 @@ use actq::runtime::ImageBuffer;
 use actq_kernels::Width;
 use half::bf16;
 
-/// Cycles of a multiplication in f32, an estimate in the rival's favour: a word by VLDM, VMUL and VADD, without a stall,
-/// a loop or a load of the operand. (A VFMA takes 3.)
+/// Cycles of a multiplication in f32, an estimate in the rival's favour: a word by VLDM, VMUL and VADD, without a
+/// stall, a loop or a load of the operand. (A VFMA takes 3.)
 pub const F32_CYCLES: f64 = 3.0;
-/// Cycles of a MAC and of a row by CMSIS-NN's int8 kernel for fully connected layers (`arm_nn_vec_mat_mult_t_s8` with DSP),
-/// an estimate in the rival's favour: an instruction takes at least a cycle, and these are the instructions that were
-/// counted before this project began, together 2.07 a MAC for 256 x 256. A network of 189,952 weights took 2.45
+/// Cycles of a MAC and of a row by CMSIS-NN's int8 kernel for fully connected layers (`arm_nn_vec_mat_mult_t_s8` with
+/// DSP), an estimate in the rival's favour: an instruction takes at least a cycle, and these are the instructions that
+/// were counted before this project began, together 2.07 a MAC for 256 x 256. A network of 189,952 weights took 2.45
 /// (docs/records/2026-11-25-c.md), and this estimate has 2.11.
 pub const CMSIS_NN_CYCLES: [f64; 2] = [1.875, 50.0];
 /// A scale with which no function of an outlined network leaves f32's range.
@@ -88,7 +88,8 @@ pub fn milliseconds(policy: &Policy, outcomes: &[Outcome]) -> Result<f64> {
     Ok(StepTime::new(&buffer.image("the rival's image".as_ref())?, CLOCK).milliseconds)
 }
 
-/// Estimates the milliseconds of a step whose products are computed by CMSIS-NN ([`CMSIS_NN_CYCLES`]), all else as here.
+/// Estimates the milliseconds of a step whose products are computed by CMSIS-NN ([`CMSIS_NN_CYCLES`]), all else as
+/// here.
 pub fn cmsis_nn_milliseconds(step: &StepTime) -> f64 {
     let [of_mac, of_row] = CMSIS_NN_CYCLES;
     let products = || step.ops.iter().filter(|op| op.macs > 0);

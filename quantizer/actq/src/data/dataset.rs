@@ -283,8 +283,8 @@ fn lengths(array: &Tensor, episodes: usize, steps: usize) -> Result<Vec<usize>> 
     numbers.into_iter().enumerate().map(one).collect()
 }
 
-/// Returns the mean and the variance of each of the `values` in rows; zeros without rows. The sums are in f64, in the order of
-/// the rows.
+/// Returns the mean and the variance of each of the `values` in rows; zeros without rows. The sums are in f64, in the
+/// order of the rows.
 pub(crate) fn mean_and_variance<'a, R: Iterator<Item = ArrayView1<'a, f32>>>(
     values: usize,
     rows: impl Fn() -> R,

@@ -74,8 +74,8 @@ impl Recording {
     }
 }
 
-/// Returns the recordings that are `named`: files, and every .npz, .npy and .safetensors in named folders, by name. A file
-/// that is named twice is refused.
+/// Returns the recordings that are `named`: files, and every .npz, .npy and .safetensors in named folders, by name. A
+/// file that is named twice is refused.
 pub fn files_of(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in named {

@@ -23,8 +23,8 @@ use crate::runtime::{ImageBuffer, with_head};
 /// Most bytes of a self-test of more than one step.
 const SELF_TEST_BYTES: usize = 64 << 10;
 
-/// Writes the image of a policy's network with its quantized matrices, one per matrix of the graph. The executor itself computes
-/// the self-test's actions.
+/// Writes the image of a policy's network with its quantized matrices, one per matrix of the graph. The executor itself
+/// computes the self-test's actions.
 ///
 /// # Errors
 ///
@@ -166,8 +166,8 @@ impl Writer {
             self.push_floats(&ensemble.weights());
         }
         let name = self.push_bytes(policy.name.as_bytes());
-        // One step tests everything if none depends on an earlier one. Else a chunk and the beginning of the next do, or as
-        // much of them as long observations leave room for.
+        // One step tests everything if none depends on an earlier one. Else a chunk and the beginning of the next do,
+        // or as much of them as long observations leave room for.
         let is_stateless = policy.kind == Kind::Step && program.state.len == 0 && !policy.contract.has_memory();
         let room = SELF_TEST_BYTES / (4 * (obs_len + policy.act_len));
         let steps = if is_stateless { 1 } else { (policy.execute.max(horizon) + 2).min(room.max(1)) };

@@ -15,7 +15,8 @@ pub struct Narrowed {
     pub columns: Vec<Vec<usize>>,
 }
 
-/// Keeps these elements of each group of `ties`, in their order: at least one, and in parts of a concatenation ascending.
+/// Keeps these elements of each group of `ties`, in their order: at least one, and in parts of a concatenation
+/// ascending.
 pub fn narrowed(graph: &Graph, ties: &Ties, kept: &[Vec<usize>]) -> Narrowed {
     let matrices = || 0..graph.matrices.len();
     let rows: Vec<Vec<usize>> = matrices().map(|m| ties.row_places(m, kept)).collect();

@@ -108,9 +108,9 @@ pub trait Operation {
         if self.products().is_empty() { Elements::Inputs } else { Elements::Own }
     }
 
-    /// Keeps some elements of the output, in this order, and the values of the vectors for them; of a recurrent cell its
-    /// hidden units. There are `len` of them. The caller cuts the matrices: their rows as `unit_rows` (`units.rs`) says,
-    /// and the columns of those that read the elements.
+    /// Keeps some elements of the output, in this order, and the values of the vectors for them; of a recurrent cell
+    /// its hidden units. There are `len` of them. The caller cuts the matrices: their rows as `unit_rows` (`units.rs`)
+    /// says, and the columns of those that read the elements.
     fn keep_units(&mut self, len: usize, units: &[usize]) {
         self.vectors_mut().into_iter().for_each(|vector| keep(vector, len, units));
     }

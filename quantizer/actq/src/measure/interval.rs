@@ -1,7 +1,7 @@
 //! The interval of a share.
 
-/// Returns the 95% interval of the share `successes / trials`, of one trial or more (Wilson: Probable inference, the law of
-/// succession, and statistical inference, 1927).
+/// Returns the 95% interval of the share `successes / trials`, of one trial or more (Wilson: Probable inference, the
+/// law of succession, and statistical inference, 1927).
 pub fn wilson(successes: f64, trials: f64) -> [f64; 2] {
     /// Quantile of the normal distribution.
     const Z: f64 = 1.96;

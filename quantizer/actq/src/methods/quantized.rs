@@ -123,7 +123,8 @@ pub struct QuantizedNetwork {
     pub outcomes: Vec<Outcome>,
     /// Learning, if the method learns.
     pub learning: Option<Learning>,
-    /// Modelled cycles of the rows, without those that removed units save elsewhere; `None` unless the rate limits them.
+    /// Modelled cycles of the rows, without those that removed units save elsewhere; `None` unless the rate limits
+    /// them.
     pub cycles: Option<f64>,
 }
 

@@ -61,7 +61,8 @@ impl Draft<'_> {
         self.quantizer.at(rate, self.options, &mut |_| {})
     }
 
-    /// Finds the cycles that rows may take: the limit less the cycles of everything else, which hardly depend on the rows.
+    /// Finds the cycles that rows may take: the limit less the cycles of everything else, which hardly depend on the
+    /// rows.
     fn cycles(&self) -> Result<Rate> {
         let TimeLimit { milliseconds, clock_hz, image_bytes } = self.limit;
         // More than any step takes, and small enough for sums.

@@ -6,8 +6,8 @@ use actq::data::NpzWriter;
 use actq_client::log::Row;
 use anyhow::{Result, ensure};
 
-/// Returns an .npz file with the arrays `obs` and `action` (one frame per row; NaN for a missing action), `applied` (0 or
-/// 1), and `sent` and `received` (seconds since the log began; NaN for a missing action).
+/// Returns an .npz file with the arrays `obs` and `action` (one frame per row; NaN for a missing action), `applied` (0
+/// or 1), and `sent` and `received` (seconds since the log began; NaN for a missing action).
 pub(super) fn npz(rows: &[Row]) -> Result<Vec<u8>> {
     let observation_len = rows.first().map_or(0, |row| row.observation.len());
     let answers = || rows.iter().map(|row| row.answer.as_ref());

@@ -15,8 +15,8 @@ use crate::methods::packing::{Activations, Packing};
 use crate::methods::quantized::{Quantized, dequantized};
 use crate::random::Random;
 
-/// Least share of the error that an int16 input must remove, and the addition per share of the weights: its kernel takes
-/// 1.3 to 1.7 times as long.
+/// Least share of the error that an int16 input must remove, and the addition per share of the weights: its kernel
+/// takes 1.3 to 1.7 times as long.
 const MIN_ERROR_SHARE: f32 = 0.03;
 const EXTRA_SHARE_PER_WEIGHT_SHARE: f32 = 0.12;
 /// Ratio of bytes, int8 layout over int16 layout, above which a matrix of few columns and mostly 8-bit rows gets int16:

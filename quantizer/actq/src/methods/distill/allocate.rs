@@ -232,8 +232,8 @@ impl RowPrice {
     }
 }
 
-/// Returns the widths that minimize error plus `multiplier` times their price. The saving of a removed row depends on the
-/// other rows' widths, so the choice is repeated until it settles.
+/// Returns the widths that minimize error plus `multiplier` times their price. The saving of a removed row depends on
+/// the other rows' widths, so the choice is repeated until it settles.
 fn choose(size: &Size<'_>, rows: &[Rows], multiplier: f64) -> Widths {
     let Size { graph, dimensions, .. } = size;
     let mut widths: Widths = graph.matrices.iter().map(|m| vec![Some(Width::W2); m.rows]).collect();

@@ -3,9 +3,9 @@
 //! If several elements carry the same information, removing one costs nothing and removing all does. So elements are
 //! ranked: the first explains most of the vector's effect, the next most of the rest, and so on. This is column subset
 //! selection by a pivoted Cholesky factorization, with the criterion of Optimal Brain Surgeon (Hassibi, Stork 1993) for
-//! several weights. Each element's error is its addition to those ranked before it. If the elements down to any rank are
-//! kept, the sum over the others is the error of removing all of them, with least squares from the kept ones in their
-//! place.
+//! several weights. Each element's error is its addition to those ranked before it. If the elements down to any rank
+//! are kept, the sum over the others is the error of removing all of them, with least squares from the kept ones in
+//! their place.
 //!
 //! A recording has too few frames to estimate all correlations. So an element costs at least its own effect, with
 //! compensation half as far (in logarithms) as the recording allows ([`importance`]).
@@ -76,8 +76,8 @@ impl Effect {
     }
 }
 
-/// Returns the errors of removing each element, as [`Effect::together`], where several vectors lose the same elements: the
-/// sums over the vectors. All have the same length.
+/// Returns the errors of removing each element, as [`Effect::together`], where several vectors lose the same elements:
+/// the sums over the vectors. All have the same length.
 pub(super) fn together(effects: &[Effect]) -> Vec<f64> {
     let alone: Vec<Vec<f64>> = effects.iter().map(Effect::alone).collect();
     let at_least = |j: usize| alone.iter().map(|alone| alone[j]).sum::<f64>();
@@ -90,8 +90,8 @@ pub(super) fn together(effects: &[Effect]) -> Vec<f64> {
 /// Measured errors are those of small changes: linear in the elements, and with the other vectors unchanged. Their sum
 /// over a vector can be a thirtieth of `mean_action_error`, although the action is lost without the vector. And they
 /// hardly fall from rank to rank, so that widths that alternate between few and many elements look cheapest. Here every
-/// vector costs `mean_action_error`. An element costs the geometric mean of its measured error and of a law by which `k`
-/// elements leave a `k + 1`-th of the error.
+/// vector costs `mean_action_error`. An element costs the geometric mean of its measured error and of a law by which
+/// `k` elements leave a `k + 1`-th of the error.
 pub(super) fn even_layer_errors(removals: &[f64], mean_action_error: f64) -> Vec<f64> {
     let mut ranked: Vec<usize> = (0..removals.len()).collect();
     ranked.sort_by(|&a, &b| removals[b].total_cmp(&removals[a]));
@@ -105,9 +105,9 @@ pub(super) fn even_layer_errors(removals: &[f64], mean_action_error: f64) -> Vec
     means.iter().map(|error| error * factor).collect()
 }
 
-/// Returns the errors of the rows of a matrix without bits, if their elements stay: each then always gives its mean, and
-/// loses the variance of its product. No other row makes up for that; sums of such elements, as residual ones, would lose
-/// what the network adds to them.
+/// Returns the errors of the rows of a matrix without bits, if their elements stay: each then always gives its mean,
+/// and loses the variance of its product. No other row makes up for that; sums of such elements, as residual ones,
+/// would lose what the network adds to them.
 pub(super) fn in_place(matrix: &WeightMatrix, moments: &Moments, g: &[f64]) -> Vec<f64> {
     let centred = moments.centred();
     let w = Array2::from_shape_fn((matrix.rows, matrix.cols), |(r, c)| f64::from(matrix.data[r * matrix.cols + c]));

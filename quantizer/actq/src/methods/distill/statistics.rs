@@ -37,7 +37,8 @@ pub struct RowStatistics {
     /// Importance of every matrix's columns; of its rows.
     pub(super) inputs: Vec<Vec<f64>>,
     pub(super) outputs: Vec<Vec<f64>>,
-    /// Errors of removing each row of every matrix: one by one, and together when needed. `None`: use the rows' energies.
+    /// Errors of removing each row of every matrix: one by one, and together when needed. `None`: use the rows'
+    /// energies.
     alone: Vec<Option<Vec<f64>>>,
     together: OnceLock<Vec<Option<Vec<f64>>>>,
     /// Units, each set with its errors of removal.
@@ -100,9 +101,9 @@ impl RowStatistics {
         &self.windows.graph
     }
 
-    /// Returns each row's error of removal; `None`: use its energy. Without learning, errors of single rows apply: joint
-    /// errors gain little then, and make those of small networks more uneven. If `even`, the errors of rows that disappear
-    /// are [`even_layer_errors`].
+    /// Returns each row's error of removal; `None`: use its energy. Without learning, errors of single rows apply:
+    /// joint errors gain little then, and make those of small networks more uneven. If `even`, the errors of rows that
+    /// disappear are [`even_layer_errors`].
     pub(super) fn removals(&self, learns: bool, even: bool) -> Cow<'_, [Option<Vec<f64>>]> {
         let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
         let together = || removals(self.graph(), &of_inputs, &self.outputs, Effect::together);
@@ -147,8 +148,9 @@ impl RowStatistics {
     }
 }
 
-/// Returns the errors of removal of every matrix's rows: by `of` if the rows disappear, else by their output's variance.
-/// `None` for the gates of a cell: a gate is the sum of two products, and one can learn to replace the other's part.
+/// Returns the errors of removal of every matrix's rows: by `of` if the rows disappear, else by their output's
+/// variance. `None` for the gates of a cell: a gate is the sum of two products, and one can learn to replace the
+/// other's part.
 fn removals(graph: &Graph, moments: &[&Moments], g: &[Vec<f64>], of: fn(&Effect) -> Vec<f64>) -> Vec<Option<Vec<f64>>> {
     let dimensions = dimensions(graph);
     let cells = graph.nodes.iter().map(|node| node.kind.products()).filter(|products| products.len() > 1);

@@ -44,8 +44,8 @@ const OF_WINDOWS: Rates = Rates { latent: 3e-2, scale: 1e-2, vector: 1e-2, strid
 /// Samples of a batch: frames, or windows of a recurrent network.
 const FRAMES: usize = 256;
 const WINDOWS: usize = 16;
-/// Parts of a batch, independent of the number of threads, so that sums have one order. The fewer windows in a part, the
-/// slower the products with a recurrent matrix, which have a row for each.
+/// Parts of a batch, independent of the number of threads, so that sums have one order. The fewer windows in a part,
+/// the slower the products with a recurrent matrix, which have a row for each.
 const FRAME_SHARDS: usize = 4;
 const WINDOW_SHARDS: usize = 2;
 /// Least steps between two runs for a recurrent network's own states, and frames of the recording for each step.
@@ -204,8 +204,8 @@ fn learn(latents: &mut [Latent], grads: &mut [Array2<f32>], gait: Gait, weights:
     });
 }
 
-/// Returns the samples of a batch, frames or windows, and the parts that it is cut into. A frame of an iterative head is
-/// one frame per denoising step.
+/// Returns the samples of a batch, frames or windows, and the parts that it is cut into. A frame of an iterative head
+/// is one frame per denoising step.
 pub fn batch_size(graph: &Graph, windows: &Windows) -> (usize, usize) {
     match windows.recurrent() {
         true => (WINDOWS, WINDOW_SHARDS),

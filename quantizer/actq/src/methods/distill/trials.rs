@@ -6,12 +6,12 @@
 //! gives several shapes for one budget. And if nearly all elements are removed, measured errors of removal do not rank
 //! the vectors well ([`even_layer_errors`]).
 //!
-//! The rates come first, then the shapes at the best rate: by measured errors, and by those of even layers with the best
-//! factor and its neighbours. After a tenth of the steps, the order of the trials is nearly the final one. All trials
-//! learn from all episodes, and their errors are those at the recorded observations. Shapes of one budget overfit alike,
-//! and the differences on a quarter of the episodes are mostly chance. Higher rates are tried if less than a quarter of
-//! the weights is left. Larger networks overfit more at them, which trials do not show, and gain little
-//! (docs/records/2026-11-26-trials.md).
+//! The rates come first, then the shapes at the best rate: by measured errors, and by those of even layers with the
+//! best factor and its neighbours. After a tenth of the steps, the order of the trials is nearly the final one. All
+//! trials learn from all episodes, and their errors are those at the recorded observations. Shapes of one budget
+//! overfit alike, and the differences on a quarter of the episodes are mostly chance. Higher rates are tried if less
+//! than a quarter of the weights is left. Larger networks overfit more at them, which trials do not show, and gain
+//! little (docs/records/2026-11-26-trials.md).
 
 use super::candidate::Candidate;
 use super::choose::{Chosen, LEAST_STEPS, errors, lowest_error};

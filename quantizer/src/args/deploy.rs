@@ -1,0 +1,94 @@
+//! Arguments of the commands for ONNX files and deploy bundles.
+
+use std::path::PathBuf;
+
+use super::quantize::{BudgetArgs, LearnArgs, RunArgs};
+use super::values::{pair, positive, two_files};
+
+#[derive(clap::Args)]
+pub(crate) struct ImportArgs {
+    /// The ONNX file, with its external tensors beside it; or a deploy bundle: a folder, a .kinfer file, or an ONNX
+    /// file with one of the options for bundles
+    pub(crate) model: PathBuf,
+    /// The policy folder to create: policy.json, policy.safetensors and, with --calib, calib.npz
+    #[arg(long, value_name = "POLICY_DIR")]
+    pub(crate) out: PathBuf,
+    /// The calibration recording: .npy, .npz or .safetensors; of a bundle: raw inputs [tick, value] by name, .npz
+    #[arg(long, value_name = "FILE")]
+    pub(crate) calib: Option<PathBuf>,
+    /// The output that is the action, or any value of the graph [default: the output named action, or the only
+    /// candidate]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) output: Option<String>,
+    /// An input that holds recurrent state, and the output of its next value; may be repeated [default: the states of
+    /// the LSTM and GRU cells]
+    #[arg(long, value_name = "IN=OUT", value_parser = pair)]
+    pub(crate) state: Vec<(String, String)>,
+    /// Compare the actions with onnxruntime's, on the recording or on random observations, to 1e-5 of the largest
+    /// action. If they differ, a run in float64 decides which is right. Needs Python with onnxruntime and onnx
+    /// (python3, or the interpreter that ACTQ_PYTHON names)
+    #[arg(long)]
+    pub(crate) check: bool,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
+    /// Replace existing files
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+/// Options for reading a deploy bundle.
+#[derive(clap::Args, Clone)]
+pub(crate) struct ReadingArgs {
+    /// Bundle: the answers to the questions of an earlier run, a TOML file of their keys
+    #[arg(long, value_name = "FILE")]
+    pub(crate) answers: Option<PathBuf>,
+    /// Bundle: ask for what nothing states, line by line on standard input
+    #[arg(long)]
+    pub(crate) ask: bool,
+    /// Bundle: accept what the family's deploy code says where the files say nothing
+    #[arg(long)]
+    pub(crate) accept_profile: bool,
+    /// Bundle: compare with a run of the deploy code, tick by tick, to 1e-5 of the largest value. RAW.npz has the raw
+    /// inputs [tick, value] by name, EXPECT.npz the arrays observation, action and target
+    #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]
+    pub(crate) reference: Option<(PathBuf, PathBuf)>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct DeployArgs {
+    /// The bundle: a folder, a .kinfer file, or an ONNX file with metadata
+    pub(crate) bundle: PathBuf,
+    /// The folder to write to
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// The board to build firmware for; `cargo xtask firmware --list` shows them
+    #[arg(long, value_name = "NAME")]
+    pub(crate) board: Option<String>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
+    /// A recording of raw values by `actq serve --record`, or a folder of them; may be repeated. Without one, the
+    /// policy learns from RAW.npz
+    #[arg(long, value_name = "FILE|DIR")]
+    pub(crate) recordings: Vec<PathBuf>,
+    /// Fail if a target's NMSE over the reference is above this number
+    #[arg(long, value_name = "NMSE", value_parser = positive, requires = "reference")]
+    pub(crate) max_nmse: Option<f64>,
+    #[command(flatten)]
+    pub(crate) budget: BudgetArgs,
+    #[command(flatten)]
+    pub(crate) learn: LearnArgs,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct CheckArgs {
+    /// The image
+    pub(crate) image: PathBuf,
+    /// The raw inputs, and what the deploy code makes of them
+    #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]
+    pub(crate) reference: (PathBuf, PathBuf),
+    /// Fail if a target's NMSE is above this number
+    #[arg(long, value_name = "NMSE", value_parser = positive)]
+    pub(crate) max_nmse: Option<f64>,
+}
