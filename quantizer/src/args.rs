@@ -35,11 +35,11 @@ pub(crate) enum Command {
     /// Convert an ONNX file to a policy folder, or a deploy bundle to a description
     ///
     /// Reads exports of PyTorch, rsl_rl, Brax, MuJoCo Playground, mjlab, Isaac Lab, Stable-Baselines3, CleanRL and
-    /// ML-Agents: matrix products, activations, norms, LSTM and GRU cells, convolutions over few positions, and
-    /// operators that move or scale values, with a batch of 1. docs/IMPORT.md lists the supported operators, and
-    /// remedies for the others. The observation is the concatenation of the inputs, in the printed order. The action is
-    /// the output named action, or else the only candidate. Nodes that do not lead to it are cut. An error names the
-    /// node that cannot be imported.
+    /// ML-Agents. They may contain matrix products, activations, norms, LSTM and GRU cells, convolutions over few
+    /// positions, and operators that move or scale values, with a batch of 1. docs/IMPORT.md lists the supported
+    /// operators, and remedies for the others. The observation is the concatenation of the inputs, in the printed
+    /// order. The action is the output named action, or else the only candidate. Nodes that do not lead to it are cut.
+    /// An error names the node that cannot be imported.
     ///
     /// A deploy bundle is what a policy's authors publish for a robot: networks with files about joints, scales and
     /// histories. The command writes them as one file, deploy.toml (docs/DEPLOY.md), with copies of the networks. It
@@ -52,11 +52,11 @@ pub(crate) enum Command {
     /// Quantize a policy into an image
     ///
     /// POLICY_DIR holds policy.json (the op list), policy.safetensors (the weights) and, for every method but rtn, a
-    /// recording to learn from: calib.npz or calib.safetensors with the arrays "obs" [episode, step, value] and
-    /// optionally "action" (the network's raw output at each observation), "length" [episode] (valid steps) and "state"
-    /// [episode, value] (recurrent state before the first step), or calib.npy with observations only. An array with two
-    /// axes [frame, value] is one episode. If the folder also holds heldout.npz, .npy or .safetensors, the command runs
-    /// the image on both recordings and prints errors and warnings.
+    /// recording to learn from. The recording is calib.npz or calib.safetensors, or calib.npy with observations only.
+    /// Its arrays are "obs" [episode, step, value] and optionally "action" (the network's raw output at each
+    /// observation), "length" [episode] (valid steps) and "state" [episode, value] (recurrent state before the first
+    /// step). An array with two axes [frame, value] is one episode. If the folder also holds heldout.npz, .npy or
+    /// .safetensors, the command runs the image on both recordings and prints errors and warnings.
     ///
     /// Every POLICY_DIR may also be an .onnx file. It is imported as `actq import` does, and its recordings are those
     /// beside it.
@@ -81,33 +81,33 @@ pub(crate) enum Command {
     /// "obs" and "action"; without "action", the policy in POLICY_DIR gives the actions. The report includes the share
     /// of the error that comes from rounding the activations. If POLICY_DIR holds calib.npz, .npy or .safetensors, the
     /// command warns when the observations leave its range. With --driven, the report adds the error on the image's own
-    /// path: on observations that its own actions led to, which may differ from those of the f32 policy.
+    /// path. Its own actions led to these observations, which may differ from those of the f32 policy.
     ///
     /// Example: actq eval ur3.actq --policy policies/ur3
     Eval(EvalArgs),
     /// Turn a deploy bundle into an image and firmware, in one command that can be run again
     ///
-    /// Imports the bundle into OUT/policy, compares it with --reference, quantizes it to OUT/policy.actq, compares the
-    /// image with the reference, writes OUT/policy.h and OUT/policy.rs for the application, and builds OUT/BOARD.elf
-    /// (in a checkout of actq, by `cargo xtask firmware`). Each step is a command of its own: import, quantize, check,
-    /// constants. If one fails, run the command again: the description stays, which one may edit in between, and so
-    /// does an image that was made with the same files and options.
+    /// Imports the bundle into OUT/policy, compares it with --reference, quantizes it to OUT/policy.actq, and compares
+    /// the image with the reference. Writes OUT/policy.h and OUT/policy.rs for the application, and builds
+    /// OUT/BOARD.elf (in a checkout of actq, by `cargo xtask firmware`). Each step is a command of its own: import,
+    /// quantize, check, constants. If one fails, run the command again. It keeps the description, which you may edit in
+    /// between, and an image that was made with the same files and options.
     ///
     /// Example: actq deploy bundle --accept-profile --reference raw.npz:expect.npz --recordings runs --bpw 2 --out
     /// walker
     Deploy(DeployArgs),
     /// Write an image's sizes, names and places as constants of Rust, or of C
     ///
-    /// The file has the lengths of observation and action, the control rate and the words of scratch memory. Of an
-    /// image of a deploy bundle, it also has the place of each raw input and of each joint in the observation, and of
-    /// the targets in the action. Names of a C header begin with the file's name: those of walker.h with WALKER_.
+    /// The file has the lengths of observation and action, the control rate and the words of scratch memory. For a
+    /// deploy bundle's image, it also has the places of raw inputs and joints in the observation, and of the targets in
+    /// the action. Names of a C header begin with the file's name: those of walker.h with WALKER_.
     ///
     /// Example: actq constants walker.actq --out walker.h
     Constants(ConstantsArgs),
     /// Write an image as source code of C, to be linked into a firmware
     ///
     /// OUT gets NAME.c with the image as a constant array, NAME.h with its lengths, names, scratch memory and digests
-    /// as macros, and manifest.json with the SHA-256 of each file. docs/C.md tells how to build and run them.
+    /// as macros, and manifest.json with the SHA-256 of each file. docs/C.md documents how to build and run them.
     ///
     /// Example: actq export-c walker.actq --golden heldout.npz --out firmware/policy
     #[command(name = "export-c")]
@@ -123,10 +123,11 @@ pub(crate) enum Command {
     /// Quantize in on-policy rounds: roll out the image, record, and learn again (DAgger)
     ///
     /// Quantizes by method distill from the f32 policy's recordings. In every round a command rolls out the newest
-    /// image: a simulator or a robot whose policy is the command line in the environment variable POLICY_CMD (actq
+    /// image, in a simulator or on a robot. Its policy is the command line in the environment variable POLICY_CMD (actq
     /// serve IMAGE --record FILE, quoted for a shell). The f32 policy labels the recorded observations, and the next
     /// image learns from all recordings together. The last image is rolled out, too. At the end the command prints one
-    /// row for each image: its error on the f32 policy's path and on its own path, and the outcome of its rollout.
+    /// row for each image, with its errors on the f32 policy's path and on its own path, and the outcome of its
+    /// rollout.
     ///
     /// The command is run by sh -c, with ACTQ_ROUND = 1, 2, ... N + 1 (to run other episodes each time) and ACTQ_POLICY
     /// (the policy folder). Its output goes to standard error. The last line of it that is one JSON object reports the
@@ -136,11 +137,11 @@ pub(crate) enum Command {
     Tune(TuneArgs),
     /// Compare methods at several budgets on held-out observations
     ///
-    /// A row of the table has an image's bytes, predicted milliseconds, error (NMSE: mean squared error / variance of
-    /// the actions, mean over dimensions) and true bits per weight, with scales and padding; "-" if no image is within
-    /// the budget. A star marks images of the frontier: no other image has fewer bytes and a smaller error. Every
-    /// method uses its default group size. Activations are int8; method distill takes int16 for matrices that profit
-    /// from it.
+    /// A row of the table has an image's bytes, predicted milliseconds, error and true bits per weight, with scales and
+    /// padding. The error is the NMSE: mean squared error / variance of the actions, mean over dimensions. The row has
+    /// "-" if no image is within the budget. A star marks images of the frontier: no other image has fewer bytes and a
+    /// smaller error. Every method uses its default group size. Activations are int8; method distill takes int16 for
+    /// matrices that profit from it.
     ///
     /// Images and measurements are jobs. They run on this machine, each in a process, as many at a time as there are
     /// cores. With --store, results stay in that folder, and jobs whose results are there do not run again: the same

@@ -16,7 +16,7 @@ pub(crate) fn start_threads(threads: u16) -> Result<()> {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")
 }
 
-/// Frees one large block. From then on, glibc keeps freed memory up to twice this size for the next allocation; before,
+/// Frees one large block. From then on, glibc keeps freed memory up to twice this size for the next allocation. Before,
 /// it returns a learner's arrays to the kernel in every step and gets them back page by page. Other allocators ignore
 /// it. (mallopt(3), M_MMAP_THRESHOLD and M_TRIM_THRESHOLD)
 fn keep_freed_memory() {

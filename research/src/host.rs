@@ -1,4 +1,4 @@
-//! What jobs need from this command: the methods and works of this crate beside those of `actq`.
+//! The host of jobs: the methods and works of this crate, beside those of `actq`.
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,10 @@
 //! llama.cpp's K-quants and IQ2_XS, simulated: the weights that a matrix has in them, at their true bits.
 //!
 //! This module computes only the weights that codes and scales represent, not the bytes in llama.cpp's order. A
-//! super-block is 256 weights of a row. IQ2_XS has a file of its own. Of a K-quant it has sub-blocks of 16 or 32; a
+//! super-block is 256 weights of a row. IQ2_XS has a file of its own. Of a K-quant it has sub-blocks of 16 or 32. A
 //! weight is `d * scale * code - d_min * min`, where d and d_min are f16, and scale and min small integers of the
-//! sub-block. Scales and mins are fitted by least squares, weighted by importance: candidates for the clipping point,
-//! then the neighbours of the rounded scales, then d and d_min for the chosen codes.
+//! sub-block. Scales and mins are fitted by least squares, weighted by importance. The fit takes candidates for the
+//! clipping point, then the neighbours of the rounded scales, then d and d_min for the chosen codes.
 
 mod fit;
 mod lattice;
@@ -296,7 +296,7 @@ mod tests {
         }
     }
     #[test]
-    fn iq2_xs_is_near_the_bound_on_gaussian_weights() {
+    fn iq2_xs_nears_the_bound_on_gaussian_weights() {
         let mut random = Random::new(3);
         let weights: Vec<f32> = (0..64 * 256).map(|_| random.normal()).collect();
         let equal = vec![1.0; weights.len()];

@@ -22,7 +22,7 @@ enum Command {
     ///
     /// The policies are the UR3 policy and, if ACTQ_SHARED names their folder, the shared ones. Their tasks run in
     /// MuJoCo with the Python of ACTQ_MUJOCO_PYTHON (go1_*, g1_*) and ACTQ_GYMNASIUM_PYTHON (fetch_*). Each image and
-    /// each closed loop is a job, whose result is kept in DIR/store: the same command resumes an interrupted run, also
+    /// each closed loop is a job, whose result is kept in DIR/store. The same command resumes an interrupted run, also
     /// at a later commit that makes the same images. The report is DIR/compare.md.
     #[command(override_usage = "cargo xtask compare [OPTIONS] --out <DIR>")]
     Compare(Plan),

@@ -1,9 +1,9 @@
 //! A rival: structured pruning with fine-tuning. Elements of hidden vectors are ranked by the Taylor criterion of
-//! Molchanov et al. (Importance Estimation for Neural Network Pruning, 2019), `(sum g w)^2` over an element's weights;
-//! those that keep the budget learn on in f32, and become int8 with a scale per row.
+//! Molchanov et al. (Importance Estimation for Neural Network Pruning, 2019), `(sum g w)^2` over an element's weights.
+//! The elements within the budget continue to learn in f32, and become int8 with a scale per row.
 //!
 //! The teacher's own answers are the labels, so the gradient of a loss is 0. In its place is that of the outputs, each
-//! over its deviation and with a random sign: the mean square is the error of removal to the first order.
+//! over its deviation and with a random sign. The mean square is the error of removal to the first order.
 
 use actq::error::Result;
 use actq::graph::narrow::narrowed;

@@ -1,5 +1,5 @@
-//! A rival: a narrower network of the teacher's structure, which learns from random weights on, from the recordings and
-//! the teacher's answers with the noise of the method distill.
+//! A rival: a narrower network of the teacher's structure. It starts at random weights, and learns from the recordings
+//! and the teacher's outputs with the noise of the method distill.
 
 pub mod choice;
 pub mod codes;

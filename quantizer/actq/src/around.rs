@@ -1,4 +1,4 @@
-//! What an image computes around its network.
+//! Operations of an image around its network, and its raw inputs and targets.
 
 use actq_kernels::PortKind;
 

@@ -1,5 +1,4 @@
-//! The network: operations over values, what they compute in f32 forwards and backwards, and what they become in an
-//! image.
+//! The network: operations over values, their computation in f32 forwards and backwards, and their form in an image.
 //!
 //! Each operation is defined one time, in its file in [`ops`]; everything else uses it through
 //! [`operation::Operation`].

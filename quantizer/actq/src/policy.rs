@@ -31,7 +31,7 @@ pub struct Policy {
     pub contract: ActionContract,
     /// The network.
     pub graph: Graph,
-    /// What is around the network in an image; then its observations and actions are not those of the image.
+    /// Operations around the network in an image; the network's observations and actions then differ from the image's.
     pub around: Option<Around>,
     /// Weights of all its matrices as they were trained; the divisor of bits per weight.
     pub weights: usize,

@@ -1,7 +1,7 @@
 //! Points that no other one beats, and where a curve bends.
 
-/// Returns the points that no other one beats, as indices in the order of their first value: all whose second value is
-/// less than that of every point with at most as much of the first. Of equal points, the first counts.
+/// Returns the points that no other one beats, as indices in the order of their first value. They are all points whose
+/// second value is less than that of every point with at most as much of the first. Of equal points, the first counts.
 pub fn frontier(points: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     // The sort keeps the order of equal ones.
@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_knee_is_the_bend_of_the_best_curve() {
+    fn the_knee_bends_the_best_curve() {
         let curve = |points: [(f64, f64); 4]| points.map(|(bits, error)| Some((1000.0 * bits, error))).to_vec();
         let worse = curve([(2.0, 0.9), (2.5, 0.8), (3.0, 0.5), (4.0, 1e-4)]);
         let better = curve([(2.0, 0.5), (2.5, 0.01), (3.0, 0.006), (4.0, 0.003)]);

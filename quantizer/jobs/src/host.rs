@@ -1,4 +1,4 @@
-//! What the jobs need from the program that runs them.
+//! The interface between jobs and the program that runs them.
 
 use std::path::{Path, PathBuf};
 

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::job::Job;
 
-/// What the order depends on.
+/// The parts of a job on which the order depends.
 #[derive(Deserialize)]
 struct Node {
     address: String,

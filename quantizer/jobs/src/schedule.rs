@@ -81,8 +81,8 @@ impl<'a> Schedule<'a> {
         schedule
     }
 
-    /// Starts a job that is ready and takes at most `cpus` cores: of those, the one with the longest estimate, as long
-    /// jobs at the end leave workers idle. If no job runs, it may take more cores. Returns its index.
+    /// Starts a job that is ready and takes at most `cpus` cores. Of those, it takes the one with the longest estimate,
+    /// since long jobs at the end leave workers idle. If no job runs, it may take more cores. Returns its index.
     pub fn start(&mut self, cpus: usize) -> Option<usize> {
         let alone = !self.state.iter().any(|state| matches!(state, State::Running { .. }));
         let ready = (0..self.jobs.len()).filter(|&i| matches!(self.state[i], State::Waiting { open: 0, .. }));

@@ -23,7 +23,7 @@ struct Header {
     version: u32,
 }
 
-/// A store. It holds `store.json` with the version of its files, and for each result `ADDRESS.json`; an image or a
+/// A store. It holds `store.json` with the version of its files, and for each result `ADDRESS.json`. An image or a
 /// recording is beside it, as `ADDRESS.actq` or `ADDRESS.npz`, and is written first.
 #[derive(Clone, Debug)]
 pub struct Store {

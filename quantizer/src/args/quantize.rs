@@ -127,12 +127,12 @@ pub(crate) struct LearnArgs {
 /// Options of distillation by which an image does not depend on the machine.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct DistillArgs {
-    /// How long to learn: quick (an eighth of the steps), default, or thorough (2.5 times the steps)
+    /// Length of learning: quick (an eighth of the steps), default, or thorough (2.5 times the steps)
     #[arg(long, value_name = "E", default_value = "default", value_parser = effort, conflicts_with = "steps")]
     pub(crate) effort: Effort,
-    /// The most steps of distillation; 0 = two-sided error feedback instead, which takes seconds and gives a larger
-    /// error at few bits [default: by the number of weights, 8000 for 200 thousand, recurrent policies 4000, heads
-    /// with denoising steps 5000]
+    /// The most steps of distillation; 0 = two-sided error feedback, which takes seconds and gives a larger error at
+    /// few bits [default: by the number of weights, 8000 for 200 thousand, recurrent policies 4000, heads with
+    /// denoising steps 5000]
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<usize>,
     /// Weigh errors relative to the action's size, more than is the default for feed-forward policies. Use it for a

@@ -24,8 +24,8 @@ const POLICY: &str = "policy";
 const MADE_WITH: &str = "policy.actq.txt";
 const IMAGE: &str = "policy.actq";
 
-/// Imports a bundle, checks it, quantizes it, checks the image, and builds firmware. What an earlier run has finished
-/// with the same options stays.
+/// Imports a bundle, checks it, quantizes it, checks the image, and builds firmware. Results of an earlier run with the
+/// same options are kept.
 pub(crate) fn run(args: &DeployArgs) -> Result<()> {
     let only_reference = args.recordings.is_empty();
     ensure!(

@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_have_bytes_time_and_error_and_knees_are_named() {
+    fn merged_rows_have_figures_and_named_knees() {
         let images = vec![image(1.0, 0, 0.0), image(2.0, 2000, 0.5), image(2.5, 2500, 0.01), image(4.0, 4000, 0.02)];
         let policy = MergedPolicy {
             policy: "arm".to_owned(),

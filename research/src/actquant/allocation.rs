@@ -85,7 +85,7 @@ pub fn allocate(graph: &Graph, scores: &[f64], choices: &Choices, packing: Packi
 /// sum over the layer's matrices of `score * 2^(-2 bits)`. Formats are numbered from few bits to many. `allowed` holds
 /// the permitted ones of each matrix, `bits` returns the bits of a matrix in one of them, and `size` its bytes.
 ///
-/// The allocation is greedy, as in the paper: from the narrowest format on, it repeatedly makes the upgrade with the
+/// The allocation is greedy, as in the paper. From the narrowest format on, it repeatedly makes the upgrade with the
 /// largest fall of `E_l^2` per byte among those that fit. Among equals the narrowest matrix goes first, so that bytes
 /// which the scores do not claim are spread.
 ///

@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn random_signs_give_the_sum_of_the_outputs_squares() {
+    fn random_signs_give_the_sum_of_squares() {
         let graph = mlp();
         // The same observation many times, with the policy's own actions. They do not deviate, so a difference in the
         // last bit would count: they come from the same pass that they are compared with.

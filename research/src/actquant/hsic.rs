@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_squared_median_is_a_bandwidth_of_its_own() {
+    fn the_squared_median_is_another_bandwidth() {
         // Squared distances 1, 4 and 1 * 9: the median is 4, sigma either 2 or 4.
         let x = Array2::from_shape_vec((3, 1), vec![0.0, 1.0, 3.0]).expect("three samples");
         for (bandwidth, sigma2) in [(Bandwidth::Median, 4.0), (Bandwidth::SquaredMedian, 16.0)] {

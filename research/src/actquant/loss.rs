@@ -19,8 +19,8 @@ const EQUAL: f32 = 1e-3;
 /// `(1 - alpha) NLL + alpha L1` of an action, summed over its dimensions.
 ///
 /// The paper's NLL is that of action tokens. Networks here have none, so it is that of a Gaussian around the output
-/// with the standard deviation s of the recorded actions: its derivative is `(y - t) / s^2`, and that of L1 the sign of
-/// `y - t`. A dimension that never varies has no NLL.
+/// with the standard deviation s of the recorded actions. Its derivative is `(y - t) / s^2`, and that of L1 is the sign
+/// of `y - t`. A dimension that never varies has no NLL.
 #[derive(Debug)]
 pub(super) struct ActionLoss {
     alpha: f32,

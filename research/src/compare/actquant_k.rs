@@ -34,9 +34,9 @@ pub(super) struct Simulated {
 ///
 /// Some choices are made in the rival's favour, by the lowest held-out error:
 ///
-/// - The paper has models from Q2_K on and from IQ2_XS on. From Q2_K, the bits of a format's expected error are those of
-///   a code, as [elsewhere](crate::actquant::choices::NoiseBits). IQ2_XS and Q2_K have equally many of them, so
-///   from IQ2_XS it is all bits of the format, as in the authors' code.
+/// - The paper has models from Q2_K on and from IQ2_XS on. From Q2_K, the bits of a format's expected error are those
+///   of a code, as [elsewhere](crate::actquant::choices::NoiseBits). IQ2_XS and Q2_K have equally many of them. So
+///   from IQ2_XS, all bits of the format count, as in the authors' code.
 /// - llama.cpp's search also multiplies the importance by the weights' magnitude; the paper's objective does not.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! llama.cpp's IQ2_XS, simulated: eight weights of a group share one point of a grid, and their signs.
 //!
-//! A super-block is 256 weights: d in f16, a 4-bit scale s for each 16 weights, and for each 8 weights 9 bits that
-//! choose a point of the grid and 7 bits of signs. The number of negative signs is even, so the last sign follows from
+//! A super-block is 256 weights: d in f16, and a 4-bit scale s for each 16 weights. Each 8 weights have 9 bits that
+//! choose a point of the grid, and 7 bits of signs. The number of negative signs is even, so the last sign follows from
 //! the others. A weight is `d (2 s + 1) / 8` times its signed magnitude, which is 8, 25 or 43.
 //!
 //! The grid here is not llama.cpp's, but has its size, magnitudes and rate ([`Grid::new`]).
@@ -44,7 +44,7 @@ impl Grid {
     /// equals.
     ///
     /// With 1, 3 and 5 for the magnitudes and an even number of negative signs, these are points of the lattice E8, the
-    /// densest packing in eight dimensions: all coordinates are odd, and their sum is a multiple of 4. (QuIP#, arXiv
+    /// densest packing in eight dimensions. All coordinates are odd, and their sum is a multiple of 4. (QuIP#, arXiv
     /// 2402.04396, takes its codebook from E8, too.)
     fn new() -> Self {
         let digits = |point: usize| (0..GROUP).rev().map(move |i| point / 3usize.pow(i as u32) % 3);
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn nearest_point_is_that_of_all_points_and_signs() {
+    fn nearest_point_matches_an_exhaustive_search() {
         for seed in 0..20 {
             let weights = normal(seed, GROUP);
             let importance: Vec<f64> = normal(seed + 100, GROUP).iter().map(|h| f64::from(h * h)).collect();

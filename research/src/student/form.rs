@@ -11,12 +11,12 @@ use actq::runtime::ImageBuffer;
 use actq_kernels::Width;
 use half::bf16;
 
-/// Cycles of a multiplication in f32, an estimate in the rival's favour: a word by VLDM, VMUL and VADD, without a
-/// stall, a loop or a load of the operand. (A VFMA takes 3.)
+/// Cycles of a multiplication in f32, an estimate in the rival's favour. It counts a word by VLDM, VMUL and VADD,
+/// without a stall, a loop or a load of the operand. (A VFMA takes 3.)
 pub const F32_CYCLES: f64 = 3.0;
 /// Cycles of a MAC and of a row by CMSIS-NN's int8 kernel for fully connected layers (`arm_nn_vec_mat_mult_t_s8` with
-/// DSP), an estimate in the rival's favour: an instruction takes at least a cycle, and these are the instructions that
-/// were counted before this project began, together 2.07 a MAC for 256 x 256. A network of 189,952 weights took 2.45
+/// DSP), an estimate in the rival's favour. An instruction takes at least a cycle, and these are the instructions that
+/// were counted before this project began: together 2.07 per MAC for 256 x 256. A network of 189,952 weights took 2.45
 /// (docs/records/2026-11-25-c.md), and this estimate has 2.11.
 pub const CMSIS_NN_CYCLES: [f64; 2] = [1.875, 50.0];
 /// A scale with which no function of an outlined network leaves f32's range.
@@ -44,7 +44,7 @@ impl Form {
     }
 }
 
-/// What an image takes.
+/// Size and time of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct Taken {
     /// Bytes of the weights: codes, padding, scales, output steps, block records.
@@ -112,7 +112,7 @@ fn outlined(matrix: &WeightMatrix, width: Width) -> Result<Outcome> {
     Ok(Outcome { x_max: quantized.x_max(127)?, quantized, error: None, allocation: None })
 }
 
-/// What an image may take.
+/// Limits on the size and time of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     /// Bytes of the weights.

@@ -1,4 +1,4 @@
-//! What a narrower network learns from, and its image.
+//! A narrower network's learning, and its image.
 
 use actq::budget::{Budget, Rate};
 use actq::calibrate::widening::Widening;

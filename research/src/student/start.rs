@@ -4,9 +4,9 @@ use actq::graph::{Graph, NodeKind};
 use actq::random::Random;
 use actq_kernels::math::Function;
 
-/// Replaces all weights: matrices by normal numbers of He's deviation (2015, `sqrt(2 / columns)` before a rectifier),
-/// or `sqrt(1 / columns)` elsewhere; biases by 0, those of an LSTM's forget gate by 1; norms by 1. `units` has the
-/// usual size of each column's operand for matrices that read observations: their weights are divided by it.
+/// Replaces all weights. Matrices get normal numbers of He's deviation (2015, `sqrt(2 / columns)` before a rectifier),
+/// or of `sqrt(1 / columns)` elsewhere. Biases become 0, those of an LSTM's forget gate by 1; norms by 1. `units` has
+/// the usual size of each column's operand for matrices that read observations: their weights are divided by it.
 pub fn restart(graph: &mut Graph, units: &[Option<Vec<f32>>], random: &mut Random) {
     let gains: Vec<f32> = (0..graph.matrices.len()).map(|m| gain(graph, m)).collect();
     for (m, matrix) in graph.matrices.iter_mut().enumerate() {

@@ -130,9 +130,9 @@ pub enum Side {
     Output,
 }
 
-/// Returns the weight of each row or column in the action error. It is the geometric mean of the moment's diagonal, the
-/// cost of an uncompensated error, and of its conditional diagonal, the cost that remains if later rows or columns (in
-/// order of falling diagonal) compensate as far as they can.
+/// Returns the weight of each row or column in the action error. It is the geometric mean of the moment's diagonal and
+/// its conditional diagonal. The diagonal is the cost of an uncompensated error. The conditional diagonal is the cost
+/// that remains if later rows or columns (in order of falling diagonal) compensate as far as they can.
 pub fn importance(second: &DMatrix<f64>, side: Side) -> Vec<f64> {
     let damping = match side {
         Side::Input => DAMPING_INPUT,

@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_deviation_has_the_same_digits_in_every_unit() {
+    fn deviations_have_equal_digits_in_every_unit() {
         for variance in [0.0f64, 0.3, 1.0, 7.9e4] {
             let deviation = root(variance);
             assert_eq!(deviation, (variance as f32).sqrt());

@@ -462,7 +462,7 @@ fn dimensions_outside_the_range_are_named() {
 }
 
 #[test]
-fn arrays_in_memory_are_checked_as_those_of_files() {
+fn arrays_in_memory_are_checked_like_files() {
     let tensor = |shape: &[usize], values| Tensor { shape: shape.to_vec(), values };
     let floats = |shape: &[usize]| tensor(shape, Values::F32(count(shape).into_iter().collect()));
     let named = |arrays: &[(&str, Tensor)]| arrays.iter().map(|(n, a)| ((*n).to_owned(), a.clone())).collect();
@@ -482,7 +482,7 @@ fn arrays_in_memory_are_checked_as_those_of_files() {
 }
 
 #[test]
-fn actions_of_a_controller_are_not_those_of_the_policy() {
+fn actions_of_a_controller_are_ignored() {
     let array = |width: usize| Tensor { shape: vec![4, width], values: Values::F32(vec![0.5; 4 * width]) };
     let recording = [("obs", array(SIZES.obs)), ("action", array(SIZES.out))];
     let log = recording.iter().cloned().chain([("applied", array(1))]);

@@ -34,8 +34,8 @@ pub enum Operand {
     State,
 }
 
-/// What the elements of an operation's output come from. It decides which elements of a network can only be removed
-/// together ([`super::ties`]).
+/// Origin of the elements of an operation's output. It decides which elements of a network can only be removed together
+/// ([`super::ties`]).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Elements {
     /// Each from the rows of the products' matrices; without products, from constants.

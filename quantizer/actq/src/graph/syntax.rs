@@ -1,4 +1,4 @@
-//! How an operation is written in policy.json. Each operation reads its own keys, in its file in [`super::ops`].
+//! Syntax of operations in policy.json. Each operation reads its own keys, in its file in [`super::ops`].
 
 use crate::error::{Context, Result};
 

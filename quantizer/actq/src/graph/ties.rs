@@ -1,5 +1,6 @@
-//! Elements of hidden vectors that can only be removed together: those of vectors that are added or multiplied, of a
-//! cell's gates and its state, of parts of concatenations, and the columns of the matrices that read them.
+//! Elements of hidden vectors that can only be removed together. They are elements of vectors that are added or
+//! multiplied, of a cell's gates and its state, and of parts of concatenations. The columns of the matrices that read
+//! them belong to them.
 
 use std::ops::Range;
 
@@ -221,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn vectors_inside_a_block_are_free_of_the_stream() {
+    fn vectors_inside_blocks_are_free_of_streams() {
         let mut graph = Graph::new(3);
         for (rows, cols) in [(6, 3), (5, 6), (6, 5), (2, 6)] {
             let data = vec![0.1; rows * cols];

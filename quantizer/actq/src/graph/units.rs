@@ -1,7 +1,7 @@
 //! Rows of an operation that belong to some of its units.
 
-/// Returns the rows of a matrix or bias, of `rows`, that belong to some of an operation's `hidden` units: of a
-/// recurrent cell those of the first gate, then those of the second, and so on.
+/// Returns the rows of a matrix or bias, of `rows`, that belong to some of an operation's `hidden` units. Of a
+/// recurrent cell, the rows of the first gate come first, then those of the second, and so on.
 pub(crate) fn unit_rows(rows: usize, hidden: usize, units: &[usize]) -> Vec<usize> {
     (0..rows / hidden.max(1)).flat_map(|gate| units.iter().map(move |unit| gate * hidden + unit)).collect()
 }

@@ -75,7 +75,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Begins the network of a flow or a diffusion policy over observation, time and iterate (slots `obs`, `tfeat` and
-    /// `x`); returns it with its time input in each step.
+    /// `x`). Returns it with its time input in each step.
     pub(super) fn iterative(
         obs_len: usize,
         by: &JsonDenoising,

@@ -7,9 +7,9 @@ use actq_kernels::image::{Matrix, Op, OpKind};
 
 use crate::graph::ops::Balance;
 
-/// Returns the bits per weight of the policy as it was trained: codes, padding, scales, output steps and block records
-/// of all matrices, and the constants that the quantizer put before them, over the number of the original network's
-/// weights. A matrix that several operations share counts once.
+/// Returns the bits per weight of the policy as it was trained, over the number of the original network's weights.
+/// Codes, padding, scales, output steps and block records of all matrices count, and the constants that the quantizer
+/// put before them. A matrix that several operations share counts once.
 pub fn bits_per_weight(image: &Image<'_>) -> f64 {
     let bytes: usize = distinct(image).iter().map(Matrix::weight_bytes).sum();
     let constants: usize = image.ops().map(|op| added_bytes(&op)).sum();

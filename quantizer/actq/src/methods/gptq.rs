@@ -1,5 +1,5 @@
-//! GPTQ (Frantar et al., arXiv 2210.17323, algorithm 1): columns are quantized one after the other, and each column's
-//! error is spread over the remaining columns so that the output changes least.
+//! GPTQ (Frantar et al., arXiv 2210.17323, algorithm 1): columns are quantized one after the other. Each column's error
+//! is spread over the remaining columns so that the output changes least.
 
 use actq_kernels::layout::Width;
 use nalgebra::DMatrix;

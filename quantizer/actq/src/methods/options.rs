@@ -113,7 +113,7 @@ impl PartialEq for dyn CustomMethod {
     }
 }
 
-/// How long to learn, in units of the steps that a network of its size gets by default.
+/// Length of learning, in units of the default steps of a network of its size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Effort {

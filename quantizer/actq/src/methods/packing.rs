@@ -1,4 +1,4 @@
-//! What decides how rows are packed, beside their widths.
+//! Properties that decide the layout of rows, beside their widths.
 
 use actq_kernels::Width;
 use actq_kernels::layout::{BlockShape, Lanes};

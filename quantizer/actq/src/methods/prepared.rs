@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(error(First(2), First(1)), "the quantizer is prepared for method first 2, not for first 1");
     }
     #[test]
-    fn the_held_out_error_is_reported_and_changes_nothing() {
+    fn reporting_the_held_out_error_changes_nothing() {
         for graph in [mlp(), lstm()] {
             let (recording, held_out) = (dataset(&graph, 4, 100), dataset(&graph, 2, 90));
             let options = Options { steps: Some(200), ..Options::new(Method::Distill, Budget::Width(Width::W4)) };

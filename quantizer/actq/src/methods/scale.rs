@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fitted_scale_is_near_the_best_of_a_fine_grid() {
+    fn fitted_scales_nearly_match_a_fine_grid() {
         let weights = bell(257);
         for width in [Width::W2, Width::W3, Width::W4] {
             let found = error(&weights, fit(&weights, &[], width), width);

@@ -161,7 +161,7 @@ mod tests {
     use crate::testing::{branches, dataset, gru, layers, lstm, residual};
 
     #[test]
-    fn the_rest_of_a_step_hardly_depends_on_rows_and_units() {
+    fn cycles_beside_rows_hardly_depend_on_them() {
         for graph in [layers(&[18, 96, 64, 6]), lstm(), gru(24), residual(48, true), branches([64, 40])] {
             let recordings = Recordings { calib: Some(dataset(&graph, 4, 60)), heldout: None };
             let policy = Policy::of("small", graph);

@@ -232,7 +232,7 @@ fn named_recordings_replace_those_of_the_policy() {
 }
 
 #[test]
-fn work_of_the_program_reads_the_results_that_it_needs() {
+fn custom_work_reads_the_results_it_needs() {
     let dir = folder(SPEC);
     let mut plan = Jobs::default();
     let work = |name: &str, needs: Vec<String>| {

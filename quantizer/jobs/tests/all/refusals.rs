@@ -105,7 +105,7 @@ fn other_folders_are_no_stores() {
 }
 
 #[test]
-fn workers_that_open_one_new_store_all_get_it() {
+fn workers_can_open_one_new_store_together() {
     let dir = tempfile::tempdir().expect("a folder");
     for round in 0..50 {
         let path = dir.path().join(round.to_string());
@@ -164,7 +164,7 @@ fn damaged_results_are_not_used() {
 }
 
 #[test]
-fn failed_jobs_are_tried_again_or_skip_their_dependents() {
+fn failed_jobs_retry_or_skip_their_dependents() {
     let plan = jobs(&folder(SPEC)).expect("a plan");
     let mut schedule = Schedule::new(&plan, |_| false, 2);
     let first = schedule.start(1).expect("a job");
@@ -195,7 +195,7 @@ fn failed_jobs_are_tried_again_or_skip_their_dependents() {
 
 /// Jobs of a sweep that was killed may still run, and write results while the next one begins.
 #[test]
-fn no_job_starts_before_all_that_it_needs_have_ended() {
+fn no_job_starts_before_its_dependencies_end() {
     let plan = jobs(&folder(SPEC)).expect("a plan");
     let asked = RefCell::new(BTreeSet::new());
     let mut schedule = Schedule::new(&plan, |job| !asked.borrow_mut().insert(job.address.clone()), 1);

@@ -1,4 +1,4 @@
-//! What jobs need from the command.
+//! The interface between jobs and this command.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};

@@ -22,7 +22,7 @@ use crate::group;
 use crate::report::progress::duration;
 use crate::terminal::{Progress, note};
 
-/// How the jobs of a plan are run.
+/// Settings of the workers that run the jobs of a plan.
 #[derive(Clone, Copy, Debug)]
 pub struct Pool<'a> {
     /// The program that runs a job: it has the command `job` of `actq`.

@@ -19,8 +19,8 @@ use crate::random::Random;
 /// takes 1.3 to 1.7 times as long.
 const MIN_ERROR_SHARE: f32 = 0.03;
 const EXTRA_SHARE_PER_WEIGHT_SHARE: f32 = 0.12;
-/// Ratio of bytes, int8 layout over int16 layout, above which a matrix of few columns and mostly 8-bit rows gets int16:
-/// int8 pads columns to 8, int16 to 4.
+/// Ratio of bytes, int8 layout over int16 layout, above which a matrix of few columns and mostly 8-bit rows gets int16.
+/// Columns are padded to 8 in int8, to 4 in int16.
 const MIN_PADDING_RATIO: f64 = 1.15;
 /// Divisor of all weights; a small matrix has at most this share.
 const SMALL_DIVISOR: usize = 10;
@@ -30,8 +30,9 @@ const INT16: u16 = Activations::Int16.limit();
 const ERROR_BATCHES: usize = 8;
 const BATCH_SAMPLES: usize = 256;
 
-/// Allocates widths for all rows, and the activations' magnitudes of learning: int8 unless requested otherwise, or
-/// int16 if it takes so many fewer bytes that other rows can use them. `size` does not reserve room for any layout yet.
+/// Allocates widths for all rows, and the activations' magnitudes of learning. These are int8 unless requested
+/// otherwise, or int16 if it takes so many fewer bytes that other rows can use them. `size` does not reserve room for
+/// any layout yet.
 pub(super) fn allocated(size: Size<'_>, rows: &[Rows], options: &Options, allowed: f64) -> Result<(Widths, Vec<u16>)> {
     let requested = vec![options.activations.limit(); size.graph.matrices.len()];
     let within = |limits: &[u16]| {
@@ -91,8 +92,8 @@ pub(super) fn packed(limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
     limits.iter().map(|&limit| vec![Packing::of(limit, options.group)]).collect()
 }
 
-/// Returns the layouts that room is reserved for: that of every matrix's limit, and int16 for matrices that are still
-/// undecided and likely to need it, such as the first and the last layer.
+/// Returns the layouts for which bytes are reserved: that of every matrix's limit, and int16 for undecided matrices
+/// that are likely to need it, such as the first and the last layer.
 fn reserved_packings(graph: &Graph, limits: &[u16], options: &Options) -> Vec<Vec<Packing>> {
     let mut packings = packed(limits, options);
     for ((matrix, packings), limit) in graph.matrices.iter().zip(&mut packings).zip(limits) {

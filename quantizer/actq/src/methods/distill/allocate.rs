@@ -3,7 +3,7 @@
 //! Rows (output neurons) differ far more in their effect on the actions than columns do. Row `r` at width `b` is
 //! predicted to cost `eps_b * g_r * sum_c w_rc^2 h_c` of squared action error. One Lagrange multiplier, found by
 //! bisection, weighs that against bits. A row of 0 bits gives its bias only. If its output only feeds matrices through
-//! elementwise functions, it disappears with the columns that it fed (see [`mod@super::compact`]): the contribution of
+//! elementwise functions, it disappears with the columns that it fed (see [`mod@super::compact`]). The contribution of
 //! those columns is its error, and their bits count as its saving.
 
 use actq_kernels::Width;
@@ -15,8 +15,8 @@ use crate::error::Result;
 use crate::graph::WeightMatrix;
 
 /// Returns the predicted squared error of a row in units of its own energy: that of the mid-rise grid with error
-/// feedback. The value at 8 bits is higher than the cost of rounding (0.00005), so that 8 bits go only to rows for
-/// which 4 bits are far from enough: learning compensates the difference.
+/// feedback. The value at 8 bits is higher than the cost of rounding (0.00005). So 8 bits go only to rows for which 4
+/// bits are far from enough. Learning compensates the difference.
 fn epsilon(width: Width) -> f64 {
     match width {
         Width::W2 => 0.125,
@@ -71,9 +71,9 @@ pub fn expected(rows: &[Rows], widths: &Widths) -> f64 {
 /// Shares of time in the price, where both bytes and cycles are limited.
 const SHARES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
-/// Chooses the widths so that [`Size::bytes`] stays within `limit`, and the cycles within their own limit: of several
-/// prices for bytes and cycles, the one with the lowest expected error. If even the fewest rows take too many cycles,
-/// those are chosen.
+/// Chooses the widths so that [`Size::bytes`] stays within `limit`, and the cycles within their own limit. Of several
+/// prices for bytes and cycles, it takes the one with the lowest expected error. If even the fewest rows take too many
+/// cycles, those are chosen.
 ///
 /// # Errors
 ///
@@ -136,9 +136,9 @@ fn smallest(size: &Size<'_>, rows: &[Rows], limit: f64) -> Result<Widths> {
 }
 
 /// Widens rows as long as bytes are left. Blocks of rows are padded, so one more row may take hundreds of bytes or
-/// none, which no multiplier can predict. It repeatedly widens the rows with the largest fall of error per byte: rows
-/// of one matrix and one width, at most as many as a block is padded to. Rows that gain less than `least` per bit keep
-/// their width, since rows without effect on the actions should not take time.
+/// none, which no multiplier can predict. It repeatedly widens the rows with the largest fall of error per byte. These
+/// are rows of one matrix and one width, at most as many as a block is padded to. Rows that gain less than `least` per
+/// bit keep their width, since rows without effect on the actions should not take time.
 fn fill(widths: &mut Widths, size: &Size<'_>, rows: &[Rows], limit: f64, least: f64) {
     if !size.fits(widths, limit) {
         return;

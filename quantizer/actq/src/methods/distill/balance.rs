@@ -16,10 +16,9 @@
 //!
 //! If only matrices read a normalization without an output limit, its own constants absorb factors and means at no
 //! cost. Otherwise an operation [`Balance`] holds them, and its bytes count. It scales the columns that need it
-//! (`part.rs`). It is added if it saves more bits than it costs: an error reduced to a share `s` saves
-//! `log2(1 / s) / 2` bits for each weight of the matrices that follow. Matrices that read the observation beside a
-//! hidden vector read it through the same operation (`sites.rs`). [`mixed_units`] reports the other matrices if their
-//! units are far apart.
+//! (`part.rs`). It is added if it saves more bits than it costs. An error reduced to a share `s` saves `log2(1 / s) /
+//! 2` bits for each weight of the matrices that follow. Matrices that read the observation beside a hidden vector read
+//! it through the same operation (`sites.rs`). [`mixed_units`] reports the other matrices if their units are far apart.
 
 mod columns;
 mod mixed;

@@ -3,8 +3,8 @@
 //!
 //! With `H = L D L'` and `G = M F M'` (unit lower triangles) the error is `sum_rc F_r D_c (M' E L)_rc^2`. Weights are
 //! rounded one by one, in order of falling diagonals. Each weight is the last one in its `(M' E L)_rc`, and makes it as
-//! small as its grid allows: it compensates the earlier errors of its row (through H) and its column (through G). For
-//! `G = I` that is GPTQ (arXiv 2210.17323). Sweeps of coordinate descent then change single codes, with all others
+//! small as its grid allows. So it compensates the earlier errors of its row (through H) and its column (through G).
+//! For `G = I` that is GPTQ (arXiv 2210.17323). Sweeps of coordinate descent then change single codes, with all others
 //! fixed, and fit the rows' scales to their codes.
 
 use actq_kernels::Width;

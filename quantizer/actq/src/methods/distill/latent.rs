@@ -59,7 +59,7 @@ impl Grid {
         }
     }
 
-    /// Rounds to the nearest code, ties to even; the trick is exact in the range of codes. (The standard library's
+    /// Rounds to the nearest code, ties to even. The trick is exact in the range of codes. (The standard library's
     /// function is a call on processors without an instruction for it.)
     #[inline(always)]
     fn round(self, code: f32) -> f32 {

@@ -49,8 +49,8 @@ impl Frames {
 }
 
 impl<'a> Objective<'a> {
-    /// Makes the loss: the mean over samples and outputs of squared error over variance and, except for
-    /// [`Frames::Even`], times the frame's weight, which is 1 on average over a batch.
+    /// Makes the loss: the mean over samples and outputs of squared error over variance. Except for [`Frames::Even`],
+    /// each error is multiplied by the frame's weight, which is 1 on average over a batch.
     pub fn new(variance: &'a [f32], frames: Frames) -> Self {
         let varying = variance.iter().filter(|variance| **variance > 0.0).count().max(1);
         Self { variance, varying, frames }

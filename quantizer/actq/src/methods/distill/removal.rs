@@ -4,7 +4,7 @@
 //! ranked: the first explains most of the vector's effect, the next most of the rest, and so on. This is column subset
 //! selection by a pivoted Cholesky factorization, with the criterion of Optimal Brain Surgeon (Hassibi, Stork 1993) for
 //! several weights. Each element's error is its addition to those ranked before it. If the elements down to any rank
-//! are kept, the sum over the others is the error of removing all of them, with least squares from the kept ones in
+//! are kept, the sum over the others is the error of removing them all. Least squares from the kept ones then take
 //! their place.
 //!
 //! A recording has too few frames to estimate all correlations. So an element costs at least its own effect, with
@@ -220,7 +220,7 @@ mod tests {
     use crate::random::Random;
 
     #[test]
-    fn copies_are_free_one_by_one_and_not_together() {
+    fn copies_are_free_alone_and_not_together() {
         // Elements 0 to 3 are one value, element 4 another one with half the effect.
         let of = |i: usize| usize::from(i == 4);
         let second = DMatrix::from_fn(5, 5, |i, j| if of(i) == of(j) { 1.0 } else { 0.0 });

@@ -15,8 +15,8 @@ use crate::methods::options::Effort;
 const FULL_RATE_SHARE: f64 = 0.7;
 /// Most steps of a network of [`REFERENCE_WEIGHTS`] weights. The steps of others follow the square root of the size: a
 /// small network learns longer, and the time of a large one does not grow as much. A step costs more for an iterative
-/// head, where a frame is one of every denoising step, and four times as much for a batch of a recurrent network's
-/// windows.
+/// head, in which a frame has one evaluation per denoising step. A batch of a recurrent network's windows costs four
+/// times as much.
 const FRAME_STEPS: f64 = 8_000.0;
 const DENOISING_HEAD_STEPS: f64 = 5_000.0;
 const WINDOW_STEPS: f64 = 4_000.0;

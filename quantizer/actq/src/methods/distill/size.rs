@@ -31,7 +31,7 @@ pub struct Size<'a> {
     pub accumulates: Vec<bool>,
     /// Most modelled cycles of the rows ([`Self::cycles`]); `None`: time does not matter.
     pub cycles: Option<f64>,
-    /// What the allocation pays with.
+    /// Price of a row, by which the allocation compares widths.
     pub price: Price,
 }
 

@@ -1,7 +1,7 @@
 //! Units: elements that can only be removed together ([`Ties`]). They are cell units, residual-stream elements, and
-//! concatenated elements. A unit has a row in every matrix that makes such a vector, one for each gate of a cell, and a
-//! column in every matrix that reads one. So a network with fewer units is far smaller than one that lacks as many
-//! rows.
+//! concatenated elements. A unit has a row in every matrix that makes such a vector; of a cell, one for each gate. It
+//! has a column in every matrix that reads one. So a network with fewer units is far smaller than one that lacks as
+//! many rows.
 
 use std::collections::BTreeMap;
 
@@ -31,8 +31,8 @@ impl Units {
     }
 }
 
-/// Finds the units of a graph. Vectors of which single rows can be removed ([`Dimension`]) have none, nor have those
-/// that a matrix of several nodes makes or reads: its moments are those of both together.
+/// Finds the units of a graph. Vectors of which single rows can be removed ([`Dimension`]) have none. Vectors that a
+/// matrix of several nodes makes or reads have none either: the matrix's moments are those of all nodes together.
 pub(super) fn units(graph: &Graph, ties: &Ties) -> Vec<Units> {
     let mut reading = BTreeMap::<ValueId, Vec<usize>>::new();
     for (n, node) in graph.nodes.iter().enumerate() {
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_can_be_removed_alone_are_no_units() {
+    fn single_rows_are_no_units() {
         assert!(found(&layers(&[3, 5, 4, 2])).is_empty());
     }
 

@@ -2,7 +2,7 @@
 //!
 //! A damped moment gives the importance of a column's error, and a limit bounds the ratio of factors. Both compare
 //! columns, so in the observations' units both would depend on these units. Here the unit of a column makes its values
-//! as large as its weights: the column is then the same for every unit that users choose. (Every step here is exact
+//! as large as its weights. The column is then the same for every unit that users choose. (Every step here is exact
 //! under a power of two.)
 
 use nalgebra::DMatrix;
@@ -12,7 +12,7 @@ use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{Side, importance};
 use crate::graph::Graph;
 
-/// Maximum ratio of a factor to the geometric mean of the factors, or of this mean to a factor: the recording may not
+/// Maximum ratio of a factor to the geometric mean of the factors, or of this mean to a factor. The recording may not
 /// show the full range of a value.
 const MAX_FACTOR_RATIO: f64 = 32.0;
 /// Maximum variance of a value that did not move, as a share of its mean square.

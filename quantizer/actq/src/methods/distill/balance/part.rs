@@ -20,8 +20,8 @@ const RECORD_BYTES: usize = 16;
 /// Ratio of the error of rounding a column's weights to 3 bits (`allocate.rs`) to that of rounding all inputs to int8,
 /// if the column's values are the largest: `0.036 * 12 * 127^2`. The mean adds nothing to the first.
 const WEIGHT_TO_INPUT_ERROR: f64 = 7000.0;
-/// Minimum additional saving of an operation without means over one with them, in bits per weight of the policy:
-/// learning is easier about the means, and the expected error does not include this.
+/// Minimum additional saving of an operation without means over one with them, in bits per weight of the policy.
+/// Learning is easier about the means, and the expected error does not include this.
 const MIN_GAIN_WITHOUT_MEANS: f64 = 1.0 / 16.0;
 /// Maximum of values and factors without means, and reciprocal of their minimum: 128 of the largest deviations are
 /// still below 2^47, the range in which the operation is exact.
