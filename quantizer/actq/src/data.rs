@@ -2,6 +2,7 @@
 //! files.
 
 mod arrays;
+mod checked;
 #[cfg(test)]
 mod damaged;
 mod dataset;

@@ -18,7 +18,7 @@ use crate::importers::load;
 use crate::terminal::{note, print};
 
 /// Minutes of learning if neither steps nor minutes are given.
-const MINUTES: f64 = 6.0;
+const DEFAULT_MINUTES: f64 = 6.0;
 /// Folder of the description, and file of what the last image was made with, in the output folder.
 const POLICY: &str = "policy";
 const MADE_WITH: &str = "policy.actq.txt";
@@ -27,9 +27,8 @@ const IMAGE: &str = "policy.actq";
 /// Imports a bundle, checks it, quantizes it, checks the image, and builds firmware. Results of an earlier run with the
 /// same options are kept.
 pub(crate) fn run(args: &DeployArgs) -> Result<()> {
-    let only_reference = args.recordings.is_empty();
     ensure!(
-        !only_reference || args.reading.reference.is_some(),
+        !args.recordings.is_empty() || args.reading.reference.is_some(),
         "give --recordings: what the policy observes on its task. `actq import` and `actq quantize --method rtn` make a first image; \
          run it on the robot or in simulation by `actq serve IMAGE --record FILE`, and pass FILE"
     );
@@ -38,39 +37,12 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
     }
     let made_with = made_with(args)?;
     let policy = args.out.join(POLICY);
-    let raw = args.reading.reference.as_ref().map(|(raw, _)| raw.clone());
-    step(1, "import")?;
     let description = policy.join(DESCRIPTION);
-    if description.exists() {
-        // It may have been edited.
-        print(&format!("{}: kept; remove the folder to import the bundle again\n", description.display()))?;
-        bundle::check_kept(&args.bundle, &policy, &args.reading)?;
-    } else {
-        bundle::run(&ImportArgs {
-            model: args.bundle.clone(),
-            out: policy.clone(),
-            calib: raw.filter(|_| only_reference),
-            output: None,
-            state: Vec::new(),
-            check: false,
-            reading: args.reading.clone(),
-            force: false,
-        })?;
-    }
-    if only_reference {
-        note(["the policy learns from the raw inputs of --reference: too little for a robot; pass recordings of its task by \
-               --recordings"
-            .to_owned()]);
-    }
-
+    step(1, "import")?;
+    import_bundle(args, &policy, &description)?;
     step(2, "quantize")?;
     let image = args.out.join(IMAGE);
-    if is_made(&image, &policy, &args.out.join(MADE_WITH), &made_with) {
-        print(&format!("{}: made before with the same options\n", image.display()))?;
-    } else {
-        quantize::run(&quantization(args, &policy, &image), Some(Method::Distill), |_, _| String::new())?;
-        fs::write(args.out.join(MADE_WITH), &made_with).context("cannot write the options")?;
-    }
+    quantize_policy(args, &policy, &image, &made_with)?;
     if let Some(reference) = &args.reading.reference {
         step(3, "check the image")?;
         check::run(&CheckArgs { image: image.clone(), reference: reference.clone(), max_nmse: args.max_nmse })?;
@@ -88,6 +60,44 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
     Ok(())
 }
 
+/// Imports the bundle, or checks the description that an earlier run has written.
+fn import_bundle(args: &DeployArgs, policy: &Path, description: &Path) -> Result<()> {
+    let only_reference = args.recordings.is_empty();
+    let raw = args.reading.reference.as_ref().map(|(raw, _)| raw.clone());
+    if description.exists() {
+        // It may have been edited.
+        print(&format!("{}: kept; remove the folder to import the bundle again\n", description.display()))?;
+        bundle::check_kept(&args.bundle, policy, &args.reading)?;
+    } else {
+        bundle::run(&ImportArgs {
+            model: args.bundle.clone(),
+            out: policy.to_owned(),
+            calib: raw.filter(|_| only_reference),
+            output: None,
+            state: Vec::new(),
+            check: false,
+            reading: args.reading.clone(),
+            force: false,
+        })?;
+    }
+    if only_reference {
+        note(["the policy learns from the raw inputs of --reference: too little for a robot; pass recordings of its task by \
+               --recordings"
+            .to_owned()]);
+    }
+    Ok(())
+}
+
+/// Makes the image, unless an earlier run has made it with the same options.
+fn quantize_policy(args: &DeployArgs, policy: &Path, image: &Path, made_with: &str) -> Result<()> {
+    let record = args.out.join(MADE_WITH);
+    if is_made(image, policy, &record, made_with) {
+        return print(&format!("{}: made before with the same options\n", image.display()));
+    }
+    quantize::run(&quantize_args(args, policy, image), Some(Method::Distill), |_, _| String::new())?;
+    fs::write(record, made_with).context("cannot write the options")
+}
+
 fn has_gains(description: &Path) -> Result<bool> {
     let read = || -> Result<Description> { Ok(Description::parse(&fs::read_to_string(description)?)?) };
     let description = read().with_context(|| format!("{}: cannot read the description", description.display()))?;
@@ -98,8 +108,8 @@ fn step(number: usize, what: &str) -> Result<()> {
     print(&format!("\n{number}. {what}\n"))
 }
 
-fn quantization(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs {
-    let own = args.learn.distill.steps.is_some()
+fn quantize_args(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs {
+    let is_limited = args.learn.distill.steps.is_some()
         || args.learn.minutes.is_some()
         || args.learn.distill.effort != Effort::Default;
     QuantizeArgs {
@@ -112,7 +122,10 @@ fn quantization(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs 
         protect: Vec::new(),
         group: None,
         activations: None,
-        learn: LearnArgs { minutes: if own { args.learn.minutes } else { Some(MINUTES) }, ..args.learn.clone() },
+        learn: LearnArgs {
+            minutes: if is_limited { args.learn.minutes } else { Some(DEFAULT_MINUTES) },
+            ..args.learn.clone()
+        },
         run: args.run.clone(),
         save_stats: None,
     }

@@ -4,12 +4,14 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use actq::budget::{Budget, TimeLimit};
-use actq::data::{Recording, Recordings, Sizes, driven_by, files_of};
+use actq::data::{Recording, Recordings, Share, Sizes, driven_by, files_of};
 use actq::measure::time::{CLOCK, StepTime};
 use actq::measure::{check, own};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::stats::Stats;
 use actq::pipeline::{QuantizedPolicy, Quantizer, check_budget};
+use actq::policy::Policy;
+use actq::runtime::ImageBuffer;
 use actq_kernels::Width;
 use anyhow::{Result, bail};
 
@@ -60,8 +62,8 @@ pub fn run(
     note(notes::mixed_units(quantizer.method().mixed_units()));
     progress.begin("choosing codes");
     let mut found = quantizer.quantize(&options, |work: &str, share: f64| progress.set(work, share))?;
-    // The error is that of the network alone, on what it reads.
-    let alone = found.buffer();
+    // The error is that of the network, on its own inputs.
+    let network = found.buffer();
     found.image = found.whole_image()?;
     let mut contents = vec![found.image.clone()];
     if args.save_stats.is_some() {
@@ -71,6 +73,19 @@ pub fn run(
     progress.begin("measuring the error");
     print(&learned(&shares))?;
     print(&describe(&quantizer, &found))?;
+    report(args, &source, &quantizer, &found, started)?;
+    note(notes::unused_budget(&found, &options));
+    measure(args, &source, &recordings, &network, shares)
+}
+
+/// Prints the widths, the learning, the size and the time of an image.
+fn report(
+    args: &QuantizeArgs,
+    source: &Policy,
+    quantizer: &Quantizer<'_>,
+    found: &QuantizedPolicy,
+    started: Instant,
+) -> Result<()> {
     let search = found.search.as_ref().map_or(String::new(), |search| quantized::search(search) + "\n");
     let sampled = quantizer.method().sampled().map_or(String::new(), quantized::sampled);
     let learned = sampled + &found.learning.as_ref().map_or(String::new(), quantized::learning);
@@ -83,16 +98,25 @@ pub fn run(
     print(&format!(
         "{search}{}{learned}\n{}: {bytes} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in \
          bf16 ({:.1}x).\n{time}Took {:.1} s.\n",
-        quantized::matrices(&found),
+        quantized::matrices(found),
         args.out.display(),
         f32_bytes as f64 / bytes as f64,
         f32_bytes / 2,
         f32_bytes as f64 / 2.0 / bytes as f64,
         started.elapsed().as_secs_f64(),
-    ))?;
-    note(notes::unused_budget(&found, &options));
-    let image = alone.image(&args.out)?;
-    match check::check(&source, image, &recordings) {
+    ))
+}
+
+/// Measures the errors of the network's image on the recordings, and on those of its own rollouts, and prints them.
+fn measure(
+    args: &QuantizeArgs,
+    source: &Policy,
+    recordings: &Recordings,
+    network: &ImageBuffer,
+    shares: Vec<Share>,
+) -> Result<()> {
+    let image = network.image(&args.out)?;
+    match check::check(source, image, recordings) {
         Ok(Some(check)) => {
             print(&format!("\n{}", notes::errors(&check)))?;
             note(notes::overfit_warning(&check));
@@ -105,7 +129,7 @@ pub fn run(
     let of_image = |path: &PathBuf| driven_by(path).is_ok_and(|crc| crc == Some(image.crc()));
     let driven: Vec<PathBuf> = shares.into_iter().map(|share| share.path).filter(of_image).collect();
     if !driven.is_empty() {
-        print(&notes::own_path(&own::own_path(image, &driven, Some(&source))?))?;
+        print(&notes::own_path(&own::own_path(image, &driven, Some(source))?))?;
     }
     Ok(())
 }

@@ -22,16 +22,10 @@ use crate::threads::start_threads;
 
 /// Quantizes in on-policy rounds: rolls out, labels, and learns again.
 pub(crate) fn run(args: &TuneArgs) -> Result<()> {
-    let budget = match args.bpw {
-        Some(bits) => Budget::BitsPerWeight(bits),
-        None => Budget::Width(args.bits.unwrap_or(Width::W3)),
-    };
-    let LearnArgs { distill: DistillArgs { effort, steps, relative }, minutes } = args.learn;
-    let options =
-        Options { effort, steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Distill, budget) };
+    let options = options(args);
     options.check()?;
     options.check_length()?;
-    let mut calib = files_of(&args.calib)?;
+    let calib = files_of(&args.calib)?;
     // Before the outputs, which may be in this folder.
     let folder = Folder::new(args.keep.as_deref())?;
     for output in [&args.out].into_iter().chain(&args.json) {
@@ -49,12 +43,7 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
         args.policy_dir.display()
     );
     let sizes = Sizes::of(&policy);
-    if calib.is_empty() {
-        calib.extend(Recording::Calib.find(&args.policy_dir)?);
-        ensure!(!calib.is_empty(), "{}", Recording::Calib.missing("actq tune"));
-    }
-    let load = |file: &PathBuf| Dataset::load(file, sizes);
-    let calib = calib.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let calib = calibration(args, calib, sizes)?;
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, sizes)?;
     let drive = Drive::new(&args.drive, &policy, folder.path())?;
     start_threads(args.run.threads)?;
@@ -85,6 +74,25 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
     ))?;
     note(report::tuned::better(&tuned, args.keep.as_deref()));
     Ok(())
+}
+
+/// Returns the options of the command line.
+fn options(args: &TuneArgs) -> Options {
+    let budget = match args.bpw {
+        Some(bits) => Budget::BitsPerWeight(bits),
+        None => Budget::Width(args.bits.unwrap_or(Width::W3)),
+    };
+    let LearnArgs { distill: DistillArgs { effort, steps, relative }, minutes } = args.learn;
+    Options { effort, steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Distill, budget) }
+}
+
+/// Reads the recordings of the f32 policy: the given files, or those in the policy folder.
+fn calibration(args: &TuneArgs, mut files: Vec<PathBuf>, sizes: Sizes) -> Result<Vec<Dataset>> {
+    if files.is_empty() {
+        files.extend(Recording::Calib.find(&args.policy_dir)?);
+        ensure!(!files.is_empty(), "{}", Recording::Calib.missing("actq tune"));
+    }
+    Ok(files.iter().map(|file| Dataset::load(file, sizes)).collect::<Result<Vec<_>, _>>()?)
 }
 
 /// The folder of images and recordings during the rounds.

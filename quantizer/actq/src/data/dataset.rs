@@ -6,14 +6,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use actq_kernels::Image;
-use actq_kernels::ops::noise::normal;
-use ndarray::{Array2, Array3, ArrayView1, Axis, concatenate, s};
+use ndarray::{Array2, Array3, ArrayView1, Axis, s};
 
-use super::arrays::{Arrays, floats};
-use super::origin::APPLIED;
-use crate::error::{Context, Result, bail, ensure};
+use super::arrays::Arrays;
+use super::checked::CheckedArrays;
+use crate::error::{Context, Result, ensure};
 use crate::graph::{Evaluator, Graph};
-use crate::import::values::{Tensor, Values};
+use crate::import::values::Tensor;
 use crate::policy::Policy;
 use crate::text::count;
 
@@ -76,93 +75,8 @@ impl Dataset {
         Self::new(name, Arrays::of(arrays), sizes).with_context(|| name.display().to_string())
     }
 
-    fn new(path: &Path, mut arrays: Arrays, sizes: Sizes) -> Result<Self> {
-        let Some(obs) = arrays.take("obs") else {
-            bail!("array \"obs\" is missing; the file holds {}", arrays.names())
-        };
-        let [episodes, steps, width] = match obs.shape[..] {
-            [episodes, steps, width] => [episodes, steps, width],
-            [frames, width] => [1, frames, width],
-            _ => bail!(
-                "array \"obs\" has the shape {:?}; use [episode, step, value], or [frame, value] for one episode",
-                obs.shape
-            ),
-        };
-        ensure!(episodes > 0 && steps > 0, "array \"obs\" is empty: {:?}", obs.shape);
-        ensure!(
-            width == sizes.obs,
-            "array \"obs\" has {} per step, and {} are needed",
-            count(width, "value"),
-            sizes.obs
-        );
-        let noise = arrays.take("noise").filter(|_| sizes.noise > 0);
-        let beside_obs = |array: &Option<Tensor>, name: &str, width: usize, what: &str| -> Result<()> {
-            let Some(array) = array else { return Ok(()) };
-            let mut expected = obs.shape.clone();
-            *expected.last_mut().unwrap_or(&mut 0) = width;
-            ensure!(
-                array.shape == expected,
-                "array {name:?} has the shape {:?}; {expected:?} is needed: {what} at every observation",
-                array.shape
-            );
-            Ok(())
-        };
-        beside_obs(&noise, "noise", sizes.noise, "the policy's initial noise")?;
-        // Actions from unknown noise cannot be compared, nor those of a controller, which are not the policy's.
-        let comparable = !arrays.has(APPLIED) && (sizes.noise == 0 || noise.is_some());
-        let action = arrays.take("action").filter(|_| comparable);
-        beside_obs(&action, "action", sizes.out, "the network's raw output")?;
-        let state = arrays.take("state");
-        if let Some(state) = &state {
-            ensure!(sizes.state > 0, "array \"state\" is present, but the policy has no recurrent state");
-            let expected = [episodes, sizes.state];
-            ensure!(
-                state.shape == expected,
-                "array \"state\" has the shape {:?}; {expected:?} is needed: the recurrent state before each episode's first step, \
-                 hidden then cell state of each lstm, the state of each gru, in the order of the ops",
-                state.shape
-            );
-        }
-        let length = match arrays.take("length") {
-            None => vec![steps; episodes],
-            Some(length) => lengths(&length, episodes, steps)?,
-        };
-        ensure!(length.iter().any(|n| *n > 0), "the recording holds no frame: every episode has length 0");
-
-        let rows = |name: &str, array: &Tensor| -> Result<Array3<f32>> {
-            let values = floats(array, name)?;
-            let shaped = Array3::from_shape_vec((episodes, steps, values.len() / (episodes * steps)), values)?;
-            let bad = shaped.indexed_iter().enumerate().find(|(_, ((e, s, _), v))| !v.is_finite() && *s < length[*e]);
-            if let Some((i, ((episode, step, value), _))) = bad {
-                bail!("array {name:?} {} at episode {episode}, step {step}, value {value}", array.values.not_f32(i));
-            }
-            Ok(shaped)
-        };
-        let starts = |array: Tensor| -> Result<Array2<f32>> {
-            let values = floats(&array, "state")?;
-            if let Some(i) = values.iter().position(|v| !v.is_finite()) {
-                let (episode, value) = (i / sizes.state, i % sizes.state);
-                bail!("array \"state\" {} at episode {episode}, value {value}", array.values.not_f32(i));
-            }
-            Ok(Array2::from_shape_vec((episodes, sizes.state), values)?)
-        };
-        let mut obs = rows("obs", &obs)?;
-        if sizes.noise > 0 {
-            let noise = match noise {
-                Some(noise) => rows("noise", &noise)?,
-                None => Array3::from_shape_fn((episodes, steps, sizes.noise), |(e, s, i)| {
-                    normal(0, (e * steps + s) as u32, i as u32)
-                }),
-            };
-            obs = concatenate(Axis(2), &[obs.view(), noise.view()])?.as_standard_layout().into_owned();
-        }
-        Ok(Self {
-            path: path.to_owned(),
-            obs,
-            action: action.map(|action| rows("action", &action)).transpose()?,
-            state: state.map(starts).transpose()?,
-            length,
-        })
+    fn new(path: &Path, arrays: Arrays, sizes: Sizes) -> Result<Self> {
+        CheckedArrays::new(arrays, sizes)?.dataset(path)
     }
 
     /// Returns the file's name without its folder, for messages.
@@ -262,25 +176,6 @@ impl Dataset {
         }
         Cow::Owned(Self { path: self.path.clone(), obs, action, length, state })
     }
-}
-
-fn lengths(array: &Tensor, episodes: usize, steps: usize) -> Result<Vec<usize>> {
-    let numbers: Vec<i64> = match &array.values {
-        Values::I32(values) => values.iter().map(|&n| n.into()).collect(),
-        Values::I64(values) => values.clone(),
-        other => bail!("array \"length\" is of type {}; use int32 or int64", other.type_name()),
-    };
-    ensure!(
-        array.shape == [episodes],
-        "array \"length\" has the shape {:?}; [{episodes}] is needed: the valid steps of each episode",
-        array.shape
-    );
-    let one = |(episode, n): (usize, i64)| {
-        let n = usize::try_from(n).ok().with_context(|| format!("array \"length\" holds {n} for episode {episode}"))?;
-        ensure!(n <= steps, "episode {episode} has length {n}, but the array \"obs\" holds {}", count(steps, "step"));
-        Ok(n)
-    };
-    numbers.into_iter().enumerate().map(one).collect()
 }
 
 /// Returns the mean and the variance of each of the `values` in rows; zeros without rows. The sums are in f64, in the

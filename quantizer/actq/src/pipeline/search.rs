@@ -17,10 +17,10 @@ use super::tries::{Search, Try};
 use super::watch::Watch;
 use crate::budget::Rate;
 use crate::data::{Dataset, Recording, Recordings};
-use crate::error::{Context, Result, bail};
+use crate::error::{Context, Error, Result};
 use crate::measure::eval;
 use crate::measure::time::{CLOCK, StepTime};
-use crate::methods::{self, Method, Options, Outcome};
+use crate::methods::{self, Method, Options, Outcome, Progress};
 use crate::policy::Policy;
 
 /// Budgets per bit.
@@ -56,55 +56,23 @@ pub(super) fn smallest(
     limit: f64,
     watch: &mut impl Watch,
 ) -> Result<QuantizedPolicy> {
-    let policy = quantizer.policy;
-    let dataset = measured(policy, quantizer.recordings)?;
-    let top = top(policy, options)?;
+    let dataset = measured(quantizer.policy, quantizer.recordings)?;
+    let top = top(quantizer.policy, options)?;
     let all_steps = quantizer.method.most_steps(options);
-    let mut tries: Vec<Try> = Vec::new();
-    let mut found = None;
-    let mut run = |cell: usize, steps: usize| -> Result<f64> {
-        let budget = cell as f64 / PER_BIT as f64;
-        let options = Options { steps: Some(steps), ..options.clone() };
-        let work = format!("try {}: {budget} bits per weight", tries.len() + 1);
-        let measured = match quantizer
-            .at(Rate::BitsPerWeight(budget), &options, &mut |state| watch.progress(&work, state.share()))
-        {
-            Err(error) if error.budget().is_some() => None,
-            Err(error) => return Err(error),
-            Ok(quantized) => {
-                let buffer = quantized.buffer();
-                let image = buffer.image(Path::new("image in memory"))?;
-                let report = eval::evaluate(image, &dataset)?;
-                let milliseconds = StepTime::new(&image, CLOCK).milliseconds;
-                if report.nmse <= limit && steps == all_steps {
-                    found = Some((quantized, report.nmse, budget));
-                }
-                Some((report, milliseconds))
-            }
-        };
-        let (report, milliseconds) = measured.unzip();
-        let error = report.as_ref().map_or(f64::INFINITY, |r| r.nmse);
-        tries.push(Try { budget, steps, report, milliseconds });
-        Ok(error)
-    };
+    let mut attempts =
+        Attempts { quantizer, options, limit, dataset: &dataset, all_steps, tries: Vec::new(), found: None };
     let few = all_steps / SHARE;
+    let mut search = |first: usize, most_tries: usize, steps: usize| {
+        narrow(first, top, most_tries, limit, |cell| attempts.run(cell, steps, watch))
+    };
     let fails = if few > 0 {
-        let looked = narrow(START * PER_BIT, top, LOOKS, limit, |cell| run(cell, few))?;
-        narrow(looked.passes.map_or(top, |p| p.0), top, TRIES, limit, |cell| run(cell, all_steps))?.fails.0
+        let looked = search(START * PER_BIT, LOOKS, few)?;
+        search(looked.passes.map_or(top, |p| p.0), TRIES, all_steps)?.fails.0
     } else {
-        narrow(START * PER_BIT, top, PLAIN_TRIES, limit, |cell| run(cell, all_steps))?.fails.0
+        search(START * PER_BIT, PLAIN_TRIES, all_steps)?.fails.0
     };
-    let Some((quantized, nmse, budget)) = found else {
-        let reports = tries.iter().filter_map(|t| t.report.as_ref());
-        let best = reports.min_by(|a, b| a.nmse.total_cmp(&b.nmse)).context("no budget of the search gave an image")?;
-        bail!(
-            "no budget up to {} bits per weight (8 bits and all scales) keeps the error within {limit}; the lowest NMSE was \
-             {:.2e} at {:.3} bits per weight",
-            top as f64 / PER_BIT as f64,
-            best.nmse,
-            best.bpw
-        )
-    };
+    let Attempts { tries, found, .. } = attempts;
+    let Some((quantized, nmse, budget)) = found else { return Err(nothing_found(&tries, limit, top)) };
     let search = Search {
         limit,
         nmse,
@@ -116,6 +84,61 @@ pub(super) fn smallest(
         held_out: quantizer.recordings.heldout.is_some(),
     };
     Ok(QuantizedPolicy { search: Some(search), ..quantized })
+}
+
+/// The tries of a search, and the last image that has kept the limit with all steps.
+struct Attempts<'a> {
+    quantizer: &'a Quantizer<'a>,
+    options: &'a Options,
+    limit: f64,
+    dataset: &'a Dataset,
+    all_steps: usize,
+    tries: Vec<Try>,
+    /// The image with its error and its budget.
+    found: Option<(QuantizedPolicy, f64, f64)>,
+}
+
+impl Attempts<'_> {
+    /// Quantizes with the budget of a cell. Returns the error; infinite if the budget is too small.
+    fn run(&mut self, cell: usize, steps: usize, watch: &mut impl Watch) -> Result<f64> {
+        let budget = cell as f64 / PER_BIT as f64;
+        let options = Options { steps: Some(steps), ..self.options.clone() };
+        let work = format!("try {}: {budget} bits per weight", self.tries.len() + 1);
+        let mut progress = |state: Progress| watch.progress(&work, state.share());
+        let measured = match self.quantizer.at(Rate::BitsPerWeight(budget), &options, &mut progress) {
+            Err(error) if error.budget().is_some() => None,
+            Err(error) => return Err(error),
+            Ok(quantized) => {
+                let buffer = quantized.buffer();
+                let image = buffer.image(Path::new("image in memory"))?;
+                let report = eval::evaluate(image, self.dataset)?;
+                let milliseconds = StepTime::new(&image, CLOCK).milliseconds;
+                if report.nmse <= self.limit && steps == self.all_steps {
+                    self.found = Some((quantized, report.nmse, budget));
+                }
+                Some((report, milliseconds))
+            }
+        };
+        let (report, milliseconds) = measured.unzip();
+        let error = report.as_ref().map_or(f64::INFINITY, |r| r.nmse);
+        self.tries.push(Try { budget, steps, report, milliseconds });
+        Ok(error)
+    }
+}
+
+/// Returns the error of a search in which no image has kept the limit.
+fn nothing_found(tries: &[Try], limit: f64, top: usize) -> Error {
+    let reports = tries.iter().filter_map(|t| t.report.as_ref());
+    let Some(best) = reports.min_by(|a, b| a.nmse.total_cmp(&b.nmse)) else {
+        return Error::input("no budget of the search gave an image");
+    };
+    Error::input(format!(
+        "no budget up to {} bits per weight (8 bits and all scales) keeps the error within {limit}; the lowest NMSE was \
+         {:.2e} at {:.3} bits per weight",
+        top as f64 / PER_BIT as f64,
+        best.nmse,
+        best.bpw
+    ))
 }
 
 /// Returns the first budget with room for 8 bits everywhere, in steps of the search.
