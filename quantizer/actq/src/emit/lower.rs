@@ -94,6 +94,19 @@ fn after(step: &Step<Slice>, output: Slice) -> Step<Slice> {
     Step { dst: placed(step.dst), src: step.src.map(placed), third: step.third.map(placed), ..step.clone() }
 }
 
+/// Returns an operation's data with the place of its noise, if it has any.
+fn placed_data(data: &StepData, region: impl Fn(Slice) -> Region) -> StepData {
+    match data {
+        StepData::Denoise { constants, noise: Some(noise) } => {
+            let mut constants = constants.clone();
+            constants[1] = f32::from_bits(region(*noise).offset as u32);
+            StepData::Constants(constants)
+        }
+        StepData::Denoise { constants, noise: None } => StepData::Constants(constants.clone()),
+        data => data.clone(),
+    }
+}
+
 /// Buffer of the observation.
 const OBSERVATION: BufferId = 0;
 
@@ -103,6 +116,14 @@ struct Arena {
     /// Words that contract and playback keep beside the last action.
     kept_len: usize,
     work_len: usize,
+}
+
+/// Offsets of the buffers in the arena.
+struct Placement {
+    offsets: Vec<usize>,
+    state_len: usize,
+    /// Words of all buffers.
+    end: usize,
 }
 
 impl Arena {
@@ -115,6 +136,38 @@ impl Arena {
         act_len: usize,
     ) -> Result<Program> {
         let Lowering { steps, buffers, .. } = &self.lowering;
+        let Placement { offsets, state_len, end } = self.place();
+        let action = Region { offset: end, len: act_len };
+        let work_offset = action.offset + action.len + self.kept_len;
+        let words = work_offset + self.work_len;
+        ensure!(
+            words <= usize::from(u16::MAX),
+            "the policy needs {words} words of scratch memory, but at most 65535 are supported; use a smaller network"
+        );
+        let region = |s: Slice| Region { offset: offsets[s.buffer] + s.offset, len: s.len };
+        let whole = |buffer: usize| Region { offset: offsets[buffer], len: buffers[buffer].len };
+        let steps = steps.iter().map(|step| Step {
+            kind: step.kind,
+            dst: region(step.dst),
+            src: step.src.map(region),
+            third: step.third.map(region),
+            data: placed_data(&step.data, region),
+        });
+        Ok(Program {
+            steps: steps.collect(),
+            state: Region { offset: 0, len: state_len },
+            observation: whole(observation),
+            first_denoising_op,
+            output: region(output),
+            action,
+            work: Region { offset: work_offset, len: self.work_len },
+            words,
+        })
+    }
+
+    /// Places the buffers: first the state, then the observation, then the values by their lifetimes.
+    fn place(&self) -> Placement {
+        let buffers = &self.lowering.buffers;
         let mut offsets = vec![0; buffers.len()];
         let mut top = 0;
         let mut state_len = 0;
@@ -146,40 +199,7 @@ impl Arena {
             ends.push(offset + len);
             placed.push((buffer, life));
         }
-        let action = Region { offset: ends.into_iter().max().unwrap_or(top), len: act_len };
-        let work_offset = action.offset + action.len + self.kept_len;
-        let words = work_offset + self.work_len;
-        ensure!(
-            words <= usize::from(u16::MAX),
-            "the policy needs {words} words of scratch memory, but at most 65535 are supported; use a smaller network"
-        );
-        let region = |s: Slice| Region { offset: offsets[s.buffer] + s.offset, len: s.len };
-        let whole = |buffer: usize| Region { offset: offsets[buffer], len: buffers[buffer].len };
-        let steps = steps.iter().map(|step| Step {
-            kind: step.kind,
-            dst: region(step.dst),
-            src: step.src.map(region),
-            third: step.third.map(region),
-            data: match &step.data {
-                StepData::Denoise { constants, noise: Some(noise) } => {
-                    let mut constants = constants.clone();
-                    constants[1] = f32::from_bits(region(*noise).offset as u32);
-                    StepData::Constants(constants)
-                }
-                StepData::Denoise { constants, noise: None } => StepData::Constants(constants.clone()),
-                data => data.clone(),
-            },
-        });
-        Ok(Program {
-            steps: steps.collect(),
-            state: Region { offset: 0, len: state_len },
-            observation: whole(observation),
-            first_denoising_op,
-            output: region(output),
-            action,
-            work: Region { offset: work_offset, len: self.work_len },
-            words,
-        })
+        Placement { offsets, state_len, end: ends.into_iter().max().unwrap_or(top) }
     }
 
     /// Returns the first and last operation that needs each value's buffer, in order of the first.

@@ -41,11 +41,11 @@ pub fn image(policy: &Policy, matrices: &[Outcome]) -> Result<Vec<u8>> {
 ///
 /// As [`image`].
 pub fn image_around(policy: &Policy, matrices: &[Outcome], around: &Around) -> Result<Vec<u8>> {
-    emit(&outside(policy, around)?, matrices, Some(around))
+    emit(&policy_around(policy, around)?, matrices, Some(around))
 }
 
-/// Returns the policy as it is seen from outside.
-fn outside(policy: &Policy, around: &Around) -> Result<Policy> {
+/// Returns the policy with the action and the limits of the operations around its network.
+fn policy_around(policy: &Policy, around: &Around) -> Result<Policy> {
     ensure!(policy.kind == Kind::Step, "only a policy of kind step can have operations around its network");
     let [low, high] = around.limits.clone().map_or([None, None], |limits| limits.map(Some));
     let contract = ActionContract { low, high, ..ActionContract::default() };
@@ -73,7 +73,7 @@ fn emit(policy: &Policy, matrices: &[Outcome], around: Option<&Around>) -> Resul
 pub fn bytes_beside_blocks(policy: &Policy) -> Result<usize> {
     let records = vec![[0; h::MATRIX_WORDS]; policy.graph.matrices.len()];
     let draft = match &policy.around {
-        Some(around) => Writer::new().finish(&outside(policy, around)?, 0, &records, Some(around))?,
+        Some(around) => Writer::new().finish(&policy_around(policy, around)?, 0, &records, Some(around))?,
         None => Writer::new().finish(policy, 0, &records, None)?,
     };
     Ok(4 * draft.words.len())
@@ -96,6 +96,17 @@ fn sealed(words: &[u32]) -> Result<Vec<u8>> {
     let mut bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
     seal(&mut bytes).context("the image is larger than 4 GB")?;
     Ok(bytes)
+}
+
+/// Returns the steps of a self-test. One step tests everything if none depends on an earlier one. Else a chunk and the
+/// beginning of the next do, or as much of them as fits with long observations.
+fn self_test_steps(policy: &Policy, state_len: usize, obs_len: usize) -> usize {
+    if policy.kind == Kind::Step && state_len == 0 && !policy.contract.has_memory() {
+        return 1;
+    }
+    let horizon = policy.contract.playback.ensemble.map_or(0, |ensemble| ensemble.horizon);
+    let fitting = SELF_TEST_BYTES / (4 * (obs_len + policy.act_len));
+    (policy.execute.max(horizon) + 2).min(fitting.max(1))
 }
 
 /// Makes observations that reach every input: spread over about two standard deviations if the policy normalizes, else
@@ -129,13 +140,13 @@ struct Writer {
     /// Offset of the matrix records.
     matrices: u32,
     /// Offset from which on all words are finite constants of operations, which other operations may share.
-    finite: usize,
+    shared_constants: usize,
 }
 
 impl Writer {
     /// Makes an image with room for its header.
     fn new() -> Self {
-        Self { words: vec![0; h::WORDS], matrices: 0, finite: 0 }
+        Self { words: vec![0; h::WORDS], matrices: 0, shared_constants: 0 }
     }
 
     /// Appends everything after the matrices' blocks; `matrices` are their records.
@@ -149,28 +160,14 @@ impl Writer {
         let program = lower(policy, group, around)?;
         let obs_len = obs_len(policy, around);
         self.matrices = self.push(matrices.iter().flatten().copied());
-        self.finite = self.words.len();
+        self.shared_constants = self.words.len();
         let records = program.steps.iter().map(|step| self.op(step)).collect::<Result<Vec<[u32; h::OP_WORDS]>>>()?;
         let ops = self.push(records.into_iter().flatten());
-        let contract = self.words.len() as u32;
-        let mut flags = 0;
-        for (bit, (_, array)) in policy.contract.arrays().into_iter().enumerate() {
-            if let Some(array) = array {
-                flags |= 1 << bit;
-                self.push_floats(array);
-            }
-        }
+        let (contract, contract_flags) = self.contract(&policy.contract);
         let playback = policy.contract.playback;
         let horizon = playback.ensemble.map_or(0, |ensemble| ensemble.horizon);
-        if let Some(ensemble) = playback.ensemble {
-            self.push_floats(&ensemble.weights());
-        }
         let name = self.push_bytes(policy.name.as_bytes());
-        // One step tests everything if none depends on an earlier one. Else a chunk and the beginning of the next do,
-        // or as much of them as long observations leave room for.
-        let is_stateless = policy.kind == Kind::Step && program.state.len == 0 && !policy.contract.has_memory();
-        let room = SELF_TEST_BYTES / (4 * (obs_len + policy.act_len));
-        let steps = if is_stateless { 1 } else { (policy.execute.max(horizon) + 2).min(room.max(1)) };
+        let steps = self_test_steps(policy, program.state.len, obs_len);
         let observations = match around {
             Some(_) => self_test_observations(&Graph::new(obs_len), steps),
             None => self_test_observations(&policy.graph, steps),
@@ -204,7 +201,7 @@ impl Writer {
             first_denoising_op: program.first_denoising_op,
             denoising_steps: policy.graph.denoising.as_ref().map_or(0, |denoising| denoising.steps.len()),
             contract,
-            contract_flags: flags,
+            contract_flags,
             name: Records { offset: name, count: policy.name.len() },
             self_test: Records { offset: self_test, count: steps },
             weights: policy.weights as u32,
@@ -212,6 +209,23 @@ impl Writer {
         };
         self.words[..h::WORDS].copy_from_slice(&header.emit()?);
         Ok(Draft { words: self.words, self_test: self_test as usize, observations })
+    }
+
+    /// Appends the arrays of the contract and the weights of its ensemble. Returns their offset, with a flag for each
+    /// array that is present.
+    fn contract(&mut self, contract: &ActionContract) -> (u32, usize) {
+        let offset = self.words.len() as u32;
+        let mut flags = 0;
+        for (bit, (_, array)) in contract.arrays().into_iter().enumerate() {
+            if let Some(array) = array {
+                flags |= 1 << bit;
+                self.push_floats(array);
+            }
+        }
+        if let Some(ensemble) = contract.playback.ensemble {
+            self.push_floats(&ensemble.weights());
+        }
+        (offset, flags)
     }
 
     /// Appends raw inputs and targets.
@@ -258,12 +272,12 @@ impl Writer {
     fn constants(&mut self, values: &[f32]) -> u32 {
         let words: Vec<u32> = values.iter().map(|v| v.to_bits()).collect();
         let same = |window: &[u32]| window == words;
-        if let Some(at) = self.words[self.finite..].windows(words.len().max(1)).position(same) {
-            return (self.finite + at) as u32;
+        if let Some(at) = self.words[self.shared_constants..].windows(words.len().max(1)).position(same) {
+            return (self.shared_constants + at) as u32;
         }
         let offset = self.push(words);
         if values.iter().any(|v| !v.is_finite()) {
-            self.finite = self.words.len();
+            self.shared_constants = self.words.len();
         }
         offset
     }
@@ -312,12 +326,12 @@ impl Writer {
             // Its first words are not only f32 constants, so later operations must not share any words up to here.
             StepData::Constants(values) if step.kind == OpKind::Denoise => {
                 let data = self.push_floats(values);
-                self.finite = self.words.len();
+                self.shared_constants = self.words.len();
                 (0, data)
             }
             StepData::Words(words) => {
                 let data = self.push(words.iter().copied());
-                self.finite = self.words.len();
+                self.shared_constants = self.words.len();
                 (0, data)
             }
             StepData::Constants(values) | StepData::Denoise { constants: values, .. } => (0, self.constants(values)),
@@ -357,7 +371,7 @@ mod tests {
     use crate::testing;
 
     /// Returns the steps of the self-test of a policy's image.
-    fn self_test_steps(policy: &Policy) -> usize {
+    fn steps_of(policy: &Policy) -> usize {
         let calib = Some(testing::dataset(&policy.graph, 2, 20));
         let options = Options::new(Method::Rtn, Budget::Width(Width::W3));
         let made = quantize(policy, &Recordings { calib, heldout: None }, &options, ()).expect("an image");
@@ -367,16 +381,16 @@ mod tests {
     #[test]
     fn stateful_policies_get_longer_self_tests() {
         let feed_forward = Policy::of("mlp", testing::mlp());
-        assert_eq!(self_test_steps(&feed_forward), 1);
-        assert_eq!(self_test_steps(&Policy::of("lstm", testing::lstm())), 3);
+        assert_eq!(steps_of(&feed_forward), 1);
+        assert_eq!(steps_of(&Policy::of("lstm", testing::lstm())), 3);
 
         let with = |contract| Policy { contract, ..feed_forward.clone() };
         let ones = Some(vec![1.0; feed_forward.act_len]);
-        assert_eq!(self_test_steps(&with(ActionContract { max_step: ones.clone(), ..ActionContract::default() })), 3);
-        assert_eq!(self_test_steps(&with(ActionContract { smoothing: ones.clone(), ..ActionContract::default() })), 3);
-        assert_eq!(self_test_steps(&with(ActionContract { scale: ones, ..ActionContract::default() })), 1);
+        assert_eq!(steps_of(&with(ActionContract { max_step: ones.clone(), ..ActionContract::default() })), 3);
+        assert_eq!(steps_of(&with(ActionContract { smoothing: ones.clone(), ..ActionContract::default() })), 3);
+        assert_eq!(steps_of(&with(ActionContract { scale: ones, ..ActionContract::default() })), 1);
         let ensemble = Some(Ensemble { horizon: 1, m: 0.1 });
         let playback = Playback { ensemble, ..Playback::default() };
-        assert_eq!(self_test_steps(&with(ActionContract { playback, ..ActionContract::default() })), 3);
+        assert_eq!(steps_of(&with(ActionContract { playback, ..ActionContract::default() })), 3);
     }
 }

@@ -45,6 +45,7 @@ use candidate::Candidate;
 use choose::{Chosen, choose};
 use compact::add_to_bias;
 use feedback::feedback;
+use schedule::Bounds;
 use shape::{Goal, Shape, values};
 use size::Size;
 use train::{Learned, Present, Task, distill};
@@ -57,8 +58,19 @@ pub fn quantize(
     options: &Options,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<QuantizedNetwork> {
-    let RowStatistics { windows, inputs, moments, .. } = statistics;
-    let graph = &windows.graph;
+    check_names(&statistics.windows.graph, options)?;
+    let goal = Goal { statistics, rate, options };
+    let (candidate, Chosen { choice, bounds, tried, share }) = choose_candidate(goal, progress)?;
+    let Learned { quantized, graph: learned, steps } = learn(goal, &candidate, choice, bounds, share, progress);
+    let outcomes = outcomes(goal, &candidate, &learned, &quantized, bounds)?;
+    let cycles = candidate.shape.cycles;
+    let outcomes = with_allocations(statistics, candidate, outcomes);
+    let learning = Some(Learning { steps, choice, tried });
+    Ok(QuantizedNetwork { graph: learned, outcomes, learning, cycles })
+}
+
+/// Refuses a forced width for a matrix that the network does not have.
+fn check_names(graph: &Graph, options: &Options) -> Result<()> {
     for (name, _) in &options.forced {
         let names = || graph.matrices.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
         ensure!(
@@ -67,41 +79,65 @@ pub fn quantize(
             names()
         );
     }
-    let goal = Goal { statistics, rate, options };
+    Ok(())
+}
+
+/// Chooses the network to quantize, and learning or feedback.
+fn choose_candidate(goal: Goal<'_>, progress: &mut dyn FnMut(Progress)) -> Result<(Candidate, Chosen)> {
+    let Goal { statistics: RowStatistics { windows, .. }, options, .. } = goal;
     let recipe = Recipe::new(Widening::of(windows.recurrent()));
     let mut choosing = |share, error| progress(Progress::Choosing { share, error });
     let first = Candidate::new(goal, recipe)?;
-    let (candidate, chosen) = if options.learns() && first.task(goal, recipe).has_lost_half(windows) {
-        choose_recipe(goal, first, recipe, &mut choosing)
-    } else {
-        let feedback =
-            |moments: &[(Moments, DMatrix<f64>)], damping: f64| feed_back(&first, options.group, moments, damping);
-        let chosen = choose(&first.task(goal, recipe), windows, &feedback, &mut choosing);
-        (first, chosen)
-    };
-    let Chosen { choice, bounds, tried, share: from } = chosen;
-    let (quantized, learned, steps) = match choice {
+    if options.learns() && first.task(goal, recipe).has_lost_half(windows) {
+        return Ok(choose_recipe(goal, first, recipe, &mut choosing));
+    }
+    let feedback =
+        |moments: &[(Moments, DMatrix<f64>)], damping: f64| feed_back(&first, options.group, moments, damping);
+    let chosen = choose(&first.task(goal, recipe), windows, &feedback, &mut choosing);
+    Ok((first, chosen))
+}
+
+/// Learns, or takes two-sided error feedback; `from` is the share of the work that the choice took.
+fn learn(
+    goal: Goal<'_>,
+    candidate: &Candidate,
+    choice: Choice,
+    bounds: Bounds,
+    from: f64,
+    progress: &mut dyn FnMut(Progress),
+) -> Learned {
+    let Goal { statistics: RowStatistics { windows, moments, .. }, options, .. } = goal;
+    match choice {
         Choice::Feedback { damping } => {
-            let (quantized, graph) = feed_back(&candidate, options.group, moments, damping);
-            (quantized, graph, 0)
+            let (quantized, graph) = feed_back(candidate, options.group, moments, damping);
+            Learned { quantized, graph, steps: 0 }
         }
         Choice::Learning(recipe) => {
             let task = Task { bounds, ..candidate.task(goal, recipe) };
-            let Learned { quantized, graph, steps } =
-                distill(&task, windows, &mut |Present { share, error, held_out }| {
-                    progress(Progress::Learning { share: from + (1.0 - from) * share, error, held_out });
-                });
-            (quantized, graph, steps)
+            distill(&task, windows, &mut |Present { share, error, held_out }| {
+                progress(Progress::Learning { share: from + (1.0 - from) * share, error, held_out });
+            })
         }
-    };
-    let Candidate { shape: Shape { cut, dimensions, rows, widths, limits: learned_with, cycles }, compacted, .. } =
-        candidate;
-    let size = Size::new(&cut.graph, &dimensions, values(&cut.graph, rate, options));
+    }
+}
+
+/// Returns the matrices with the activations that they get: int16 has another layout, which may pad more, so a matrix
+/// gets it only if it still fits.
+fn outcomes(
+    Goal { statistics, rate, options }: Goal<'_>,
+    candidate: &Candidate,
+    learned: &Graph,
+    quantized: &[Quantized],
+    bounds: Bounds,
+) -> Result<Vec<Outcome>> {
+    let (graph, windows) = (statistics.graph(), &statistics.windows);
+    let Shape { cut, dimensions, widths, limits: learned_with, .. } = &candidate.shape;
+    let size = Size::new(&cut.graph, dimensions, values(&cut.graph, rate, options));
     let allowed = rate.bytes(graph.weights());
     let wanted = match options.activations {
         Activations::Auto => {
             let allowance = bounds.time.filter(|_| graph.denoising_steps() > 1).map(Allowance::of);
-            choose_activations(&learned, &quantized, windows, &learned_with, allowance, options.seed)
+            choose_activations(learned, quantized, windows, learned_with, allowance, options.seed)
         }
         _ => learned_with.clone(),
     };
@@ -109,29 +145,32 @@ pub fn quantize(
         Ok(Outcome { x_max: quantized.x_max(limit)?, quantized: quantized.clone(), error: None, allocation: None })
     };
     let mut outcomes: Vec<Outcome> =
-        quantized.iter().zip(learned_with).map(|(q, limit)| outcome(q, limit)).collect::<Result<_>>()?;
-    // int16 has another layout, which may pad more; use it if it still fits.
+        quantized.iter().zip(learned_with).map(|(q, &limit)| outcome(q, limit)).collect::<Result<_>>()?;
     for (m, &limit) in wanted.iter().enumerate() {
         let other = outcome(&quantized[m], limit)?;
-        let total = size.beside(&widths) + outcomes.iter().map(Outcome::bytes).sum::<usize>() - outcomes[m].bytes()
+        let total = size.beside(widths) + outcomes.iter().map(Outcome::bytes).sum::<usize>() - outcomes[m].bytes()
             + other.bytes();
         if total as f64 <= allowed {
             outcomes[m] = other;
         }
     }
+    Ok(outcomes)
+}
+
+/// Adds the reasons for the widths to the matrices. The rows of removed units count as rows without bits.
+fn with_allocations(statistics: &RowStatistics, candidate: Candidate, mut outcomes: Vec<Outcome>) -> Vec<Outcome> {
+    let Candidate { shape: Shape { cut, rows, widths, .. }, compacted, .. } = candidate;
     for (m, ((outcome, rows), widths)) in outcomes.iter_mut().zip(rows).zip(widths).enumerate() {
         let expected = widths.iter().enumerate().map(|(r, width)| rows.expected(r, *width)).collect();
         let Rows { energy, removal, .. } = rows;
-        // The rows of removed units count as rows without bits.
         let [removal, expected] = [removal, expected].map(|of: Vec<f64>| cut.expand(m, of, cut.error_of_row()));
         let energy = cut.expand(m, energy, 0.0);
         let widths = cut.expand(m, widths, None);
         let (rows, columns) = (compacted.rows[m].clone(), compacted.columns[m].clone());
-        let allocation = RowAllocation { widths, energy, removal, expected, inputs: inputs[m].clone(), rows, columns };
-        outcome.allocation = Some(allocation);
+        let inputs = statistics.inputs[m].clone();
+        outcome.allocation = Some(RowAllocation { widths, energy, removal, expected, inputs, rows, columns });
     }
-    let learning = Some(Learning { steps, choice, tried });
-    Ok(QuantizedNetwork { graph: learned, outcomes, learning, cycles })
+    outcomes
 }
 
 /// Returns the fewest bytes that meet a rate. A balance does not count, since only the recording can require it.

@@ -81,79 +81,114 @@ pub fn feedback(
     (input, damping): (&Moments, f64),
     output: &DMatrix<f64>,
 ) -> (Quantized, Vec<f32>) {
-    let (rows, cols) = (matrix.rows, matrix.cols);
     let (h, g) = (Factor::new(&input.centred(), damping), Factor::new(output, DAMPING_OUTPUT));
-    let mut scales = Scales::fit(matrix, widths, group, importance);
-    let mut codes = vec![0u8; rows * cols];
-    // Rounded minus wanted weights.
-    let mut errors = vec![0f64; rows * cols];
-    let value = |scales: &Scales, width: Width, r: usize, c: usize, code: u8| {
-        f64::from(width.level(code)) * f64::from(scales.at(r, c))
-    };
-    let mut carried = vec![0f64; cols];
-    let mut done = vec![0f64; cols];
-    for i in (0..rows).rev() {
-        let r = g.order[i];
-        carried.fill(0.0);
-        for (&other, m) in g.order.iter().zip(g.below(i)).skip(i + 1) {
-            add(&mut carried, *m, &errors[other * cols..][..cols]);
-        }
-        for j in (0..cols).rev() {
-            let c = h.order[j];
-            let weight = f64::from(matrix.data[r * cols + c]);
-            let rounded = widths[r].map_or(0.0, |width| {
-                let before = dot(&h.below(j)[j + 1..], &done[j + 1..]);
-                let code = scales.code(width, r, c, (weight - carried[c] - before) as f32);
-                codes[r * cols + c] = code;
-                value(&scales, width, r, c, code)
-            });
-            errors[r * cols + c] = rounded - weight;
-            done[j] = rounded - weight + carried[c];
-        }
-    }
+    let mut rounding = Rounding::new(matrix, widths, Scales::fit(matrix, widths, group, importance));
+    rounding.feed_back(&h, &g);
     for _ in 0..SWEEPS {
-        for r in 0..rows {
-            let Some(width) = widths[r] else { continue };
-            // Row r of G E H, which is half the derivative of the error by the row.
-            carried.fill(0.0);
-            for (other, m) in g.row(r).iter().enumerate() {
-                add(&mut carried, *m, &errors[other * cols..][..cols]);
-            }
-            done.fill(0.0);
-            for (c, x) in carried.iter().enumerate() {
-                add(&mut done, *x, h.row(c));
-            }
-            let own = g.row(r)[r];
-            for c in 0..cols {
-                let at = r * cols + c;
-                let now = value(&scales, width, r, c, codes[at]);
-                let code = scales.code(width, r, c, (now - done[c] / (own * h.row(c)[c])) as f32);
-                if code != codes[at] {
-                    let step = value(&scales, width, r, c, code) - now;
-                    codes[at] = code;
-                    errors[at] += step;
-                    add(&mut done, own * step, h.row(c));
-                }
-            }
-            // The scale at which the derivative along the row's levels vanishes.
-            let level = |c: usize| f64::from(width.level(codes[r * cols + c])) * f64::from(scales.group_scale(r, c));
-            let levels: Vec<f64> = (0..cols).map(level).collect();
-            let slope = dot(&levels, &done);
-            let curvature: f64 = own * levels.iter().enumerate().map(|(c, l)| l * dot(h.row(c), &levels)).sum::<f64>();
-            if curvature > 0.0 {
-                let scale = &mut scales.rows[r];
-                let wanted = bf16::from_f64(scale.to_f64() - slope / curvature);
-                if wanted > bf16::ZERO {
-                    let step = wanted.to_f64() - scale.to_f64();
-                    add(&mut errors[r * cols..][..cols], step, &levels);
-                    *scale = wanted;
-                }
+        for r in 0..matrix.rows {
+            if let Some(width) = widths[r] {
+                rounding.descend(&h, &g, r, width);
             }
         }
     }
-    let shift = errors.chunks_exact(cols).map(|e| -dot(e, &input.mean) as f32).collect();
-    let widths = widths.to_vec();
+    let Rounding { scales, codes, errors, .. } = rounding;
+    let shift = errors.chunks_exact(matrix.cols).map(|e| -dot(e, &input.mean) as f32).collect();
+    let (rows, cols, widths) = (matrix.rows, matrix.cols, widths.to_vec());
     (Quantized { rows, cols, group, widths, scales: scales.rows, group_scales: scales.groups, codes }, shift)
+}
+
+/// A matrix that is being rounded.
+struct Rounding<'a> {
+    matrix: &'a WeightMatrix,
+    widths: &'a [Option<Width>],
+    scales: Scales,
+    codes: Vec<u8>,
+    /// Rounded minus wanted weights.
+    errors: Vec<f64>,
+}
+
+impl<'a> Rounding<'a> {
+    fn new(matrix: &'a WeightMatrix, widths: &'a [Option<Width>], scales: Scales) -> Self {
+        let len = matrix.rows * matrix.cols;
+        Self { matrix, widths, scales, codes: vec![0; len], errors: vec![0.0; len] }
+    }
+
+    fn value(&self, width: Width, r: usize, c: usize, code: u8) -> f64 {
+        f64::from(width.level(code)) * f64::from(self.scales.at(r, c))
+    }
+
+    /// Rounds all weights one by one. Each compensates the earlier errors of its row and its column.
+    fn feed_back(&mut self, h: &Factor, g: &Factor) {
+        let (rows, cols) = (self.matrix.rows, self.matrix.cols);
+        let mut carried = vec![0f64; cols];
+        let mut done = vec![0f64; cols];
+        for i in (0..rows).rev() {
+            let r = g.order[i];
+            carried.fill(0.0);
+            for (&other, m) in g.order.iter().zip(g.below(i)).skip(i + 1) {
+                add(&mut carried, *m, &self.errors[other * cols..][..cols]);
+            }
+            for j in (0..cols).rev() {
+                let c = h.order[j];
+                let weight = f64::from(self.matrix.data[r * cols + c]);
+                let rounded = self.widths[r].map_or(0.0, |width| {
+                    let before = dot(&h.below(j)[j + 1..], &done[j + 1..]);
+                    let code = self.scales.code(width, r, c, (weight - carried[c] - before) as f32);
+                    self.codes[r * cols + c] = code;
+                    self.value(width, r, c, code)
+                });
+                self.errors[r * cols + c] = rounded - weight;
+                done[j] = rounded - weight + carried[c];
+            }
+        }
+    }
+
+    /// Changes single codes of a row, with all others fixed, then fits the row's scale to its codes.
+    fn descend(&mut self, h: &Factor, g: &Factor, r: usize, width: Width) {
+        let cols = self.matrix.cols;
+        let mut slopes = self.slopes(h, g, r);
+        let own = g.row(r)[r];
+        for c in 0..cols {
+            let at = r * cols + c;
+            let now = self.value(width, r, c, self.codes[at]);
+            let code = self.scales.code(width, r, c, (now - slopes[c] / (own * h.row(c)[c])) as f32);
+            if code != self.codes[at] {
+                let step = self.value(width, r, c, code) - now;
+                self.codes[at] = code;
+                self.errors[at] += step;
+                add(&mut slopes, own * step, h.row(c));
+            }
+        }
+        // The scale at which the derivative along the row's levels vanishes.
+        let level =
+            |c: usize| f64::from(width.level(self.codes[r * cols + c])) * f64::from(self.scales.group_scale(r, c));
+        let levels: Vec<f64> = (0..cols).map(level).collect();
+        let slope = dot(&levels, &slopes);
+        let curvature: f64 = own * levels.iter().enumerate().map(|(c, l)| l * dot(h.row(c), &levels)).sum::<f64>();
+        if curvature > 0.0 {
+            let scale = &mut self.scales.rows[r];
+            let wanted = bf16::from_f64(scale.to_f64() - slope / curvature);
+            if wanted > bf16::ZERO {
+                let step = wanted.to_f64() - scale.to_f64();
+                add(&mut self.errors[r * cols..][..cols], step, &levels);
+                *scale = wanted;
+            }
+        }
+    }
+
+    /// Returns row `r` of `G E H`, half the derivative of the error by the row.
+    fn slopes(&self, h: &Factor, g: &Factor, r: usize) -> Vec<f64> {
+        let cols = self.matrix.cols;
+        let mut weighted = vec![0.0; cols];
+        for (other, m) in g.row(r).iter().enumerate() {
+            add(&mut weighted, *m, &self.errors[other * cols..][..cols]);
+        }
+        let mut slopes = vec![0.0; cols];
+        for (c, x) in weighted.iter().enumerate() {
+            add(&mut slopes, *x, h.row(c));
+        }
+        slopes
+    }
 }
 
 /// Computes `to += factor * from`.
