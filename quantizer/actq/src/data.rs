@@ -13,13 +13,14 @@ mod origin;
 mod range;
 mod recording;
 mod save;
+mod sizes;
 #[cfg(test)]
 mod tests;
 mod thinning;
 
 pub use arrays::arrays;
+pub use dataset::Dataset;
 pub(crate) use dataset::mean_and_variance;
-pub use dataset::{Dataset, Sizes};
 pub use joined::{Learned, MOST_FRAMES, Share, joined, longest_piece};
 pub use npy::npy_header;
 pub(crate) use origin::is_link_log;
@@ -27,3 +28,4 @@ pub use origin::{CRC32, driven_by};
 pub use range::{Outside, Range, runs};
 pub use recording::{Recording, Recordings, files_of};
 pub use save::{Element, NpzWriter, write_npy};
+pub use sizes::Sizes;

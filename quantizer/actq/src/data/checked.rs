@@ -1,13 +1,11 @@
 //! Arrays of a recording: the checks of their shapes, then their values.
 
-use std::path::Path;
-
 use actq_kernels::ops::noise::normal;
 use ndarray::{Array2, Array3, Axis, concatenate};
 
 use super::arrays::{Arrays, floats};
-use super::dataset::{Dataset, Sizes};
 use super::origin::APPLIED;
+use super::sizes::Sizes;
 use crate::error::{Context, Result, bail, ensure};
 use crate::import::values::{Tensor, Values};
 use crate::text::count;
@@ -23,6 +21,14 @@ pub(super) struct CheckedArrays {
     state: Option<Tensor>,
     /// Valid steps of each episode.
     length: Vec<usize>,
+}
+
+/// Values of a recording, as [`super::Dataset`] has them.
+pub(super) struct Contents {
+    pub(super) obs: Array3<f32>,
+    pub(super) action: Option<Array3<f32>>,
+    pub(super) state: Option<Array2<f32>>,
+    pub(super) length: Vec<usize>,
 }
 
 impl CheckedArrays {
@@ -51,7 +57,7 @@ impl CheckedArrays {
     }
 
     /// Converts the values to f32. Frames without noise get it from a fixed generator.
-    pub(super) fn dataset(self, path: &Path) -> Result<Dataset> {
+    pub(super) fn contents(self) -> Result<Contents> {
         let mut obs = self.rows("obs", &self.obs)?;
         if self.sizes.noise > 0 {
             let noise = match &self.noise {
@@ -62,8 +68,7 @@ impl CheckedArrays {
             };
             obs = concatenate(Axis(2), &[obs.view(), noise.view()])?.as_standard_layout().into_owned();
         }
-        Ok(Dataset {
-            path: path.to_owned(),
+        Ok(Contents {
             obs,
             action: self.action.as_ref().map(|action| self.rows("action", action)).transpose()?,
             state: self.state.as_ref().map(|state| self.states(state)).transpose()?,

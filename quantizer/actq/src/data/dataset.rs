@@ -5,47 +5,15 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use actq_kernels::Image;
 use ndarray::{Array2, Array3, ArrayView1, Axis, s};
 
 use super::arrays::Arrays;
-use super::checked::CheckedArrays;
+use super::checked::{CheckedArrays, Contents};
+use super::sizes::Sizes;
 use crate::error::{Context, Result, ensure};
 use crate::graph::{Evaluator, Graph};
 use crate::import::values::Tensor;
-use crate::policy::Policy;
 use crate::text::count;
-
-/// Sizes that a recording's arrays must fit.
-#[derive(Clone, Copy, Debug)]
-pub struct Sizes {
-    /// Values of an observation.
-    pub obs: usize,
-    /// Values of noise that an evaluation takes ([`Graph::noise_len`]).
-    pub noise: usize,
-    /// Values of the network's raw output.
-    pub out: usize,
-    /// Values of the recurrent state ([`Graph::state_len`]).
-    pub state: usize,
-}
-
-impl Sizes {
-    /// Returns the sizes of a policy.
-    pub fn of(policy: &Policy) -> Self {
-        let graph = &policy.graph;
-        Self {
-            obs: graph.obs_len,
-            noise: graph.noise_len(),
-            out: policy.chunk * policy.act_len,
-            state: graph.state_len(),
-        }
-    }
-
-    /// Returns the sizes of an image.
-    pub fn of_image(image: &Image<'_>) -> Self {
-        Self { obs: image.obs_len(), noise: image.noise_len(), out: image.output().len, state: image.state().len }
-    }
-}
 
 /// Episodes of observations, with the f32 policy's own actions if they were recorded.
 #[derive(Clone, Debug)]
@@ -76,7 +44,8 @@ impl Dataset {
     }
 
     fn new(path: &Path, arrays: Arrays, sizes: Sizes) -> Result<Self> {
-        CheckedArrays::new(arrays, sizes)?.dataset(path)
+        let Contents { obs, action, state, length } = CheckedArrays::new(arrays, sizes)?.contents()?;
+        Ok(Self { path: path.to_owned(), obs, action, length, state })
     }
 
     /// Returns the file's name without its folder, for messages.

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use ndarray::{Array2, Array3, s};
 
-use super::dataset::{Dataset, Sizes};
+use super::dataset::Dataset;
 use super::recording::Recording;
+use super::sizes::Sizes;
 use super::thinning::{Place, episodes, frames, places};
 use crate::error::{Context as _, Result, ensure};
 use crate::graph::Graph;

@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::arrays::ENDINGS;
-use super::dataset::{Dataset, Sizes};
+use super::dataset::Dataset;
+use super::sizes::Sizes;
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::Graph;
 use crate::import::folder_of;

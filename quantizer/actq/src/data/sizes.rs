@@ -1,0 +1,38 @@
+//! Sizes of the arrays of a recording.
+
+use actq_kernels::Image;
+
+#[cfg(doc)]
+use crate::graph::Graph;
+use crate::policy::Policy;
+
+/// Sizes that a recording's arrays must fit.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
+    /// Values of an observation.
+    pub obs: usize,
+    /// Values of noise that an evaluation takes ([`Graph::noise_len`]).
+    pub noise: usize,
+    /// Values of the network's raw output.
+    pub out: usize,
+    /// Values of the recurrent state ([`Graph::state_len`]).
+    pub state: usize,
+}
+
+impl Sizes {
+    /// Returns the sizes of a policy.
+    pub fn of(policy: &Policy) -> Self {
+        let graph = &policy.graph;
+        Self {
+            obs: graph.obs_len,
+            noise: graph.noise_len(),
+            out: policy.chunk * policy.act_len,
+            state: graph.state_len(),
+        }
+    }
+
+    /// Returns the sizes of an image.
+    pub fn of_image(image: &Image<'_>) -> Self {
+        Self { obs: image.obs_len(), noise: image.noise_len(), out: image.output().len, state: image.state().len }
+    }
+}
