@@ -85,8 +85,8 @@ pub fn feedback(
     let mut rounding = Rounding::new(matrix, widths, Scales::fit(matrix, widths, group, importance));
     rounding.feed_back(&h, &g);
     for _ in 0..SWEEPS {
-        for r in 0..matrix.rows {
-            if let Some(width) = widths[r] {
+        for (r, width) in widths.iter().enumerate() {
+            if let Some(width) = *width {
                 rounding.descend(&h, &g, r, width);
             }
         }
