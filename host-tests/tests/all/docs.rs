@@ -120,7 +120,7 @@ fn add_documents(folder: &Path, to: &mut Vec<PathBuf>) -> Result<()> {
 #[test]
 fn every_shown_command_is_known() -> Result<()> {
     let mut documents = Vec::new();
-    add_documents(&root(), &mut documents)?;
+    add_documents(root(), &mut documents)?;
     for expected in ["README.md", "docs/families/lerobot.md", "capi/README.md", "quantizer/python/README.md"] {
         ensure!(documents.contains(&root().join(expected)), "{expected} was not found");
     }
