@@ -116,7 +116,7 @@ image_errors! {
     /// impossible.
     Ports = 32, "raw inputs or targets have impossible lengths, names, kinds or ranges";
     /// This build lacks what the image needs: a width, an operation, chunks. `actq inspect` lists the features.
-    LeftOut = 33, "the image needs a feature of the kernels that this build leaves out";
+    LeftOut = 33, "the image needs a feature of the kernels that this build leaves out; actq inspect lists them";
 }
 
 impl ImageError {
@@ -230,7 +230,7 @@ errors! {
             /// Modelled instructions given.
             given: u32,
         } = 85, "a poll has {given} instructions; the image needs at least {needed}";
-        /// A poll without a step that has begun, and without an action since the start or a reset.
+        /// A poll without a step that has begun, and without an action since the start, a reset or an error.
         NotBegun = 86, "no step has begun; call begin with an observation, then poll";
         /// The noise's length differs from the image's.
         NoiseLength {
@@ -280,6 +280,58 @@ impl From<NotFinite> for Fault {
         Self::NotFinite
     }
 }
+
+/// Any error of this crate, for functions that open an image and run it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Error {
+    /// See [`ImageError`].
+    Image(ImageError),
+    /// See [`HeadError`].
+    Head(HeadError),
+    /// See [`SavedError`].
+    Saved(SavedError),
+    /// See [`StepError`].
+    Step(StepError),
+}
+
+impl Error {
+    /// Returns the error's number, the same in all versions.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Image(error) => error as u8,
+            Self::Head(error) => error.code(),
+            Self::Saved(error) => error.code(),
+            Self::Step(error) => error.code(),
+        }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Image(error) => error.fmt(f),
+            Self::Head(error) => error.fmt(f),
+            Self::Saved(error) => error.fmt(f),
+            Self::Step(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for Error {}
+
+macro_rules! any_error {
+    ($($variant:ident $error:ident)*) => {
+        $(impl From<$error> for Error {
+            fn from(error: $error) -> Self {
+                Self::$variant(error)
+            }
+        })*
+    };
+}
+
+any_error! { Image ImageError Head HeadError Saved SavedError Step StepError }
 
 #[cfg(test)]
 mod tests {

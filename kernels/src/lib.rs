@@ -5,7 +5,7 @@
 //! crate runs that image in place from flash:
 //!
 //! ```
-//! # fn run(bytes: &[u8], scratch: &mut [u32], observation: &[f32]) -> Result<(), Box<dyn std::error::Error>> {
+//! # fn run(bytes: &[u8], scratch: &mut [u32], observation: &[f32]) -> Result<(), actq_kernels::Error> {
 //! use actq_kernels::{Head, Image};
 //!
 //! let image = Image::new_checked(bytes)?; // checks checksum, layout, bounds and overflow limits
@@ -32,8 +32,9 @@
 //! - `around`: the operations around a network (`docs/DEPLOY.md`): raw values in, targets out.
 //!
 //! These make the code smaller when they are off; all but `around` are on by default. A build refuses an image that
-//! needs one of them with [`ImageError::LeftOut`]; `actq inspect` lists what an image needs. Two more:
+//! needs one of them with [`ImageError::LeftOut`]; `actq inspect` lists what an image needs. Three more:
 //!
+//! - `compact` shortens the assembler's loops for paired lanes of 3, 4 and 8 bits: less code, more time, the same bits.
 //! - `defmt` derives `defmt::Format` for the error types.
 //! - `writer` makes public what writes images and what checks the kernels: packed layouts, records, arithmetic and the
 //!   parts of the cost model. The quantizer, tests and measurements use it. It is **unstable**: any version may change
@@ -100,7 +101,7 @@ pub mod x;
 mod x;
 
 pub use arch::{BACKEND, Backend};
-pub use error::{HeadError, ImageError, SavedError, StepError};
+pub use error::{Error, HeadError, ImageError, SavedError, StepError};
 pub use head::Head;
 pub use image::{Image, ImageInfo, Kind, Port, PortKind};
 #[cfg(feature = "writer")]

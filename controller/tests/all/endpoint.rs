@@ -379,7 +379,7 @@ proptest! {
         let mut bench = Bench::new();
         bench.arm();
         let before = format!("{:?}", bench.safety);
-        prop_assert_eq!(bench.bytes(&bytes), vec![]);
+        prop_assert_eq!(bench.bytes(&bytes), Vec::<u8>::new());
         prop_assert_eq!(before, format!("{:?}", bench.safety));
         bench.bytes(&[0]);
         prop_assert_eq!(bench.status().state, State::Armed);

@@ -19,7 +19,7 @@ pub const OBS: usize = 18;
 pub const AXES: usize = 6;
 /// Scratch memory in words; `actq inspect` shows how many an image needs.
 pub const SCRATCH: usize = 2048;
-/// Modelled instructions of a slice: 0.12 ms of a Cortex-M4 at 168 MHz.
+/// Modelled instructions of a slice: about 0.17 ms of a Cortex-M4 at 168 MHz.
 pub const SLICE: u32 = 20_000;
 
 /// Cycles of a tick: 1 kHz of the board's 25 MHz.

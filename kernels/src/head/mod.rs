@@ -9,6 +9,8 @@ mod saved;
 mod self_test;
 mod step;
 
+use core::fmt;
+
 use self::playback::Playback;
 use crate::arena::part;
 use crate::cursor::Cursor;
@@ -16,7 +18,6 @@ use crate::error::HeadError;
 use crate::image::{Image, Region};
 
 /// A head: an image and the scratch memory that it runs in.
-#[derive(Debug)]
 pub struct Head<'a, 's> {
     image: Image<'a>,
     arena: &'s mut [u32],
@@ -30,6 +31,18 @@ pub struct Head<'a, 's> {
     seed: u32,
     /// Evaluations since the reset that generated noise.
     draws: u32,
+}
+
+/// Not its memory, which a log must not be filled with.
+impl fmt::Debug for Head<'_, '_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { image, phase, playback, .. } = self;
+        f.debug_struct("Head")
+            .field("image", image)
+            .field("phase", phase)
+            .field("playback", playback)
+            .finish_non_exhaustive()
+    }
 }
 
 /// Progress of a step in the arena.

@@ -59,16 +59,17 @@ impl Head<'_, '_> {
 
     /// Runs a slice of the step that has begun: at most `budget` instructions by the cost model
     /// ([`crate::Image::step_cost`]). It returns the action as soon as it is ready. Without a step that has begun, it
-    /// returns the last action again, and fails if there is none since the start or a reset. A step that continues a
-    /// chunk has little to do and is ready at the first poll. A budget of 2^28 or more is no limit.
+    /// returns the last action again, however old, and fails if there is none since the start, a reset or an error. A
+    /// step that continues a chunk has little to do and is ready at the first poll. A budget of 2^28 or more is no
+    /// limit.
     ///
     /// The cost model is that of the build for thumbv7em-none-eabihf; on other targets a step is cut in the same
     /// places. However a step is cut, its bits are the same.
     ///
     /// # Errors
     ///
-    /// [`StepError::Budget`] if `budget` is below [`crate::Image::least_budget`], and [`StepError::NotBegun`]; both
-    /// change nothing. All others are those of [`Self::step`].
+    /// [`StepError::Budget`] if `budget` is below [`crate::Image::least_budget`] (after the first [`Self::begin`]), and
+    /// [`StepError::NotBegun`]; both change nothing. All others are those of [`Self::step`].
     pub fn poll(&mut self, budget: u32) -> Result<Poll<&[f32]>, StepError> {
         self.poll_until(budget, false)
     }

@@ -67,11 +67,11 @@ impl<'a> Image<'a> {
     /// Checks the bytes as a whole: alignment, header, checksum.
     #[inline(always)]
     pub(super) fn whole(bytes: &'a [u8]) -> Result<Self, ImageError> {
-        if bytes.as_ptr().align_offset(4) != 0 {
-            return Err(ImageError::Misaligned);
-        }
         if bytes.len() < h::WORDS * 4 {
             return Err(ImageError::TooShort);
+        }
+        if bytes.as_ptr().align_offset(4) != 0 {
+            return Err(ImageError::Misaligned);
         }
         let words: &[u32] = bytemuck::try_cast_slice(bytes).map_err(|_| ImageError::Length)?;
         let image = Self { words, header: Words(words.first_chunk().ok_or(ImageError::TooShort)?) };

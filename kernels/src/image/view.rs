@@ -1,14 +1,23 @@
 //! A checked image and its header fields.
 
+use core::fmt;
+
 use super::header::{self as h, Kind, Words};
 use super::region::Region;
 use super::words::{section, word};
 
 /// A checked image.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Image<'a> {
     pub(super) words: &'a [u32],
     pub(super) header: Words<'a>,
+}
+
+/// Not its content, which a log must not be filled with.
+impl fmt::Debug for Image<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Image").field("name", &self.name()).field("bytes", &self.bytes()).finish_non_exhaustive()
+    }
 }
 
 impl<'a> Image<'a> {

@@ -23,7 +23,9 @@ pub fn mul(x: &[f32], y: &mut [f32]) {
 #[inline(always)]
 fn in_pairs(x: &[f32], y: &mut [f32], of: impl Fn(f32, f32) -> f32) {
     let len = x.len().min(y.len());
-    let ((x, xs), (y, ys)) = (x[..len].as_rchunks::<2>(), y[..len].as_rchunks_mut::<2>());
+    // Not by indexing, whose panic some builds keep.
+    let (Some(x), Some(y)) = (x.get(..len), y.get_mut(..len)) else { return };
+    let ((x, xs), (y, ys)) = (x.as_rchunks::<2>(), y.as_rchunks_mut::<2>());
     if let ([y], [x]) = (y, x) {
         *y = of(*y, *x);
     }

@@ -78,7 +78,8 @@ impl Budget {
     #[inline(never)]
     fn take_priced(&mut self, units: usize, PieceCost { first, each }: PieceCost) -> usize {
         let Some(room) = self.left.checked_sub(first) else { return 0 };
-        let units = units.min((room / each) as usize);
+        // A piece without a price fits any room. (A plain division would keep a panic in programs without LTO.)
+        let units = units.min(room.checked_div(each).unwrap_or(u32::MAX) as usize);
         if units > 0 {
             self.left = room - each * units as u32;
         }
