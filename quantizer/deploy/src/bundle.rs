@@ -75,6 +75,11 @@ impl Bundle {
         &self.root
     }
 
+    /// Returns the files, by their paths from the root, in alphabetical order.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        self.files.iter().map(String::as_str)
+    }
+
     /// Returns `true` if the bundle has this file, by its path from the root.
     pub fn has(&self, file: &str) -> bool {
         self.files.iter().any(|own| own == file)
@@ -83,7 +88,7 @@ impl Bundle {
     /// Returns the files with an extension.
     pub fn with_ending<'a>(&'a self, ending: &'a str) -> impl Iterator<Item = &'a str> + 'a {
         let ends = move |file: &&str| Path::new(file).extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
-        self.files.iter().map(String::as_str).filter(ends)
+        self.files().filter(ends)
     }
 
     /// Returns the file whose path is, or ends in, `name`; `None` if there is none.

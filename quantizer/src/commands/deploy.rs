@@ -1,5 +1,6 @@
 //! `actq deploy`
 
+use std::collections::BTreeSet;
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,8 +9,8 @@ use std::process::{Command, Stdio};
 use actq::data::files_of;
 use actq::methods::{Effort, Method};
 use actq::runtime::ImageBuffer;
-use actq_deploy::DESCRIPTION;
 use actq_deploy::description::Description;
+use actq_deploy::{Bundle, DESCRIPTION};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::{bundle, check, constants, quantize};
@@ -23,6 +24,12 @@ const DEFAULT_MINUTES: f64 = 6.0;
 const POLICY: &str = "policy";
 const MADE_WITH: &str = "policy.actq.txt";
 const IMAGE: &str = "policy.actq";
+/// Endings of the files of constants.
+const CONSTANTS: [&str; 2] = ["rs", "h"];
+/// Checksums of the bundle's files at its import.
+const IMPORTED: &str = "policy.bundle.txt";
+/// Most files that differ and are named.
+const MOST_NAMED: usize = 4;
 
 /// Imports a bundle, checks it, quantizes it, checks the image, and builds firmware. Results of an earlier run with the
 /// same options are kept.
@@ -49,7 +56,7 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
     }
     step(4, "constants")?;
     let gains = has_gains(&description)?.then_some(description);
-    for ending in ["rs", "h"] {
+    for ending in CONSTANTS {
         let out = image.with_extension(ending);
         constants::run(&ConstantsArgs { image: image.clone(), out, gains: gains.clone() })?;
     }
@@ -63,11 +70,15 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
 /// Imports the bundle, or checks the description that an earlier run has written.
 fn import_bundle(args: &DeployArgs, policy: &Path, description: &Path) -> Result<()> {
     let only_reference = args.recordings.is_empty();
+    let (record, checksums) = (args.out.join(IMPORTED), checksums(&args.bundle)?);
     let raw = args.reading.reference.as_ref().map(|(raw, _)| raw.clone());
     if description.exists() {
         // It may have been edited.
         print(&format!("{}: kept; remove the folder to import the bundle again\n", description.display()))?;
-        bundle::check_kept(&args.bundle, policy, &args.reading)?;
+        bundle::check_kept(policy, &args.reading)?;
+        if let Ok(imported) = fs::read_to_string(&record) {
+            check_imported(args, policy, &imported, &checksums)?;
+        }
     } else {
         bundle::run(&ImportArgs {
             model: args.bundle.clone(),
@@ -79,12 +90,42 @@ fn import_bundle(args: &DeployArgs, policy: &Path, description: &Path) -> Result
             reading: args.reading.clone(),
             force: false,
         })?;
+        fs::write(&record, checksums).with_context(|| format!("{}: cannot write the file", record.display()))?;
     }
     if only_reference {
         note(["the policy learns from the raw inputs of --reference: too little for a robot; pass recordings of its task by \
                --recordings"
             .to_owned()]);
     }
+    Ok(())
+}
+
+/// Returns a line with the checksum of each file of a bundle.
+fn checksums(bundle: &Path) -> Result<String> {
+    let files = Bundle::open(bundle)?;
+    let mut text = String::new();
+    for file in files.files() {
+        let path = files.path(file)?;
+        let bytes = fs::read(&path).with_context(|| format!("{}: cannot read the file", path.display()))?;
+        text += &format!("{:08x} {file}\n", actq_kernels::image::checksum(&bytes));
+    }
+    Ok(text)
+}
+
+/// Refuses a bundle of other files than those that the kept description was made of.
+fn check_imported(args: &DeployArgs, policy: &Path, imported: &str, checksums: &str) -> Result<()> {
+    let [before, now]: [BTreeSet<&str>; 2] = [imported, checksums].map(|text| text.lines().collect());
+    let names: BTreeSet<&str> =
+        before.symmetric_difference(&now).filter_map(|line| Some(line.split_once(' ')?.1)).collect();
+    let named: Vec<&str> = names.iter().copied().take(MOST_NAMED).collect();
+    let more = if names.len() > MOST_NAMED { " and others" } else { "" };
+    ensure!(
+        names.is_empty(),
+        "{}: has changed since {} was made of it: {}{more}; remove {1} to import the bundle again, or choose another --out",
+        args.bundle.display(),
+        policy.display(),
+        named.join(", ")
+    );
     Ok(())
 }
 
@@ -95,6 +136,13 @@ fn quantize_policy(args: &DeployArgs, policy: &Path, image: &Path, made_with: &s
         return print(&format!("{}: made before with the same options\n", image.display()));
     }
     quantize::run(&quantize_args(args, policy, image), Some(Method::Distill), |_, _| String::new())?;
+    // Those of the image before, should the check of this one fail.
+    let firmware = args.board.iter().map(|board| args.out.join(format!("{board}.elf")));
+    for stale in CONSTANTS.map(|ending| image.with_extension(ending)).into_iter().chain(firmware) {
+        if stale.exists() {
+            fs::remove_file(&stale).with_context(|| format!("{}: cannot remove the file", stale.display()))?;
+        }
+    }
     fs::write(record, made_with).context("cannot write the options")
 }
 

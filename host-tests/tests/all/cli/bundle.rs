@@ -234,11 +234,20 @@ fn deploy_makes_everything_and_keeps_what_is_made() -> Result<()> {
     let gone = text(&robot.path("gone"));
     failed(&run(actq(&[&["deploy", &gone], &line[2..]].concat()), b"")?, 1, &["gone"])?;
     failed(&run(actq(&[&line[..], &["--max-nmse", "1"]].concat()), b"")?, 2, &["--reference"])?;
+    // A bundle that has changed is not taken for the one that was imported.
+    let yaml = robot.path("bundle/deploy.yaml");
+    let before = fs::read_to_string(&yaml)?;
+    fs::write(&yaml, before.clone() + "\n")?;
+    let remedy = "deploy.yaml; remove";
+    failed(&run(actq(&all), b"")?, 1, &["has changed since", remedy, "import the bundle again"])?;
+    fs::write(&yaml, before)?;
     // Another option makes another image.
     let report = succeeded(&run(actq(&[&all[..], &["--bpw", "20"]].concat()), b"")?)?;
     ensure!(!report.contains("made before") && fs::read(robot.path("deployed/policy.actq"))? != image, "{report}");
-    let exact = run(actq(&[&all[..], &["--bpw", "20", "--max-nmse", "1e-12"]].concat()), b"")?;
-    failed(&exact, 1, &["quantize at more bits"])
+    let exact = run(actq(&[&all[..], &["--bpw", "19", "--max-nmse", "1e-12"]].concat()), b"")?;
+    failed(&exact, 1, &["quantize at more bits"])?;
+    ensure!(!robot.path("deployed/policy.h").exists(), "the constants of another image stay");
+    Ok(())
 }
 
 #[test]
