@@ -192,8 +192,9 @@ pub(crate) enum Command {
     ///
     /// With --record, the observations go into a recording that `actq quantize --calib` learns from and `actq eval
     /// --driven` measures on, labelled by the f32 policy. An episode begins at "R" and after a reply without an action.
-    /// The command replaces the file as a whole while the policy runs: a process that is killed loses about the last
-    /// twentieth. It never overwrites a file of an earlier run.
+    /// The command replaces the file as a whole while the policy runs: a process that is killed by signal 9 loses about
+    /// the last twentieth, or up to 256 frames of a short recording; other signals lose none. It never overwrites a file
+    /// of an earlier run.
     ///
     /// Example: actq serve ur3.actq --record drive.npz --policy policies/ur3
     Serve(ServeArgs),

@@ -253,6 +253,21 @@ fn a_killed_recorder_keeps_earlier_observations() -> Result<()> {
     Ok(())
 }
 
+/// As by a simulator that terminates its policy.
+#[cfg(unix)]
+#[test]
+fn a_terminated_recorder_keeps_all_observations() -> Result<()> {
+    let fixture = Fixture::new(Network::Lstm)?;
+    let observations = draw(6, 30);
+    let mut child = serve(&fixture, "serve image.actq --record drive.npz --policy policy")?;
+    show(&mut child, &observations)?;
+    std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status()?;
+    let status = child.wait()?;
+    ensure!(status.code() == Some(143), "{status}");
+    assert_eq!(episodes(&fixture.recording("drive.npz")?).concat(), observations);
+    Ok(())
+}
+
 #[test]
 fn recorders_with_one_name_use_separate_files() -> Result<()> {
     let fixture = Fixture::new(Network::Chunk)?;

@@ -10,6 +10,8 @@ use anyhow::{Result, ensure};
 
 use crate::args::ServeArgs;
 use crate::importers::load;
+#[cfg(unix)]
+use crate::interrupts::{EndsItself, Input};
 use crate::serve::{RecordPlan, serve, serve_recorded};
 use crate::terminal::note;
 
@@ -17,13 +19,13 @@ use crate::terminal::note;
 pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
-    let (input, output) = (io::stdin().lock(), io::stdout().lock());
+    let output = io::stdout().lock();
     // The variable is set for every command of a rollout.
     let is_option =
         args.policy.as_ref().is_some_and(|policy| env::var_os("ACTQ_POLICY").is_none_or(|of| of != **policy));
     let Some(path) = &args.record else {
         ensure!(!is_option, "--policy labels the recording of --record FILE.npz; add that, or remove --policy");
-        return serve(image, input, output, |_| {});
+        return serve(image, io::stdin().lock(), output, |_| {});
     };
     ensure!(
         !is_option || !image.has_around(),
@@ -42,6 +44,11 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
         ]);
     }
     let plan = RecordPlan { path, source: source.as_ref().filter(|_| is_labelled) };
+    // A signal ends the input, and the recording is written.
+    #[cfg(unix)]
+    let (_ends_itself, input) = (EndsItself::begin(), Input::stdin());
+    #[cfg(not(unix))]
+    let input = io::stdin().lock();
     serve_recorded(image, plan, input, output, |text| note([text]))
 }
 
