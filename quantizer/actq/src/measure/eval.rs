@@ -254,7 +254,7 @@ pub fn fill_actions(dataset: &mut Dataset, source: Option<&Policy>) -> Result<()
     if dataset.action.is_none() {
         let source = source.with_context(|| {
             format!(
-                "{}: array \"action\" is missing, and no policy is given that could compute it: \
+                "{}: array \"action\" is missing, and the policy that the image was made from is not given: \
                  name its folder with --policy",
                 dataset.path.display()
             )

@@ -116,8 +116,9 @@ impl Draft<'_> {
         let TimeLimit { milliseconds, clock_hz, .. } = self.limit;
         ensure!(
             fastest <= milliseconds,
-            "the limit is {milliseconds} ms, but the fastest step takes {fastest:.3} ms at {} MHz",
-            clock_hz / 1e6
+            "the limit is {milliseconds} ms, but the fastest step takes {fastest:.4} ms at {} MHz; allow {:.3} ms or more",
+            clock_hz / 1e6,
+            (1e3 * fastest).ceil() / 1e3
         );
         Ok(())
     }
