@@ -86,7 +86,7 @@ enum actq_code {
   ACTQ_IMAGE_AROUND = 31,
   /** raw inputs or targets have impossible lengths, names, kinds or ranges */
   ACTQ_IMAGE_PORTS = 32,
-  /** the image needs a feature of the kernels that this build leaves out */
+  /** the image needs a feature of the kernels that this build leaves out; actq inspect lists them */
   ACTQ_IMAGE_LEFT_OUT = 33,
   /** scratch memory is too small for the image */
   ACTQ_SCRATCH_TOO_SMALL = 64,

@@ -101,7 +101,7 @@ codes! {
     /// The image: raw inputs or targets have impossible lengths, names, kinds or ranges.
     ImagePorts = 32, c"raw inputs or targets have impossible lengths, names, kinds or ranges";
     /// The image: it needs a feature of the kernels that this build leaves out.
-    ImageLeftOut = 33, c"the image needs a feature of the kernels that this build leaves out";
+    ImageLeftOut = 33, c"the image needs a feature of the kernels that this build leaves out; actq inspect lists them";
     /// Too few words of scratch memory.
     ScratchTooSmall = 64, c"scratch memory is too small for the image";
     /// The length differs from that of the image's state.

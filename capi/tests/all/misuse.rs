@@ -190,7 +190,7 @@ fn damaged_images_and_infinite_values_are_errors() {
         actq_image_open(image, damaged.0.as_ptr(), damaged.0.len()) => ImageChecksum;
         actq_image_open_checksummed(image, damaged.0.as_ptr(), damaged.0.len()) => ImageChecksum;
         actq_image_open_checksummed(image, BYTES.0.as_ptr(), 4) => ImageTooShort;
-        actq_image_open(image, BYTES.0.as_ptr().wrapping_add(1), 64) => ImageMisaligned;
+        actq_image_open(image, BYTES.0.as_ptr().wrapping_add(1), BYTES.0.len() - 1) => ImageMisaligned;
         actq_image_open(image, BYTES.0.as_ptr(), 4) => ImageTooShort;
     }
     assert!(action.iter().all(|value| *value == 7.0));
