@@ -10,7 +10,7 @@ use actq_kernels::ops::denoise::Coefficients;
 use super::builder::{Attribute, Builder, Data, Network, Value};
 
 /// Returns the network of an image with scale, offset and limits of its actions. Denoising steps follow each other.
-/// What the contract does from step to step (step limits, smoothing, switches, playback) is not part of it.
+/// Work of the contract from step to step (step limits, smoothing, switches, playback) is not part of it.
 ///
 /// # Errors
 ///
