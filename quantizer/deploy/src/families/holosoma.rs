@@ -8,7 +8,7 @@ use actq_onnx::Signature;
 
 use super::common::action::{add_zero, clip, fed_back, padded};
 use super::common::terms::given;
-use super::common::{Histories, Parts, given_gravity};
+use super::common::{Histories, Parts, Ports, given_gravity};
 use crate::bundle::Bundle;
 use crate::description::{Clock, Description, Gains, Op, Operand, Standing, TargetKind, When};
 use crate::document::Document;
@@ -79,7 +79,7 @@ impl Family for Holosoma {
         let gains = gains(metadata, joints.len())?;
         let n = joints.len();
         let kind = if signature.inputs.iter().any(|(name, _)| name == "time_step") { TRACKING } else { LOCOMOTION };
-        let ports = Ports::find(file, &signature)?;
+        let ports = ports(file, &signature)?;
         // A graph whose axes are all dynamic has no fixed lengths.
         let action_len = ports.action_len.filter(|len| *len > 1).unwrap_or(n);
         if action_len > n {
@@ -146,28 +146,19 @@ fn gains(metadata: &Document, n: usize) -> Result<Gains> {
     Ok(Gains { joints: Some("robot".to_owned()), stiffness, damping })
 }
 
-/// The observation's input and the action's output, with their lengths if known.
+/// Finds the observation's input and the action's output.
 ///
 /// A tracking policy's file also has inputs and outputs of the motion, which its action does not depend on.
-struct Ports {
-    input: String,
-    output: String,
-    observation_len: Option<usize>,
-    action_len: Option<usize>,
-}
-
-impl Ports {
-    fn find(file: &str, signature: &Signature) -> Result<Self> {
-        let find = |names: [&str; 2], ports: &[(String, Option<usize>)]| match ports {
-            [one] => Some(one.clone()),
-            several => several.iter().find(|(name, _)| names.contains(&name.as_str())).cloned(),
-        };
-        let input = find(["actor_obs", "obs"], &signature.inputs);
-        let output = find(["action", "actions"], &signature.outputs);
-        let (input, observation_len) = input.with_context(|| format!("{file}: it has no input actor_obs or obs"))?;
-        let (output, action_len) = output.with_context(|| format!("{file}: it has no output action or actions"))?;
-        Ok(Self { input, output, observation_len, action_len })
-    }
+fn ports(file: &str, signature: &Signature) -> Result<Ports> {
+    let find = |names: [&str; 2], ports: &[(String, Option<usize>)]| match ports {
+        [one] => Some(one.clone()),
+        several => several.iter().find(|(name, _)| names.contains(&name.as_str())).cloned(),
+    };
+    let input = find(["actor_obs", "obs"], &signature.inputs);
+    let output = find(["action", "actions"], &signature.outputs);
+    let (input, observation_len) = input.with_context(|| format!("{file}: it has no input actor_obs or obs"))?;
+    let (output, action_len) = output.with_context(|| format!("{file}: it has no output action or actions"))?;
+    Ok(Ports { input, output, observation_len, action_len })
 }
 
 /// Parses the texts of metadata, which are JSON and so YAML. What cannot be parsed stays a text.

@@ -16,7 +16,7 @@ use actq_onnx::Signature;
 
 use self::reader::Reader;
 use self::robot::Robot;
-use super::common::Parts;
+use super::common::{Parts, Ports};
 use crate::bundle::Bundle;
 use crate::description::Description;
 use crate::document::Document;
@@ -66,7 +66,7 @@ impl Family for Humanoidverse {
             yaml.file
         );
         let file = network(yaml, &found.networks, facts)?;
-        let ports = Ports::read(bundle, &file)?;
+        let ports = ports(bundle, &file)?;
         let rate = rate(yaml, facts)?;
         let mut reader = Reader {
             yaml,
@@ -100,34 +100,25 @@ impl Family for Humanoidverse {
     }
 }
 
-/// The input and the output of a network, with their lengths if these are fixed.
-struct Ports {
-    input: String,
-    output: String,
-    observation_len: Option<usize>,
-    action_len: Option<usize>,
-}
-
-impl Ports {
-    fn read(bundle: &Bundle, file: &str) -> Result<Self> {
-        let signature = Signature::read(&bundle.path(file)?)?;
-        let input = match &signature.inputs[..] {
-            [one] => Some(one),
-            several => several.iter().find(|(name, _)| name == "actor_obs"),
-        };
-        let (input, observation_len) = input.with_context(|| format!("{file}: it has no input actor_obs"))?;
-        // The deploy code reads the first output only.
-        let output = signature.outputs.first();
-        let (output, action_len) = output.with_context(|| format!("{file}: it has no output"))?;
-        // A graph whose axes are all dynamic has no fixed lengths.
-        let fixed_len = |len: &Option<usize>| len.filter(|len| *len > 1);
-        Ok(Self {
-            input: input.clone(),
-            output: output.clone(),
-            observation_len: fixed_len(observation_len),
-            action_len: fixed_len(action_len),
-        })
-    }
+/// Reads the observation's input and the action's output of a network.
+fn ports(bundle: &Bundle, file: &str) -> Result<Ports> {
+    let signature = Signature::read(&bundle.path(file)?)?;
+    let input = match &signature.inputs[..] {
+        [one] => Some(one),
+        several => several.iter().find(|(name, _)| name == "actor_obs"),
+    };
+    let (input, observation_len) = input.with_context(|| format!("{file}: it has no input actor_obs"))?;
+    // The deploy code reads the first output only.
+    let output = signature.outputs.first();
+    let (output, action_len) = output.with_context(|| format!("{file}: it has no output"))?;
+    // A graph whose axes are all dynamic has no fixed lengths.
+    let fixed_len = |len: &Option<usize>| len.filter(|len| *len > 1);
+    Ok(Ports {
+        input: input.clone(),
+        output: output.clone(),
+        observation_len: fixed_len(observation_len),
+        action_len: fixed_len(action_len),
+    })
 }
 
 /// Returns the ticks a second.

@@ -58,3 +58,12 @@ pub(crate) fn metadata_document(file: &str, metadata: &BTreeMap<String, String>)
     let data = Data::Map(metadata.iter().map(entry).collect());
     Document::of(&format!("{file} metadata"), Node { line: 1, data })
 }
+
+/// The input of the observation and the output of the action, with their lengths if known.
+#[derive(Debug)]
+pub(crate) struct Ports {
+    pub(crate) input: String,
+    pub(crate) output: String,
+    pub(crate) observation_len: Option<usize>,
+    pub(crate) action_len: Option<usize>,
+}
