@@ -6,6 +6,7 @@ mod agreement;
 pub mod args;
 mod check;
 pub mod commands;
+mod ending;
 mod group;
 pub mod importers;
 #[cfg(unix)]
@@ -45,8 +46,7 @@ pub fn run_work(work: impl FnOnce() -> Result<()>) -> ExitCode {
     let outcome = work();
     // If a signal ends the process, the signal decides the exit status.
     let _held = unfinished::hold();
-    #[cfg(unix)]
-    if let (Ok(()), Some(signal)) = (&outcome, interrupts::told()) {
+    if let (Ok(()), Some(signal)) = (&outcome, ending::told()) {
         eprintln!("actq: interrupted");
         return ExitCode::from(128 + signal as u8);
     }

@@ -21,8 +21,7 @@ use anyhow::{Context as _, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::link::{LinkArgs, LinkCommand, PortArgs, PushArgs, StreamArgs};
-#[cfg(unix)]
-use crate::interrupts::{self, EndsItself};
+use crate::ending::{self, EndsItself, Input};
 use crate::report::notes;
 use crate::terminal::{Progress, note, print, reserve};
 
@@ -89,11 +88,8 @@ fn watch(port: &PortArgs, once: bool) -> Result<()> {
 
 /// A signal ends the input, after which the controller is disarmed.
 fn run_serve(port: &PortArgs, arm: bool) -> Result<()> {
-    #[cfg(unix)]
-    let (_ends_itself, input) = (EndsItself::begin(), interrupts::Input::stdin());
-    #[cfg(not(unix))]
-    let input = io::stdin().lock();
-    serve::serve(&mut connect(port)?, arm, input, io::stdout().lock())
+    let mut input = Input::stdin();
+    serve::serve(&mut connect(port)?, arm, &mut input, io::stdout().lock())
 }
 
 fn run_stream(args: &StreamArgs) -> Result<()> {
@@ -112,18 +108,11 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     let rate = args.rate.unwrap_or(f64::from(image.rate_hz()));
     let pace = Pace { period: Duration::from_secs_f64(1.0 / rate), arm: args.arm };
     // A signal ends the observations: the controller is disarmed, and the log written.
-    #[cfg(unix)]
     let _ends_itself = EndsItself::begin();
-    let is_interrupted = || {
-        #[cfg(unix)]
-        return interrupts::told().is_some();
-        #[cfg(not(unix))]
-        return false;
-    };
     let (progress, mut log) = (Progress::new(false, "streaming")?, Log::default());
     let frames = recording.frames();
     let observations =
-        recording.observations().take_while(|_| !is_interrupted()).enumerate().map(|(i, observation)| {
+        recording.observations().take_while(|_| ending::told().is_none()).enumerate().map(|(i, observation)| {
             progress.set_share(i as f64 / frames as f64);
             // The noise of an iterative head follows the observation; the controller makes its own.
             observation.iter().take(image.obs_len()).copied().collect()

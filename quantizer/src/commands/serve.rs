@@ -9,9 +9,8 @@ use actq_kernels::Image;
 use anyhow::{Result, ensure};
 
 use crate::args::ServeArgs;
+use crate::ending::Input;
 use crate::importers::load;
-#[cfg(unix)]
-use crate::interrupts::{EndsItself, Input};
 use crate::serve::{RecordPlan, serve, serve_recorded};
 use crate::terminal::note;
 
@@ -45,11 +44,8 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     }
     let plan = RecordPlan { path, source: source.as_ref().filter(|_| is_labelled) };
     // A signal ends the input, and the recording is written.
-    #[cfg(unix)]
-    let (_ends_itself, input) = (EndsItself::begin(), Input::stdin());
-    #[cfg(not(unix))]
-    let input = io::stdin().lock();
-    serve_recorded(image, plan, input, output, |text| note([text]))
+    let mut input = Input::stdin();
+    serve_recorded(image, plan, &mut input, output, |text| note([text]))
 }
 
 /// Loads the policy that the image was made from.
