@@ -221,7 +221,7 @@ impl Client {
         self.request(&Message::Disarm)?.1.context("not disarmed")
     }
 
-    /// Sends a request that is valid in any state with the current token.
+    /// Sends a request that may be repeated, with the current token, until the token is accepted or the time is over.
     pub(crate) fn change<'m>(&mut self, message: impl Fn(u32) -> Message<'m>) -> Result<Result<(), Refusal>> {
         self.change_unless(message, |_, _| Ok(false))
     }

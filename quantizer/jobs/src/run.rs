@@ -19,9 +19,8 @@ use crate::job::{Job, version};
 use crate::record::{FORMAT, Outcome, Record};
 use crate::store::Store;
 use crate::work::{self, Work};
-pub use merge::merge;
-
 use inputs::{Kept, check_inputs, heldout, image, path_of};
+pub use merge::merge;
 
 /// Runs a job and writes its result into the store. Returns `false` if the store has the result already. `watch`
 /// receives the present work and the share of it that is done.

@@ -105,11 +105,14 @@ fn checksums(bundle: &Path) -> Result<String> {
     let files = Bundle::open(bundle)?;
     let mut text = String::new();
     for file in files.files() {
-        let path = files.path(file)?;
-        let bytes = fs::read(&path).with_context(|| format!("{}: cannot read the file", path.display()))?;
-        text += &format!("{:08x} {file}\n", actq_kernels::image::checksum(&bytes));
+        text += &format!("{:08x} {file}\n", checksum(&files.path(file)?)?);
     }
     Ok(text)
+}
+
+fn checksum(file: &Path) -> Result<u32> {
+    let bytes = fs::read(file).with_context(|| format!("{}: cannot read the file", file.display()))?;
+    Ok(actq_kernels::image::checksum(&bytes))
 }
 
 /// Refuses a bundle of other files than those that the kept description was made of.
@@ -187,8 +190,7 @@ fn made_with(args: &DeployArgs) -> Result<String> {
         false => files_of(&args.recordings)?,
     };
     for file in files {
-        let bytes = fs::read(&file).with_context(|| format!("{}: cannot read the file", file.display()))?;
-        text += &format!("{} {:08x}\n", file.display(), actq_kernels::image::checksum(&bytes));
+        text += &format!("{} {:08x}\n", file.display(), checksum(&file)?);
     }
     Ok(text)
 }
