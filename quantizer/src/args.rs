@@ -15,7 +15,7 @@ pub(crate) use image::{ConstantsArgs, EvalArgs, ExportCArgs, InspectArgs, ServeA
 use jobs::{JobArgs, MergeArgs, PlanArgs};
 use link::{KeygenArgs, LinkArgs, SignArgs};
 pub use quantize::QuantizeArgs;
-pub(crate) use quantize::{ActivationArg, BudgetArgs, DistillArgs, LearnArgs, MethodArg, TuneArgs};
+pub(crate) use quantize::{ActivationArg, DistillArgs, LearnArgs, MethodArg, TuneArgs};
 pub use sweep::SweepArgs;
 
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.

@@ -432,6 +432,27 @@ fn tune_drives_and_learns_again() -> Result<()> {
 }
 
 #[test]
+fn tune_keeps_budgets_of_bytes_and_time() -> Result<()> {
+    const LIMIT: usize = 4096;
+    let fixture = Fixture::new(Network::Chunk)?;
+    let drive = driver(&fixture)?;
+    let run_with = |budget: String| -> Result<Output> {
+        let mut command = fixture.command(&format!("tune policy {budget} --steps 8 --out tuned.actq --drive"));
+        command.arg(&drive);
+        run(command, b"")
+    };
+    failed(&run_with("--flash 100".to_owned())?, 1, &["the budget is too small", "the limit is 100"])?;
+    ensure!(!fixture.path("answers").exists(), "a budget is refused before the first rollout");
+    succeeded(&run_with(format!("--flash {LIMIT}"))?)?;
+    let size = fs::metadata(fixture.path("tuned.actq"))?.len() as usize;
+    ensure!((LIMIT / 2..=LIMIT).contains(&size), "{size} bytes");
+    let table = succeeded(&run_with(format!("--flash {LIMIT} --ms 1"))?)?;
+    let row: Vec<&str> = table.lines().nth(1).context("a row")?.split_whitespace().collect();
+    ensure!(row[3].parse::<usize>()? <= LIMIT && row[4].parse::<f64>()? <= 1.0, "{table}");
+    Ok(())
+}
+
+#[test]
 fn a_failed_drive_is_reported_and_writes_nothing() -> Result<()> {
     let fixture = Fixture::new(Network::Chunk)?;
     let drive = driver(&fixture)?;

@@ -1,6 +1,8 @@
 //! Statistics of a network over recorded observations, collected before anything is quantized.
 
 pub mod allowance;
+mod dynamics;
+pub mod imagined;
 pub mod moments;
 pub mod sensitivity;
 pub mod widening;

@@ -12,6 +12,7 @@ mod quantized;
 pub mod scale;
 
 pub use crate::calibrate::allowance::Sampled;
+pub use crate::calibrate::imagined::Imagined;
 pub use learning::{Choice, Learning, Recipe, Tried};
 pub use options::{CustomMethod, CustomStatistics, Effort, MOST_MINUTES, Method, Options};
 pub use packing::{Activations, Packing};

@@ -118,16 +118,42 @@ pub(crate) fn outputs(graph: &Graph) -> Vec<Vec<f32>> {
 /// Makes random observations with the network's own actions.
 pub(crate) fn dataset(graph: &Graph, episodes: usize, steps: usize) -> Dataset {
     let mut random = Random::new(3);
-    let obs = Array3::from_shape_fn((episodes, steps, graph.obs_len), |_| random.unit());
+    recorded(graph, episodes, steps, |_, _| (0..graph.obs_len).map(|_| random.unit()).collect())
+}
+
+/// Records a robot that the network drives: every value of the observation follows an action slowly, but the last one
+/// is the first one of the step before.
+pub(crate) fn driven(graph: &Graph, episodes: usize, steps: usize) -> Dataset {
+    let mut random = Random::new(4);
+    let last = graph.obs_len - 1;
+    recorded(graph, episodes, steps, |before, action| {
+        let Some(before) = before else { return (0..graph.obs_len).map(|_| random.normal()).collect() };
+        let mut next: Vec<f32> = before.iter().map(|x| 0.9 * x + 0.1 * random.normal()).collect();
+        next.iter_mut().zip(action.iter().cycle()).for_each(|(x, action)| *x += 0.2 * action);
+        next[last] = before[0];
+        next
+    })
+}
+
+/// Records the network's actions on episodes of observations: `next` gives the first one, and the one after an
+/// observation and its action.
+fn recorded(
+    graph: &Graph,
+    episodes: usize,
+    steps: usize,
+    mut next: impl FnMut(Option<&[f32]>, &[f32]) -> Vec<f32>,
+) -> Dataset {
+    let mut obs = Array3::zeros((episodes, steps, graph.obs_len));
     let mut action = Array3::zeros((episodes, steps, graph.len_of(graph.output())));
     let mut evaluator = Evaluator::new(graph);
     for episode in 0..episodes {
         evaluator.reset();
+        let (mut x, mut y) = (Vec::new(), Vec::new());
         for step in 0..steps {
-            let x: Vec<f32> = (0..graph.obs_len).map(|i| obs[(episode, step, i)]).collect();
-            for (i, y) in evaluator.step(&x, &mut |_, _| {}).into_iter().enumerate() {
-                action[(episode, step, i)] = y;
-            }
+            x = next((step > 0).then_some(&x[..]), &y);
+            y = evaluator.step(&x, &mut |_, _| {});
+            x.iter().enumerate().for_each(|(i, x)| obs[(episode, step, i)] = *x);
+            y.iter().enumerate().for_each(|(i, y)| action[(episode, step, i)] = *y);
         }
     }
     Dataset { path: "test".into(), obs, action: Some(action), length: vec![steps; episodes], state: None }

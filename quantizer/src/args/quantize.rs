@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use actq::budget::{Budget, TimeLimit};
 use actq::methods::{Effort, Method};
 use actq_kernels::Width;
 use anyhow::{Result, bail};
@@ -78,6 +79,19 @@ pub(crate) struct BudgetArgs {
     pub(crate) clock: f64,
 }
 
+impl BudgetArgs {
+    /// Returns the budget: 3 bits for every weight if none is given.
+    pub(crate) fn budget(&self) -> Budget {
+        let Self { bits, bpw, flash, ms, clock } = *self;
+        let limits = [
+            bpw.map(Budget::BitsPerWeight),
+            ms.map(|milliseconds| Budget::Time(TimeLimit { milliseconds, clock_hz: clock, image_bytes: flash })),
+            flash.map(Budget::ImageBytes),
+        ];
+        limits.into_iter().flatten().next().unwrap_or(Budget::Width(bits.unwrap_or(Width::W3)))
+    }
+}
+
 #[derive(clap::Args)]
 pub(crate) struct TuneArgs {
     /// The policy folder
@@ -91,12 +105,8 @@ pub(crate) struct TuneArgs {
     /// On-policy rounds, 1 to 100
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = rounds)]
     pub(crate) rounds: usize,
-    /// Bits per weight of all weights, with scales and padding
-    #[arg(long, value_name = "X", value_parser = positive)]
-    pub(crate) bpw: Option<f64>,
-    /// Bits of every weight: 2, 3, 4 or 8 [default: 3]
-    #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
-    pub(crate) bits: Option<Width>,
+    #[command(flatten)]
+    pub(crate) budget: BudgetArgs,
     /// A recording of the f32 policy: .npz, .npy or .safetensors, or a folder of them; may be repeated [default:
     /// calib.* in POLICY_DIR]
     #[arg(long, value_name = "FILE|DIR")]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use actq::budget::{Budget, TimeLimit};
+use actq::budget::Budget;
 use actq::data::{Recording, Recordings, Share, Sizes, driven_by, files_of};
 use actq::measure::time::{CLOCK, StepTime};
 use actq::measure::{check, own};
@@ -15,7 +15,7 @@ use actq::runtime::ImageBuffer;
 use actq_kernels::Width;
 use anyhow::{Result, bail};
 
-use crate::args::{ActivationArg, BudgetArgs, QuantizeArgs};
+use crate::args::{ActivationArg, QuantizeArgs};
 use crate::importers::{learned as learned_from, load, policy_files};
 use crate::outputs::files::refuse_foreign;
 use crate::report::learned::learned;
@@ -88,7 +88,9 @@ fn report(
 ) -> Result<()> {
     let search = found.search.as_ref().map_or(String::new(), |search| quantized::search(search) + "\n");
     let sampled = quantizer.method().sampled().map_or(String::new(), quantized::sampled);
-    let learned = sampled + &found.learning.as_ref().map_or(String::new(), quantized::learning);
+    let imagined =
+        quantizer.method().imagined().filter(|_| found.steps() > 0).map_or(String::new(), quantized::imagined);
+    let learned = sampled + &found.learning.as_ref().map_or(String::new(), quantized::learning) + &imagined;
     let time = match &found.time {
         Some(step) => time::sentence(step),
         None => time::sentence(&StepTime::new(&found.buffer().image(&args.out)?, CLOCK)),
@@ -136,14 +138,7 @@ fn measure(
 
 /// Returns the options of the command line.
 fn options(args: &QuantizeArgs, method: Method) -> Options {
-    let BudgetArgs { bits, bpw, flash, ms, clock } = args.budget;
-    let limits = [
-        bpw.map(Budget::BitsPerWeight),
-        args.max_nmse.map(Budget::MaxNmse),
-        ms.map(|milliseconds| Budget::Time(TimeLimit { milliseconds, clock_hz: clock, image_bytes: flash })),
-        flash.map(Budget::ImageBytes),
-    ];
-    let width = bits.unwrap_or(Width::W3);
+    let budget = args.max_nmse.map_or_else(|| args.budget.budget(), Budget::MaxNmse);
     let protected = args.protect.iter().map(|name| (name.clone(), Width::W8));
     Options {
         group: args.group.unwrap_or(method.default_group()),
@@ -158,6 +153,6 @@ fn options(args: &QuantizeArgs, method: Method) -> Options {
         relative: args.learn.distill.relative,
         seed: args.run.seed,
         forced: args.width.iter().cloned().chain(protected).collect(),
-        ..Options::new(method, limits.into_iter().flatten().next().unwrap_or(Budget::Width(width)))
+        ..Options::new(method, budget)
     }
 }

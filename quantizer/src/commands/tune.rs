@@ -3,12 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use actq::budget::Budget;
 use actq::data::{Dataset, Recording, Sizes, files_of};
 use actq::error::Error;
 use actq::methods::{Method, Options};
+use actq::pipeline::check_budget;
 use actq::pipeline::tune::{self, TunePlan};
-use actq_kernels::Width;
 use anyhow::{Context as _, Result, ensure};
 
 use super::drive::Drive;
@@ -42,6 +41,7 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
          `actq quantize --calib`",
         args.policy_dir.display()
     );
+    check_budget(&policy, &options)?;
     let sizes = Sizes::of(&policy);
     let calib = calibration(args, calib, sizes)?;
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, sizes)?;
@@ -78,12 +78,15 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
 
 /// Returns the options of the command line.
 fn options(args: &TuneArgs) -> Options {
-    let budget = match args.bpw {
-        Some(bits) => Budget::BitsPerWeight(bits),
-        None => Budget::Width(args.bits.unwrap_or(Width::W3)),
-    };
     let LearnArgs { distill: DistillArgs { effort, steps, relative }, minutes } = args.learn;
-    Options { effort, steps, minutes, relative, seed: args.run.seed, ..Options::new(Method::Distill, budget) }
+    Options {
+        effort,
+        steps,
+        minutes,
+        relative,
+        seed: args.run.seed,
+        ..Options::new(Method::Distill, args.budget.budget())
+    }
 }
 
 /// Reads the recordings of the f32 policy: the given files, or those in the policy folder.

@@ -2,7 +2,7 @@
 
 use actq::measure::eval::ErrorReport;
 use actq::methods::distill::balance::balance_bytes;
-use actq::methods::{Choice, Learning, Sampled, Tried};
+use actq::methods::{Choice, Imagined, Learning, Sampled, Tried};
 use actq::pipeline::{QuantizedPolicy, Search, Try};
 use actq::text::count;
 use comfy_table::Table;
@@ -41,6 +41,16 @@ pub fn matrices(quantized: &QuantizedPolicy) -> String {
 pub fn sampled(Sampled { frames, inputs, outputs }: Sampled) -> String {
     let derived = if outputs > 0 { format!(", derivatives at {outputs} random ones") } else { String::new() };
     format!("statistics of {inputs} of {}{derived}, in every denoising step\n", count(frames, "frame"))
+}
+
+/// Formats how far a linear model of the robot can predict, and what was learned from its rollouts.
+pub fn imagined(imagined: &Imagined) -> String {
+    let predicted =
+        format!("a linear model predicts {:.0}% of the next observation", 100.0 * imagined.predicted.max(0.0));
+    match imagined.frames() {
+        0 => format!("no imagined rollouts: {predicted}\n"),
+        frames => format!("{} of imagined rollouts: {predicted}\n", count(frames, "observation")),
+    }
 }
 
 /// Formats the choice of learning, and the settings that were tried.

@@ -1,4 +1,4 @@
-//! The method distill gives the same error in any units of the observations.
+//! The method distill gives the same error in any units of the observations and of the actions.
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
@@ -205,6 +205,26 @@ fn units_do_not_change_a_networks_error() -> Result<()> {
 fn units_do_not_change_learning() -> Result<()> {
     for build in [feed_forward, recurrent] {
         keeps_its_error(build, 40, &[(1, 1e-6), (7, 1e3), (OBS, 1e20)])?;
+    }
+    Ok(())
+}
+
+/// People choose the units of actions, too.
+#[test]
+fn units_of_actions_do_not_change_learning() -> Result<()> {
+    const STEPS: usize = 300;
+    let scaled = |scale: f32| -> Result<f64> {
+        let units = first(0, 1.0);
+        let mut graph = feed_forward(&units)?;
+        graph.matrices.last_mut().into_iter().flat_map(|matrix| &mut matrix.data).for_each(|weight| *weight *= scale);
+        let last = graph.nodes.last_mut().into_iter().flat_map(|node| node.kind.vectors_mut());
+        last.flatten().for_each(|bias| *bias *= scale);
+        error_of(graph, &units, 1.5, STEPS)
+    };
+    let usual = scaled(1.0)?;
+    for scale in [1e-6, 1e-3, 1e3] {
+        let found = scaled(scale)?;
+        assert!(found < 1.1 * usual && usual < 1.1 * found, "{scale:e}: {found:e}, else {usual:e}");
     }
     Ok(())
 }

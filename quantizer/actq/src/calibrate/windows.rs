@@ -4,6 +4,7 @@
 use ndarray::{Array2, Axis, s};
 use rayon::prelude::*;
 
+use super::imagined::{Imagined, Recorded, Rollout};
 use super::widening::{MEMORY, Widening};
 use crate::data::{Dataset, mean_and_variance};
 use crate::graph::{Graph, Network, State, Weights, copy_sample, start_state, zero_state};
@@ -58,6 +59,8 @@ pub struct Windows {
     pub output_variance: Vec<f32>,
     /// Steps of a window.
     pub window: usize,
+    /// Imagined rollouts, which some of the widened windows are taken from.
+    pub imagined: Option<Imagined>,
 }
 
 impl Windows {
@@ -95,7 +98,15 @@ impl Windows {
         for episode in &mut episodes {
             last(episode, window);
         }
-        Self { graph, weights, states, deviation, output_variance, episodes, window }
+        Self { graph, weights, states, deviation, output_variance, episodes, window, imagined: None }
+    }
+
+    /// Adds imagined rollouts. Denoising heads have none: their answers depend on the noise, too.
+    pub fn imagine(&mut self, seed: u64) {
+        let Self { graph, weights, episodes, states, window, .. } = &*self;
+        if graph.denoising.is_none() {
+            self.imagined = Recorded { graph, weights, episodes, states, window: *window }.imagine(seed);
+        }
     }
 
     /// Returns `true` if steps depend on each other.
@@ -132,17 +143,24 @@ impl Windows {
         let mut frames = Array2::zeros((size * self.window, self.graph.input_len()));
         let mut starts = Vec::with_capacity(size);
         for sample in 0..size {
-            let e = random.below(self.episodes.len());
-            let start = random.below(self.episodes[e].nrows() + 1 - self.window);
+            // Where the source begins in the recorded episode.
+            let (episode, origin, source) = match widening.and_then(|_| self.imagined.as_ref()?.draw(random)) {
+                Some(Rollout { episode, start, frames }) => (*episode, *start, frames),
+                None => {
+                    let episode = random.below(self.episodes.len());
+                    (episode, 0, &self.episodes[episode])
+                }
+            };
+            let start = random.below(source.nrows() + 1 - self.window);
             for t in 0..self.window {
-                frames.row_mut(t * size + sample).assign(&self.episodes[e].row(start + t));
+                frames.row_mut(t * size + sample).assign(&source.row(start + t));
             }
             let mut from_zero = false;
             if let Some(widening) = widening {
                 self.widen(widening, (0..self.window).map(|t| t * size + sample), &mut frames, random);
                 from_zero = random.share() < FROM_ZERO;
             }
-            starts.push((self.recurrent() && !from_zero).then_some((e, start)));
+            starts.push((self.recurrent() && !from_zero).then_some((episode, origin + start)));
         }
         let mut batch = Batch { frames, state: State::new(), starts };
         batch.state = batch.state_of(&self.graph, &self.states);
@@ -199,6 +217,7 @@ impl Windows {
                 deviation: self.deviation.clone(),
                 output_variance: self.output_variance.clone(),
                 window: self.window,
+                imagined: self.imagined.as_ref().map(|imagined| imagined.beside(&chosen)),
             })
         };
         Some((part(false)?, part(true)?))
@@ -255,7 +274,7 @@ fn root(variance: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{dataset, lstm};
+    use crate::testing::{dataset, driven, lstm, mlp};
 
     #[test]
     fn short_episodes_do_not_shorten_windows() {
@@ -279,5 +298,26 @@ mod tests {
                 assert_eq!(root(variance * unit * unit), deviation * unit as f32);
             }
         }
+    }
+
+    #[test]
+    fn some_widened_windows_are_imagined() {
+        const STILL: Widening = Widening { noise: 0.0, power: 1, mix: 0.0 };
+        let (graph, frames) = (mlp(), 1000);
+        let dataset = driven(&graph, 4, 120);
+        let mut windows = Windows::new(graph, &dataset, 1);
+        windows.imagine(1);
+        let recorded = |widening| {
+            let batch = windows.batch(frames, widening, &mut Random::new(2));
+            let is_recorded = |frame: &ndarray::ArrayView1<'_, f32>| {
+                windows.episodes.iter().any(|episode| episode.rows().into_iter().any(|row| row == frame))
+            };
+            batch.frames.rows().into_iter().filter(is_recorded).count()
+        };
+        assert_eq!(recorded(None), frames);
+        let imagined = windows.imagined.as_ref().expect("a model");
+        let expected = (1.5 - imagined.predicted) * frames as f64;
+        let found = recorded(Some(STILL)) as f64;
+        assert!((found - expected).abs() < 60.0, "{found} recorded frames, not {expected}");
     }
 }

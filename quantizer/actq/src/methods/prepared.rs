@@ -13,6 +13,7 @@ use super::progress::Progress;
 use super::quantized::{Outcome, QuantizedNetwork};
 use crate::budget::Rate;
 use crate::calibrate::allowance::{Allowance, Sampled};
+use crate::calibrate::imagined::Imagined;
 use crate::calibrate::moments::{Moments, collect};
 use crate::data::{Dataset, Recording};
 use crate::error::{Context as _, Result, ensure};
@@ -129,6 +130,14 @@ impl<'a> PreparedMethod<'a> {
         match &self.statistics {
             Statistics::Distill(statistics) => &statistics.mixed,
             _ => &[],
+        }
+    }
+
+    /// Returns the imagined rollouts that distill learns from; `None` for other methods, and without a model.
+    pub fn imagined(&self) -> Option<&Imagined> {
+        match &self.statistics {
+            Statistics::Distill(statistics) => statistics.imagined(),
+            _ => None,
         }
     }
 

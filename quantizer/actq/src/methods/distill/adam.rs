@@ -47,6 +47,21 @@ impl Adam {
         step(parameters, grads, Moments { first: &mut self.first, second: &mut self.second }, stride);
     }
 
+    /// As [`Self::step`], with strides in units of each parameter's own.
+    pub(super) fn step_in_units(
+        &mut self,
+        parameters: &mut [f32],
+        grads: &[f32],
+        units: Option<&[f32]>,
+        stride: Stride,
+    ) {
+        let Some(units) = units else { return self.step(parameters, grads, stride) };
+        let parameters = parameters.chunks_mut(1).zip(grads.chunks(1)).zip(self.chunks(1));
+        for (((parameter, grad), moments), unit) in parameters.zip(units) {
+            step(parameter, grad, moments, stride.times(*unit));
+        }
+    }
+
     /// Returns the moments of `len` parameters at a time.
     pub(super) fn chunks(&mut self, len: usize) -> impl Iterator<Item = Moments<'_>> {
         let pairs = self.first.chunks_mut(len).zip(self.second.chunks_mut(len));

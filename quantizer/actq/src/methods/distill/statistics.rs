@@ -13,6 +13,7 @@ use super::removal::{Effect, Reading, even_layer_errors, in_place};
 use super::schedule::{Bounds, most_steps};
 use super::units::{Units, units};
 use crate::calibrate::allowance::Allowance;
+use crate::calibrate::imagined::Imagined;
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{Side, importance, output_moments};
 use crate::calibrate::windows::Windows;
@@ -75,9 +76,11 @@ impl RowStatistics {
         let balanced = balance(graph, &mut moments, &outputs)?;
         let of_inputs: Vec<&Moments> = moments.iter().collect();
         let alone = removals(&balanced, &of_inputs, &outputs, Effect::alone);
+        let mut windows = windows.with(balanced);
+        windows.imagine(SEED);
         Ok(Self {
-            mixed: mixed_units(&balanced, &moments),
-            windows: windows.with(balanced),
+            mixed: mixed_units(&windows.graph, &moments),
+            windows,
             inputs: moments.iter().map(|m| importance(&m.second, Side::Input)).collect(),
             outputs,
             alone,
@@ -94,6 +97,11 @@ impl RowStatistics {
         let graph = self.graph().clone();
         let some = held_out.thinned(MAX_WATCHED_FRAMES / graph.denoising_steps(), graph.state_len() > 0);
         self.watched = (some.frames() > 0).then(|| Windows::new(graph, &some, 1));
+    }
+
+    /// Returns the imagined rollouts; `None` without a model of the robot.
+    pub fn imagined(&self) -> Option<&Imagined> {
+        self.windows.imagined.as_ref()
     }
 
     /// Returns the network with balanced columns.

@@ -16,7 +16,7 @@ use super::objective::{Frames, Objective};
 use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
-use crate::graph::{Derivatives, Graph, Matrix, Network, STRIP, Vectors, WeightMatrix, Weights};
+use crate::graph::{Derivatives, Graph, Matrix, Network, Node, NodeKind, STRIP, Vectors, WeightMatrix, Weights};
 use crate::methods::learning::Recipe;
 use crate::methods::options::Effort;
 use crate::methods::quantized::Quantized;
@@ -131,6 +131,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Pres
     let mut latents: Vec<Latent> =
         matrices.map(|((matrix, widths), importance)| Latent::new(matrix, widths, task.group, importance)).collect();
     let mut adam_vectors: Vec<Adam> = weights.vectors.iter().flatten().map(|v| Adam::new(v.len())).collect();
+    let units = units_of_vectors(task.graph, &windows.output_variance);
     latents.iter_mut().zip(&mut weights.matrices).for_each(|(latent, matrix)| latent.write(matrix));
     let mut lessons = Lessons::new(task.seed);
     let (size, shards) = batch_size(task.graph, windows);
@@ -179,8 +180,8 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Pres
         let by_vector = stride(rates.vector);
         learn(&mut latents, &mut of_matrices, gait, &mut weights.matrices);
         let vectors = weights.vectors.iter_mut().flatten().zip(of_vectors.iter().flatten());
-        for (adam, (vector, grads)) in adam_vectors.iter_mut().zip(vectors) {
-            adam.step(vector, grads, by_vector);
+        for ((adam, units), (vector, grads)) in adam_vectors.iter_mut().zip(&units).zip(vectors) {
+            adam.step_in_units(vector, grads, units.as_deref(), by_vector);
         }
         if let Some(watched) = task.watched.filter(|_| schedule.is_at_part()) {
             held_out = Some(recorded_error(&network, &weights, watched, None, task.seed));
@@ -202,6 +203,18 @@ fn learn(latents: &mut [Latent], grads: &mut [Array2<f32>], gait: Gait, weights:
         strip.learn(grads.as_slice_mut().unwrap_or_default(), gait);
         weights.set(|values| strip.weights(values));
     });
+}
+
+/// Returns the units that each vector learns in. The bias of a last matrix is in the unit of the actions, which people
+/// choose, so it learns in their deviations. All others are in the network's own units, which are about 1.
+fn units_of_vectors(graph: &Graph, output_variance: &[f32]) -> Vec<Option<Vec<f32>>> {
+    let deviations = || output_variance.iter().map(|variance| variance.sqrt()).collect();
+    let of_node = |(index, node): (usize, &Node)| {
+        let is_last = index + 1 == graph.output() && graph.denoising.is_none();
+        let is_action = is_last && matches!(node.kind, NodeKind::Linear(_));
+        vec![is_action.then(deviations); node.kind.vectors().len()]
+    };
+    graph.nodes.iter().enumerate().flat_map(of_node).collect()
 }
 
 /// Returns the samples of a batch, frames or windows, and the parts that it is cut into. A frame of an iterative head
