@@ -90,7 +90,7 @@ fn report(
     let sampled = quantizer.method().sampled().map_or(String::new(), quantized::sampled);
     let imagined =
         quantizer.method().imagined().filter(|_| found.steps() > 0).map_or(String::new(), quantized::imagined);
-    let learned = sampled + &found.learning.as_ref().map_or(String::new(), quantized::learning) + &imagined;
+    let learned = sampled + &imagined + &found.learning.as_ref().map_or(String::new(), quantized::learning);
     let time = match &found.time {
         Some(step) => time::sentence(step),
         None => time::sentence(&StepTime::new(&found.buffer().image(&args.out)?, CLOCK)),
