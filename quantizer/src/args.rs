@@ -93,6 +93,9 @@ pub(crate) enum Command {
     /// quantize, check, constants. If one fails, run the command again. It keeps the description, which you may edit in
     /// between, and an image that was made with the same files and options.
     ///
+    /// Without --steps, --effort and --minutes, learning takes at most 6 minutes, so that the image depends on the
+    /// machine's speed. Pass --steps or --effort for the same image on every machine.
+    ///
     /// Example: actq deploy bundle --accept-profile --reference raw.npz:expect.npz --recordings runs --bpw 2 --out
     /// walker
     Deploy(DeployArgs),

@@ -18,10 +18,10 @@
 use ndarray::{Array2, ArrayView1, ArrayViewMut1};
 
 use super::dynamics::Dynamics;
-use crate::graph::{Graph, Network, Weights, zero_state};
+use crate::graph::{Graph, Network, State, Weights, copy_sample, zero_state};
 use crate::random::Random;
 
-/// Most steps of a rollout.
+/// Steps of a rollout of a feed-forward policy.
 const STEPS: usize = 50;
 /// Most observations of all rollouts, and most multiplications for them.
 const MAX_FRAMES: usize = 32_768;
@@ -33,11 +33,12 @@ const MAX_VALUES: usize = 1_024;
 const LEAST_PREDICTED: f64 = 0.5;
 /// Largest share of the difference of two recorded observations that a rollout begins beside the recording.
 const LARGEST_SHIFT: f32 = 0.5;
-/// Deviation of the answers' errors, in deviations of the answers, and the share that remains from step to step.
-const ERROR: f32 = 0.5;
+/// Deviation of the answers' errors, in deviations of the answers, and the share of a residual that is added. A
+/// recurrent policy keeps its balance with less (docs/records/2026-11-27-imagined.md).
+const OF_FRAMES: Disturbance = Disturbance { error: 0.5, residual: 0.5 };
+const OF_WINDOWS: Disturbance = Disturbance { error: 0.25, residual: 0.25 };
+/// Share of an answer's error that remains from step to step.
 const MEMORY: f32 = 0.9;
-/// Share of a residual that is added.
-const RESIDUAL: f32 = 0.5;
 /// Largest difference of a value to the recording, in deviations. A rollout ends before a larger one: the model is not
 /// valid there.
 const MAX_DIFFERENCE: f32 = 6.0;
@@ -83,13 +84,17 @@ impl Imagined {
     }
 }
 
-/// A recording with its f32 network, which has no state and takes no noise.
+/// A recording with its f32 network, which takes no noise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Recorded<'a> {
     pub(super) graph: &'a Graph,
     pub(super) weights: &'a Weights,
     /// Observations of each episode, `[step, value]`.
     pub(super) episodes: &'a [Array2<f32>],
+    /// State before each step of each episode; empty for a feed-forward network.
+    pub(super) states: &'a [State],
+    /// Steps of a recurrent network's window.
+    pub(super) window: usize,
 }
 
 impl Recorded<'_> {
@@ -100,7 +105,7 @@ impl Recorded<'_> {
         if values > MAX_VALUES {
             return None;
         }
-        let answers: Vec<Array2<f32>> = self.episodes.iter().map(|episode| self.answers(episode.clone())).collect();
+        let answers: Vec<Array2<f32>> = (0..self.episodes.len()).map(|episode| self.answers(episode)).collect();
         let model = Dynamics::fit(self.episodes, &answers)?;
         let predicted = model.predicted;
         let rollouts = match predicted > LEAST_PREDICTED {
@@ -110,27 +115,36 @@ impl Recorded<'_> {
         Some(Imagined { rollouts, predicted })
     }
 
-    /// Returns the f32 network's answers to observations.
-    fn answers(&self, observations: Array2<f32>) -> Array2<f32> {
-        let mut state = zero_state(self.graph, observations.nrows());
-        Network::new(self.graph).forward(self.weights, observations, &mut state).into_output()
+    /// Returns the answers to an episode.
+    fn answers(&self, episode: usize) -> Array2<f32> {
+        let observations = &self.episodes[episode];
+        let mut state = match self.states.get(episode) {
+            Some(states) => states.clone(),
+            None => zero_state(self.graph, observations.nrows()),
+        };
+        Network::new(self.graph).forward(self.weights, observations.clone(), &mut state).into_output()
     }
 
     /// Makes all rollouts side by side.
     fn rollouts(&self, model: &Dynamics, answers: &[Array2<f32>], random: &mut Random) -> Vec<Rollout> {
-        let Self { graph, episodes, .. } = *self;
+        let Self { graph, weights, episodes, states, window } = *self;
+        let is_recurrent = !states.is_empty();
         let longest = episodes.iter().map(Array2::nrows).max().unwrap_or(0);
-        let steps = STEPS.min(longest);
+        let steps = if is_recurrent { window } else { STEPS.min(longest) };
         let work = graph.obs_len * (model.observation.len() + model.answer.len()) + graph.weights();
         let count = MAX_FRAMES.min(MAX_MULTIPLICATIONS / work.max(1)) / steps.max(1);
         let mut branches: Vec<Branch> = (0..count).map(|_| Branch::draw(self, model, steps, random)).collect();
+        let mut state = zero_state(graph, count);
+        for (sample, branch) in branches.iter().enumerate().filter(|_| is_recurrent) {
+            copy_sample(&states[branch.episode], branch.start, &mut state, sample);
+        }
         for step in 0..steps {
             let mut frames = Array2::zeros((count, graph.obs_len));
             for (branch, mut frame) in branches.iter_mut().zip(frames.rows_mut()) {
                 branch.observe(model, row(&episodes[branch.episode], branch.start + step), frame.view_mut());
                 branch.keep(step, frame.view());
             }
-            let given = self.answers(frames);
+            let given = Network::new(graph).forward(weights, frames, &mut state).into_output();
             let mut differences = Array2::zeros((count, model.observation.len() + model.answer.len()));
             for ((branch, to), given) in branches.iter_mut().zip(differences.rows_mut()).zip(given.rows()) {
                 branch.err(random);
@@ -142,13 +156,20 @@ impl Recorded<'_> {
                 branch.advance(model, next, model.residuals.row(random.below(model.residuals.nrows())));
             }
         }
-        branches.into_iter().filter_map(|branch| branch.rollout()).collect()
+        branches.into_iter().filter_map(|branch| branch.rollout(if is_recurrent { steps } else { 1 })).collect()
     }
 }
 
 /// Returns the row of a step; the last one after the end.
 fn row(rows: &Array2<f32>, step: usize) -> ArrayView1<'_, f32> {
     rows.row(step.min(rows.nrows() - 1))
+}
+
+/// What moves a rollout away from the recording.
+#[derive(Clone, Copy, Debug)]
+struct Disturbance {
+    error: f32,
+    residual: f32,
 }
 
 /// A rollout in the making.
@@ -160,31 +181,35 @@ struct Branch {
     /// Difference to the recorded observation and error of the answer, in deviations.
     difference: Vec<f32>,
     error: Vec<f32>,
+    disturbance: Disturbance,
     /// Observations so far, one after the other.
     frames: Vec<f32>,
     is_over: bool,
 }
 
 impl Branch {
-    /// Begins beside a recorded observation.
+    /// Begins beside a recorded observation; beside one of the last `steps` for a recurrent network, whose windows are
+    /// whole.
     fn draw(recorded: &Recorded<'_>, model: &Dynamics, steps: usize, random: &mut Random) -> Self {
-        let episodes = recorded.episodes;
+        let Recorded { episodes, states, .. } = recorded;
         let episode = random.below(episodes.len());
         let there = episodes[episode].nrows();
-        let start = random.below(there);
+        let start = random.below(if states.is_empty() { there } else { there + 1 - steps });
         let mut any = || {
             let episode = &episodes[random.below(episodes.len())];
             row(episode, random.below(episode.nrows()))
         };
         let (from, to) = (any(), any());
         let share = LARGEST_SHIFT * random.share();
+        let disturbance = if states.is_empty() { OF_FRAMES } else { OF_WINDOWS };
         let values = to.iter().zip(from).zip(&model.observation);
         Self {
             episode,
             start,
             steps: steps.min(there - start),
             difference: values.map(|((to, from), unit)| in_units(share * (to - from), *unit)).collect(),
-            error: model.answer.iter().map(|_| ERROR * random.normal()).collect(),
+            error: model.answer.iter().map(|_| disturbance.error * random.normal()).collect(),
+            disturbance,
             frames: Vec::new(),
             is_over: false,
         }
@@ -207,7 +232,7 @@ impl Branch {
 
     /// Draws the next error of the answer.
     fn err(&mut self, random: &mut Random) {
-        let fresh = ERROR * (1.0 - MEMORY * MEMORY).sqrt();
+        let fresh = self.disturbance.error * (1.0 - MEMORY * MEMORY).sqrt();
         self.error.iter_mut().for_each(|error| *error = MEMORY * *error + fresh * random.normal());
     }
 
@@ -230,7 +255,8 @@ impl Branch {
     /// Goes on to the next step.
     fn advance(&mut self, model: &Dynamics, next: ArrayView1<'_, f32>, residual: ArrayView1<'_, f32>) {
         let next = next.iter().zip(residual).zip(&model.observation);
-        let next = next.map(|((next, residual), unit)| if *unit > 0.0 { next + RESIDUAL * residual } else { 0.0 });
+        let share = self.disturbance.residual;
+        let next = next.map(|((next, residual), unit)| if *unit > 0.0 { next + share * residual } else { 0.0 });
         self.difference = next.collect();
         self.is_over |= !self.difference.iter().all(|difference| difference.abs() <= MAX_DIFFERENCE);
         if self.is_over {
@@ -238,12 +264,12 @@ impl Branch {
         }
     }
 
-    /// Returns the rollout; `None` if it has no step.
-    fn rollout(self) -> Option<Rollout> {
+    /// Returns the rollout if it has at least `least` steps.
+    fn rollout(self, least: usize) -> Option<Rollout> {
         let Self { episode, start, frames, difference, .. } = self;
         let steps = frames.len() / difference.len().max(1);
         let frames = Array2::from_shape_vec((steps, difference.len()), frames).ok()?;
-        (steps > 0).then_some(Rollout { episode, start, frames })
+        (steps >= least).then_some(Rollout { episode, start, frames })
     }
 }
 
@@ -256,7 +282,7 @@ fn in_units(value: f32, unit: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::data::Dataset;
-    use crate::testing::{dataset, driven, mlp};
+    use crate::testing::{dataset, driven, lstm, mlp};
 
     /// Calls `of` with a recording and its f32 network.
     fn with<R>(graph: &Graph, dataset: &Dataset, of: impl FnOnce(Recorded<'_>) -> R) -> R {
@@ -266,7 +292,11 @@ mod tests {
             Array2::from_shape_vec((dataset.length[e], graph.obs_len), rows).expect("whole rows")
         };
         let episodes: Vec<Array2<f32>> = (0..dataset.length.len()).map(of_episode).collect();
-        of(Recorded { graph, weights: &weights, episodes: &episodes })
+        let states = match graph.state_len() {
+            0 => Vec::new(),
+            _ => episodes.iter().map(|episode| zero_state(graph, episode.nrows())).collect(),
+        };
+        of(Recorded { graph, weights: &weights, episodes: &episodes, states: &states, window: 16 })
     }
 
     #[test]
@@ -311,12 +341,14 @@ mod tests {
     }
 
     #[test]
-    fn rollouts_follow_their_episodes() {
-        let graph = mlp();
+    fn rollouts_of_recurrent_networks_are_whole_windows() {
+        let graph = lstm();
         let imagined = with(&graph, &driven(&graph, 5, 40), |recorded| recorded.imagine(1)).expect("a model");
+        assert!(!imagined.rollouts.is_empty());
+        assert!(imagined.rollouts.iter().all(|rollout| rollout.frames.nrows() == 16 && rollout.start <= 40 - 16));
         let beside = imagined.beside(&[4, 1]);
         assert!(beside.rollouts.iter().all(|rollout| rollout.episode < 2));
         let of = |episode: usize| imagined.rollouts.iter().filter(|rollout| rollout.episode == episode).count();
-        assert!(of(4) > 0 && beside.rollouts.len() == of(4) + of(1));
+        assert_eq!(beside.rollouts.len(), of(4) + of(1));
     }
 }

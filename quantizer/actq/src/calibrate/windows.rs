@@ -101,12 +101,11 @@ impl Windows {
         Self { graph, weights, states, deviation, output_variance, episodes, window, imagined: None }
     }
 
-    /// Adds imagined rollouts, for feed-forward networks alone: a large recurrent one fails more often with them
-    /// (docs/records/2026-11-27-imagined.md). The answers of denoising heads depend on the noise, too.
+    /// Adds imagined rollouts. Denoising heads have none: their answers depend on the noise, too.
     pub fn imagine(&mut self, seed: u64) {
-        let Self { graph, weights, episodes, .. } = &*self;
-        if graph.denoising.is_none() && !self.recurrent() {
-            self.imagined = Recorded { graph, weights, episodes }.imagine(seed);
+        let Self { graph, weights, episodes, states, window, .. } = &*self;
+        if graph.denoising.is_none() {
+            self.imagined = Recorded { graph, weights, episodes, states, window: *window }.imagine(seed);
         }
     }
 
