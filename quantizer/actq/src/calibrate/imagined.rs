@@ -21,7 +21,7 @@ use super::dynamics::Dynamics;
 use crate::graph::{Graph, Network, State, Weights, copy_sample, zero_state};
 use crate::random::Random;
 
-/// Steps of a rollout of a feed-forward policy.
+/// Most steps of a feed-forward network's rollout; that of a recurrent one is a whole window.
 const STEPS: usize = 50;
 /// Most observations of all rollouts, and most multiplications for them.
 const MAX_FRAMES: usize = 32_768;
