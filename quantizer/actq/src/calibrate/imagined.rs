@@ -2,7 +2,7 @@
 //!
 //! The errors of a small network lead its robot to places that the recording of the f32 policy does not have. Noise on
 //! single values does not lead there, because the values of an observation depend on each other. So a linear model of
-//! the robot ([`Dynamics`]) is fitted to the recording. A rollout begins beside a recorded observation, and the
+//! the robot (`dynamics.rs`) is fitted to the recording. A rollout begins beside a recorded observation, and the
 //! difference `e` to the recording goes on by the model, in units of deviations:
 //!
 //! `e' = A e + B (policy(x + e) + error - policy(x)) + residual`
