@@ -261,6 +261,8 @@ fn a_terminated_recorder_keeps_all_observations() -> Result<()> {
     let observations = draw(6, 30);
     let mut child = serve(&fixture, "serve image.actq --record drive.npz --policy policy")?;
     show(&mut child, &observations)?;
+    // `wait` closes the input, whose end could come before the signal.
+    let _input = child.stdin.take();
     std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status()?;
     let status = child.wait()?;
     ensure!(status.code() == Some(143), "{status}");
