@@ -2,7 +2,7 @@
 //! answer to it, by ridge regression.
 
 use nalgebra::DMatrix;
-use ndarray::{Array2, ArrayView2, s};
+use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 
 use crate::data::mean_and_variance;
 use crate::gemm::{Panels, add_product_parallel};
@@ -28,9 +28,10 @@ pub(super) struct Dynamics {
 }
 
 /// Steps of an episode: observations with the answers to them, and the observations after them.
-struct Steps {
-    before: Array2<f64>,
-    after: Array2<f64>,
+#[derive(Clone, Copy)]
+struct Steps<'a> {
+    before: ArrayView2<'a, f64>,
+    after: ArrayView2<'a, f64>,
 }
 
 impl Dynamics {
@@ -43,10 +44,12 @@ impl Dynamics {
             let mut before = Array2::zeros((last, values + answers.ncols()));
             before.slice_mut(s![.., ..values]).assign(&observed.slice(s![..last, ..]));
             before.slice_mut(s![.., values..]).assign(&of_answer.of_rows(answers.slice(s![..last, ..])));
-            Steps { before, after: observed.slice(s![1.min(episode.nrows()).., ..]).to_owned() }
+            (before, observed.slice(s![1.min(episode.nrows()).., ..]).to_owned())
         };
-        let all: Vec<Steps> = episodes.iter().zip(answers).map(steps).collect();
-        let matrix = regression(all.iter())?;
+        let arrays: Vec<(Array2<f64>, Array2<f64>)> = episodes.iter().zip(answers).map(steps).collect();
+        let all: Vec<Steps<'_>> =
+            arrays.iter().map(|(before, after)| Steps { before: before.view(), after: after.view() }).collect();
+        let matrix = regression(&all)?;
         let residuals: Vec<Array2<f64>> = all.iter().map(|steps| steps.residuals(&matrix)).collect();
         let rows = residuals.iter().flat_map(|residuals| residuals.iter().map(|value| *value as f32)).collect();
         let count = residuals.iter().map(Array2::nrows).sum();
@@ -70,42 +73,35 @@ impl Dynamics {
 
 /// Fits to three in four episodes and measures the share of variance that is predicted in the others; with fewer than
 /// four episodes, to the first three quarters of each.
-fn predicted(all: &[Steps]) -> Option<f64> {
-    let (fitted, measured): (Vec<Steps>, Vec<Steps>) = match all.len() >= LEFT_OUT {
-        true => {
-            let of = |left_out: bool| {
-                let chosen = move |index: &usize| (index % LEFT_OUT == LEFT_OUT - 1) == left_out;
-                (0..all.len()).filter(chosen).map(|index| all[index].part(0, usize::MAX)).collect()
-            };
-            (of(false), of(true))
-        }
-        false => {
-            let cut = |steps: &Steps| steps.before.nrows() * (LEFT_OUT - 1) / LEFT_OUT;
-            let first = all.iter().map(|steps| steps.part(0, cut(steps))).collect();
-            (first, all.iter().map(|steps| steps.part(cut(steps), usize::MAX)).collect())
-        }
+fn predicted(all: &[Steps<'_>]) -> Option<f64> {
+    // Steps of an episode that are fitted to.
+    let fitted_of = |index: usize, steps: &Steps<'_>| match steps.before.nrows() {
+        count if all.len() < LEFT_OUT => count * (LEFT_OUT - 1) / LEFT_OUT,
+        _ if index % LEFT_OUT == LEFT_OUT - 1 => 0,
+        count => count,
     };
-    let matrix = regression(fitted.iter())?;
+    let (fitted, measured): (Vec<_>, Vec<_>) =
+        all.iter().enumerate().map(|(index, steps)| steps.split_at(fitted_of(index, steps))).unzip();
+    let matrix = regression(&fitted)?;
     let squares =
-        |rows: &Array2<f64>| rows.map_axis(ndarray::Axis(0), |column| column.iter().map(|v| v * v).sum::<f64>());
-    let values = matrix.ncols();
-    let (mut left, mut whole) = (ndarray::Array1::<f64>::zeros(values), ndarray::Array1::<f64>::zeros(values));
+        |rows: ArrayView2<'_, f64>| rows.map_axis(Axis(0), |column| column.iter().map(|v| v * v).sum::<f64>());
+    let (mut left, mut whole) = (Array1::<f64>::zeros(matrix.ncols()), Array1::<f64>::zeros(matrix.ncols()));
     for steps in &measured {
-        left += &squares(&steps.residuals(&matrix));
-        whole += &squares(&steps.after);
+        left += &squares(steps.residuals(&matrix).view());
+        whole += &squares(steps.after);
     }
     let shares: Vec<f64> = left.iter().zip(&whole).filter(|(_, w)| **w > 0.0).map(|(l, w)| 1.0 - l / w).collect();
     (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)
 }
 
 /// Returns the matrix that predicts the values after steps from those before them; `None` without steps.
-fn regression<'s>(all: impl Iterator<Item = &'s Steps> + Clone) -> Option<Array2<f64>> {
-    let (inputs, outputs) = all.clone().next().map(|steps| (steps.before.ncols(), steps.after.ncols()))?;
+fn regression(all: &[Steps<'_>]) -> Option<Array2<f64>> {
+    let (inputs, outputs) = all.first().map(|steps| (steps.before.ncols(), steps.after.ncols()))?;
     let (mut square, mut across) = (Array2::zeros((inputs, inputs)), Array2::zeros((inputs, outputs)));
     let mut count = 0;
     for Steps { before, after } in all {
-        add_product_parallel(before.t(), &Panels::of(before.view()), square.view_mut());
-        add_product_parallel(before.t(), &Panels::of(after.view()), across.view_mut());
+        add_product_parallel(before.t(), &Panels::of(*before), square.view_mut());
+        add_product_parallel(before.t(), &Panels::of(*after), across.view_mut());
         count += before.nrows();
     }
     let ridge = RIDGE * count as f64;
@@ -114,20 +110,17 @@ fn regression<'s>(all: impl Iterator<Item = &'s Steps> + Clone) -> Option<Array2
     Some(Array2::from_shape_fn((inputs, outputs), |(i, j)| solution[(i, j)]))
 }
 
-impl Steps {
-    /// Returns the steps from `first` up to `end`.
-    fn part(&self, first: usize, end: usize) -> Self {
-        let range = first..end.min(self.before.nrows());
-        Self {
-            before: self.before.slice(s![range.clone(), ..]).to_owned(),
-            after: self.after.slice(s![range, ..]).to_owned(),
-        }
+impl Steps<'_> {
+    /// Returns the steps before `index` and those from there on.
+    fn split_at(self, index: usize) -> (Self, Self) {
+        let (before, after) = (self.before.split_at(Axis(0), index), self.after.split_at(Axis(0), index));
+        (Self { before: before.0, after: after.0 }, Self { before: before.1, after: after.1 })
     }
 
     /// Returns what a matrix does not predict.
     fn residuals(&self, matrix: &Array2<f64>) -> Array2<f64> {
         let mut predicted = Array2::zeros(self.after.dim());
-        add_product_parallel(self.before.view(), &Panels::of(matrix.view()), predicted.view_mut());
+        add_product_parallel(self.before, &Panels::of(matrix.view()), predicted.view_mut());
         &self.after - &predicted
     }
 }

@@ -115,6 +115,10 @@ impl Recorded<'_> {
         Some(Imagined { rollouts, predicted })
     }
 
+    fn is_recurrent(&self) -> bool {
+        !self.states.is_empty()
+    }
+
     /// Returns the answers to an episode.
     fn answers(&self, episode: usize) -> Array2<f32> {
         let observations = &self.episodes[episode];
@@ -128,7 +132,7 @@ impl Recorded<'_> {
     /// Makes all rollouts side by side.
     fn rollouts(&self, model: &Dynamics, answers: &[Array2<f32>], random: &mut Random) -> Vec<Rollout> {
         let Self { graph, weights, episodes, states, window } = *self;
-        let is_recurrent = !states.is_empty();
+        let is_recurrent = self.is_recurrent();
         let longest = episodes.iter().map(Array2::nrows).max().unwrap_or(0);
         let steps = if is_recurrent { window } else { STEPS.min(longest) };
         let work = graph.obs_len * (model.observation.len() + model.answer.len()) + graph.weights();
@@ -165,7 +169,7 @@ fn row(rows: &Array2<f32>, step: usize) -> ArrayView1<'_, f32> {
     rows.row(step.min(rows.nrows() - 1))
 }
 
-/// What moves a rollout away from the recording.
+/// Sizes of the disturbances that lead a rollout off the recording.
 #[derive(Clone, Copy, Debug)]
 struct Disturbance {
     error: f32,
@@ -188,20 +192,20 @@ struct Branch {
 }
 
 impl Branch {
-    /// Begins beside a recorded observation; beside one of the last `steps` for a recurrent network, whose windows are
-    /// whole.
+    /// Begins beside a recorded observation. A recurrent network's begins early enough for all `steps`, because its
+    /// windows are whole.
     fn draw(recorded: &Recorded<'_>, model: &Dynamics, steps: usize, random: &mut Random) -> Self {
-        let Recorded { episodes, states, .. } = recorded;
+        let episodes = recorded.episodes;
         let episode = random.below(episodes.len());
         let there = episodes[episode].nrows();
-        let start = random.below(if states.is_empty() { there } else { there + 1 - steps });
+        let start = random.below(if recorded.is_recurrent() { there + 1 - steps } else { there });
         let mut any = || {
             let episode = &episodes[random.below(episodes.len())];
             row(episode, random.below(episode.nrows()))
         };
         let (from, to) = (any(), any());
         let share = LARGEST_SHIFT * random.share();
-        let disturbance = if states.is_empty() { OF_FRAMES } else { OF_WINDOWS };
+        let disturbance = if recorded.is_recurrent() { OF_WINDOWS } else { OF_FRAMES };
         let values = to.iter().zip(from).zip(&model.observation);
         Self {
             episode,

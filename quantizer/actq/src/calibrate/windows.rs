@@ -143,7 +143,7 @@ impl Windows {
         let mut frames = Array2::zeros((size * self.window, self.graph.input_len()));
         let mut starts = Vec::with_capacity(size);
         for sample in 0..size {
-            // Where the source begins in the recorded episode.
+            // `origin`: step of the recorded episode that the source begins at.
             let (episode, origin, source) = match widening.and_then(|_| self.imagined.as_ref()?.draw(random)) {
                 Some(Rollout { episode, start, frames }) => (*episode, *start, frames),
                 None => {
