@@ -1,4 +1,4 @@
-//! Scratch memory of whole policies: its size, and its distance from the bound of liveness.
+//! Scratch memory of whole policies: its size, its distance from the bound of liveness, and its way back from a head.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::{rtn, shared_policies, ur3};
 use actq_cli::report::memory::{Peak, peak};
-use actq_kernels::Width;
+use actq_kernels::{Head, Width};
 use anyhow::{Result, ensure};
 
 /// Words of the arena, and of the values that operations write: the place of the largest need, the words needed there,
@@ -36,6 +36,27 @@ fn shared_policies_keep_their_scratch_size() -> Result<()> {
         ("fetch_flow", 2509, [10, 1808, 1836]),
     ] {
         scratch_is(&policies.join(name), words, values)?;
+    }
+    Ok(())
+}
+
+#[test]
+fn a_head_gives_its_memory_to_the_next_one() -> Result<()> {
+    let policy = Policy::load(&ur3())?;
+    let images =
+        [Width::W3, Width::W8].map(|width| rtn(&policy, width, 0, Activations::Auto).map(|i| ImageBuffer::new(&i)));
+    let mut scratch: Vec<u32> = vec![7; 2000];
+    let mut memory: &mut [u32] = &mut scratch;
+    for buffer in images {
+        let buffer = buffer?;
+        let image = buffer.image(&ur3())?;
+        let observation = vec![0.5; image.obs_len()];
+        let mut fresh = vec![0; image.scratch_words()];
+        let expected = Head::new(image, &mut fresh)?.infer(&observation)?.to_vec();
+        let mut head = Head::new(image, memory)?;
+        ensure!(head.infer(&observation)? == expected);
+        memory = head.into_scratch();
+        ensure!(memory.len() == 2000 && memory[1990..] == [7; 10]);
     }
     Ok(())
 }

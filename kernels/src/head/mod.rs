@@ -20,6 +20,7 @@ use crate::image::{Image, Region};
 /// A head: an image and the scratch memory that it runs in.
 pub struct Head<'a, 's> {
     image: Image<'a>,
+    /// The whole scratch memory; the image's regions are at its start.
     arena: &'s mut [u32],
     /// [`Self::least_budget`]; 0 until it is computed.
     least_budget: u32,
@@ -57,19 +58,32 @@ enum Phase {
 }
 
 impl<'a, 's> Head<'a, 's> {
-    /// Creates a head in `scratch`, which needs at least [`Image::scratch_words`] words and is zeroed.
+    /// Creates a head in `scratch`, which needs at least [`Image::scratch_words`] words; these are zeroed.
     ///
     /// # Errors
     ///
     /// [`HeadError::ScratchTooSmall`] if `scratch` has fewer words.
     pub fn new(image: Image<'a>, scratch: &'s mut [u32]) -> Result<Self, HeadError> {
         let (needed, given) = (image.scratch_words(), scratch.len());
-        let arena = scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?;
         // No result depends on the previous content of the memory.
-        arena.fill(0);
+        scratch.get_mut(..needed).ok_or(HeadError::ScratchTooSmall { needed, given })?.fill(0);
         let mut playback = Playback::default();
-        playback.forget(&image, arena);
-        Ok(Self { image, arena, least_budget: 0, phase: Phase::Idle, playback, started: false, seed: 0, draws: 0 })
+        playback.forget(&image, scratch);
+        Ok(Self {
+            image,
+            arena: scratch,
+            least_budget: 0,
+            phase: Phase::Idle,
+            playback,
+            started: false,
+            seed: 0,
+            draws: 0,
+        })
+    }
+
+    /// Ends the head and returns its memory, all that [`Self::new`] was given: for a head of another image.
+    pub fn into_scratch(self) -> &'s mut [u32] {
+        self.arena
     }
 
     /// Clears the recurrent state, all chunks, the last action and a step that has begun. The noise of a flow or

@@ -20,7 +20,7 @@ use crate::record::{FORMAT, Outcome, Record};
 use crate::store::Store;
 use crate::work::{self, Work};
 use inputs::{Kept, check_inputs, heldout, image, path_of};
-pub use merge::merge;
+pub use merge::{merge, merge_finished};
 
 /// Runs a job and writes its result into the store. Returns `false` if the store has the result already. `watch`
 /// receives the present work and the share of it that is done.

@@ -71,7 +71,10 @@ pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> 
         is_kept: temporary.is_none(),
     };
     merge::merge_of(&jobs)?;
-    complete(&jobs, &store, &pool)?;
+    if let Err(error) = complete(&jobs, &store, &pool) {
+        merge::report_finished(&jobs, &store)?;
+        return Err(error);
+    }
     merge::report(&jobs, &store, outputs, args.svg.is_some(), args.json.is_some())
 }
 

@@ -1,4 +1,4 @@
-//! The job that puts the results of a plan into one.
+//! The job that puts the results of a plan into one, and the same for a part of them.
 
 use std::path::Path;
 
@@ -28,6 +28,20 @@ pub fn merge(plan: &Merge, store: &Store) -> Result<Merged, JobError> {
     }
     let policies = plan.policies.iter().zip(images).map(|(name, images)| MergedPolicy::new(name, images)).collect();
     Ok(Merged { clock_hz: plan.clock_hz, policies })
+}
+
+/// Merges the rows of a plan whose results are all in the store. Returns `None` if there is none.
+///
+/// # Errors
+///
+/// If a result is damaged.
+pub fn merge_finished(plan: &Merge, store: &Store) -> Result<Option<Merged>, JobError> {
+    let is_finished = |row: &&Row| row.results().all(|address| store.has(address));
+    let rows: Vec<Row> = plan.rows.iter().filter(is_finished).cloned().collect();
+    if rows.is_empty() {
+        return Ok(None);
+    }
+    merge(&Merge { rows, ..plan.clone() }, store).map(Some)
 }
 
 fn image(row: &Row, store: &Store) -> Result<MergedImage, JobError> {

@@ -3,12 +3,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use actq::text::count;
 use actq_jobs::job::Job;
 use actq_jobs::merged::Merged;
 use actq_jobs::record::Outcome;
 use actq_jobs::run;
 use actq_jobs::store::Store;
-use actq_jobs::work::Work;
+use actq_jobs::work::{Merge, Work};
 use anyhow::{Context as _, Result, ensure};
 
 use super::host::Command;
@@ -16,7 +17,7 @@ use super::plan;
 use crate::args::jobs::MergeArgs;
 use crate::outputs::files::Outputs;
 use crate::report::{frontiers, merged};
-use crate::terminal::{print, reserve};
+use crate::terminal::{note, print, reserve};
 
 /// Prints the results of a sweep.
 pub(crate) fn run(args: &MergeArgs) -> Result<()> {
@@ -34,6 +35,16 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
         args.store.display()
     );
     report(&jobs, &store, outputs, args.svg.is_some(), args.json.is_some())
+}
+
+/// Prints the rows of a plan whose results are all in the store, after other jobs have failed.
+pub(crate) fn report_finished(jobs: &[Job], store: &Store) -> Result<()> {
+    let merge = rows_of(merge_of(jobs)?)?;
+    let Some(finished) = run::merge_finished(merge, store)? else { return Ok(()) };
+    let rows = finished.policies.iter().map(|policy| policy.images.len()).sum();
+    print(&merged::report(&finished))?;
+    note([format!("the table has {} of {}; the jobs of the others failed", count(rows, "row"), merge.rows.len())]);
+    Ok(())
 }
 
 /// Refuses outputs among the files of a store.
@@ -74,12 +85,17 @@ pub(crate) fn merge_of(jobs: &[Job]) -> Result<&Job> {
     Ok(merge)
 }
 
+/// Returns the rows that a job merges.
+fn rows_of(job: &Job) -> Result<&Merge> {
+    let Work::Merge(merge) = &job.work else { anyhow::bail!("{}: is not of kind merge", job.title) };
+    Ok(merge)
+}
+
 /// Returns the results of a plan: those of its merge if that has run, or else of its other jobs. It writes nothing.
 fn merged(jobs: &[Job], store: &Store) -> Result<Merged> {
     let job = merge_of(jobs)?;
-    let Work::Merge(merge) = &job.work else { anyhow::bail!("{}: is not of kind merge", job.title) };
     if !store.has(&job.address) {
-        return Ok(run::merge(merge, store)?);
+        return Ok(run::merge(rows_of(job)?, store)?);
     }
     match store.read(&job.address)? {
         Outcome::Merged(merged) => Ok(merged),
