@@ -14,14 +14,14 @@ use crate::log::Log;
 pub struct Pace {
     /// Time from one observation to the next.
     pub period: Duration,
-    /// `true` to arm after the first observations, and to disarm at the end.
+    /// `true` to arm after [`BEFORE_ARMING`] observations, and to disarm at the end.
     pub arm: bool,
 }
 
 /// Longest wait for the last action, counted from the controller's answer to a later request.
 const LAST_ACTION: Duration = Duration::from_millis(100);
-/// Observations before arming.
-const BEFORE_ARMING: usize = 5;
+/// Observations that [`stream`] sends before it arms.
+pub const BEFORE_ARMING: usize = 5;
 
 /// Sends every observation at its time. Passes each received status to `seen`.
 ///

@@ -377,6 +377,14 @@ fn missing_controllers_and_wrong_command_lines_are_reported() -> Result<()> {
         let line = [&[arguments[0], "tcp:127.0.0.1:1"], &arguments[1..], &["--axis", "1"]].concat();
         failed(&link(&line)?, 1, &["--axis 1", "remove --axis"])?;
     }
+    // A recording that ends before the controller would be armed.
+    let (folder, recording) = folder()?;
+    write_observations(&recording, &Array3::zeros((1, 5, OBS)))?;
+    let image_file = folder.path().join("image.actq");
+    fs::write(&image_file, image("image", 0)?)?;
+    let (image_file, recording) = (image_file.display().to_string(), recording.display().to_string());
+    let line = ["stream", "tcp:127.0.0.1:1", &image_file, &recording, "--arm"];
+    failed(&link(&line)?, 1, &["drive.npz: has 5 observations, and --arm arms after 5", "record more"])?;
     // A listener that is no controller.
     let listener = TcpListener::bind("127.0.0.1:0")?;
     let port = format!("tcp:{}", listener.local_addr()?);

@@ -15,7 +15,7 @@ use actq_client::connection::Connection;
 use actq_client::keys::Signed;
 use actq_client::log::Log;
 use actq_client::push::{Package, axes_note, push};
-use actq_client::stream::{Pace, stream};
+use actq_client::stream::{BEFORE_ARMING, Pace, stream};
 use actq_client::{port, serve};
 use anyhow::{Context as _, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -97,6 +97,13 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let recording = Dataset::load(&args.recording, Sizes::of_image(&image))?;
+    let frames = recording.frames();
+    ensure!(
+        !args.arm || frames > BEFORE_ARMING,
+        "{}: has {}, and --arm arms after {BEFORE_ARMING}; record more, or stream without --arm",
+        args.recording.display(),
+        count(frames, "observation")
+    );
     let mut client = connect(&args.port)?;
     let runs = client.status()?.image;
     ensure!(
@@ -110,7 +117,6 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     // A signal ends the observations: the controller is disarmed, and the log written.
     let _ends_itself = EndsItself::begin();
     let (progress, mut log) = (Progress::new(false, "streaming")?, Log::default());
-    let frames = recording.frames();
     let observations =
         recording.observations().take_while(|_| ending::told().is_none()).enumerate().map(|(i, observation)| {
             progress.set_share(i as f64 / frames as f64);
