@@ -156,13 +156,6 @@ pub struct Row {
     pub drives: Vec<String>,
 }
 
-impl Row {
-    /// Returns the addresses of all its results: the image's, then those of its evaluations and episodes.
-    pub fn results(&self) -> impl Iterator<Item = &String> {
-        std::iter::once(&self.image).chain(&self.evaluations).chain(&self.drives)
-    }
-}
-
 impl Make {
     /// Returns the options of a quantization by `method`, which has this job's name.
     ///
@@ -215,7 +208,10 @@ impl Work {
             Self::Evaluate(Evaluate { image, .. }) | Self::Drive(Drive { image, .. }) => vec![image.clone()],
             Self::Learn(learn) => learn.recordings.clone(),
             Self::Custom(custom) => custom.needs.clone(),
-            Self::Merge(merge) => merge.rows.iter().flat_map(Row::results).cloned().collect(),
+            Self::Merge(merge) => {
+                let of_row = |row: &Row| [&[row.image.clone()][..], &row.evaluations, &row.drives].concat();
+                merge.rows.iter().flat_map(of_row).collect()
+            }
         };
         deps.sort_unstable();
         deps.dedup();

@@ -30,14 +30,19 @@ pub fn merge(plan: &Merge, store: &Store) -> Result<Merged, JobError> {
     Ok(Merged { clock_hz: plan.clock_hz, policies })
 }
 
-/// Merges the rows of a plan whose results are all in the store. Returns `None` if there is none.
+/// Merges the rows of a plan whose images and evaluations are all in the store; those without all of their episodes
+/// count as not driven. Returns `None` if there is none.
 ///
 /// # Errors
 ///
 /// If a result is damaged.
 pub fn merge_finished(plan: &Merge, store: &Store) -> Result<Option<Merged>, JobError> {
-    let is_finished = |row: &&Row| row.results().all(|address| store.has(address));
-    let rows: Vec<Row> = plan.rows.iter().filter(is_finished).cloned().collect();
+    let finished = |row: &Row| {
+        let has_all = |addresses: &[String]| addresses.iter().all(|address| store.has(address));
+        let drives = if has_all(&row.drives) { row.drives.clone() } else { Vec::new() };
+        (store.has(&row.image) && has_all(&row.evaluations)).then(|| Row { drives, ..row.clone() })
+    };
+    let rows: Vec<Row> = plan.rows.iter().filter_map(finished).collect();
     if rows.is_empty() {
         return Ok(None);
     }

@@ -37,13 +37,13 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     report(&jobs, &store, outputs, args.svg.is_some(), args.json.is_some())
 }
 
-/// Prints the rows of a plan whose results are all in the store, after other jobs have failed.
+/// Prints the rows of a plan whose images and errors are in the store, after some jobs have failed.
 pub(crate) fn report_finished(jobs: &[Job], store: &Store) -> Result<()> {
     let merge = rows_of(merge_of(jobs)?)?;
     let Some(finished) = run::merge_finished(merge, store)? else { return Ok(()) };
-    let rows = finished.policies.iter().map(|policy| policy.images.len()).sum();
+    let rows: usize = finished.policies.iter().map(|policy| policy.images.len()).sum();
     print(&merged::report(&finished))?;
-    note([format!("the table has {} of {}; the jobs of the others failed", count(rows, "row"), merge.rows.len())]);
+    note([format!("the table has {rows} of {}, and no success where a drive failed", count(merge.rows.len(), "row"))]);
     Ok(())
 }
 

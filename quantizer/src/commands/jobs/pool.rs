@@ -176,7 +176,9 @@ impl Working<'_> {
         let job = &self.jobs[job];
         if *ended != Ended::Done {
             let next = if again { "it is tried again" } else { "no further try" };
-            note([format!("{}: failed with status {status}; {next}: {}", job.title, said.trim_end())]);
+            let (before, reason) = reason(said, &job.title);
+            let before = before.iter().map(|line| format!("{}: {line}", job.title));
+            note(before.chain([format!("{}: failed with status {status}; {next}: {reason}", job.title)]));
         }
         let Some(log) = self.pool.log else { return Ok(()) };
         let entry = json!({
@@ -189,6 +191,15 @@ impl Working<'_> {
         });
         append(log, &format!("{entry}\n"))
     }
+}
+
+/// Splits a worker's errors into the lines of its commands and its own reason, the last line, which begins with the
+/// program's name and the job's title.
+fn reason<'a>(said: &'a str, title: &str) -> (Vec<&'a str>, &'a str) {
+    let mut lines: Vec<&str> = said.lines().collect();
+    let last = lines.pop().unwrap_or_default();
+    let own = last.split_once(": ").and_then(|(_program, rest)| rest.strip_prefix(title)?.strip_prefix(": "));
+    (lines, own.unwrap_or(last))
 }
 
 /// Reads a worker's output until it ends. Returns its exit status, as a shell shows it, and its errors.
@@ -220,4 +231,20 @@ fn shell_status(status: std::process::ExitStatus) -> i32 {
 pub(crate) fn append(path: &Path, line: &str) -> Result<()> {
     let write = || OpenOptions::new().create(true).append(true).open(path)?.write_all(line.as_bytes());
     write().with_context(|| format!("{}: cannot write the file", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::reason;
+
+    #[test]
+    fn reasons_do_not_repeat_the_title() {
+        let said = "loading\nno display\nactq: arm, rtn: drive: the command failed (exit status: 3): sh run.sh\n";
+        assert_eq!(
+            reason(said, "arm, rtn: drive"),
+            (vec!["loading", "no display"], "the command failed (exit status: 3): sh run.sh")
+        );
+        assert_eq!(reason("killed: no memory\n", "arm"), (vec![], "killed: no memory"));
+        assert_eq!(reason("", "arm"), (vec![], ""));
+    }
 }
