@@ -182,10 +182,13 @@ impl<'a> Maker<'a> {
         let quantizer = self.prepared(contender)?;
         let Subject { policy, recordings } = self.subject;
         let calib = recordings.calib.as_ref().with_context(|| Recording::Calib.missing("a rival"))?;
-        let teacher = Teacher::new(policy, quantizer.method().graph(), calib);
+        let mut teacher = Teacher::new(policy, quantizer.method().graph(), calib);
+        if matches!(rival, Rival::Student { has_imagined: true, .. }) {
+            teacher.windows.imagine(self.seed);
+        }
         let settings = Settings { budget: budget.budget(), steps: self.steps, seed: self.seed };
         let made = match rival {
-            Rival::Student(form) => student(&teacher, form, settings, progress),
+            Rival::Student { form, .. } => student(&teacher, form, settings, progress),
             Rival::Pruned => pruned(&teacher, settings, progress),
         };
         let made = match made {

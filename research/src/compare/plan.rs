@@ -52,7 +52,15 @@ pub enum Contender {
     #[value(name = "student-4")]
     #[serde(rename = "student-4")]
     Student4,
-    /// The same in f32: its error and its size, no image
+    /// student that learns from distill's imagined rollouts, too
+    #[value(name = "student-imagined")]
+    #[serde(rename = "student-imagined")]
+    StudentImagined,
+    /// The same in 4 bits
+    #[value(name = "student-4-imagined")]
+    #[serde(rename = "student-4-imagined")]
+    Student4Imagined,
+    /// student, in f32: its error and its size, no image
     #[value(name = "student-f32")]
     #[serde(rename = "student-f32")]
     StudentF32,
@@ -64,7 +72,12 @@ pub enum Contender {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rival {
     /// A narrower network that learns from random weights on.
-    Student(Form),
+    Student {
+        /// Form of its weights.
+        form: Form,
+        /// `true` if it learns from imagined rollouts, too.
+        has_imagined: bool,
+    },
     /// A pruned network that learns on.
     Pruned,
 }
@@ -82,6 +95,8 @@ impl Contender {
             | Self::Distill
             | Self::Student
             | Self::Student4
+            | Self::StudentImagined
+            | Self::Student4Imagined
             | Self::StudentF32
             | Self::Pruned => Method::Distill,
         }
@@ -94,10 +109,13 @@ impl Contender {
 
     /// Returns the rival that is made instead of codes of the trained network.
     pub fn rival(self) -> Option<Rival> {
+        let student = |form, has_imagined| Some(Rival::Student { form, has_imagined });
         match self {
-            Self::Student => Some(Rival::Student(Form::Int8)),
-            Self::Student4 => Some(Rival::Student(Form::Bits4)),
-            Self::StudentF32 => Some(Rival::Student(Form::F32)),
+            Self::Student => student(Form::Int8, false),
+            Self::Student4 => student(Form::Bits4, false),
+            Self::StudentImagined => student(Form::Int8, true),
+            Self::Student4Imagined => student(Form::Bits4, true),
+            Self::StudentF32 => student(Form::F32, false),
             Self::Pruned => Some(Rival::Pruned),
             _ => None,
         }
@@ -126,6 +144,8 @@ impl Contender {
             Self::Distill => "distill",
             Self::Student => "student, int8",
             Self::Student4 => "student, 4 bits",
+            Self::StudentImagined => "student, int8, imagined rollouts",
+            Self::Student4Imagined => "student, 4 bits, imagined rollouts",
             Self::StudentF32 => "student, f32",
             Self::Pruned => "pruned, int8",
         }
