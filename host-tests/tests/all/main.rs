@@ -1,14 +1,11 @@
 //! The tests of more than one crate: one binary, so that cargo links one, and the tests share their builds.
 
 mod accuracy;
-mod arrows;
 mod budgets;
-mod built_once;
 mod c_ports;
 mod cli;
 mod constants;
 mod controller;
-mod demo;
 mod denoising;
 mod deployed;
 mod digests;

@@ -26,7 +26,7 @@ const C_HEADER: &str = "actq-capi-header";
 
 /// The tests that only `cargo verify --all` runs, modules of `host-tests/tests/all`: those in QEMU beyond the smoke
 /// run, those that learn for long, and those of packages that the short run does not download.
-const SKIPPED_TESTS: [&str; 6] = ["--skip", "on_target::", "--skip", "learning::", "--skip", "built_once::"];
+const SKIPPED_TESTS: [&str; 4] = ["--skip", "on_target::", "--skip", "learning::"];
 
 /// A command with a name.
 pub(super) struct Step {
