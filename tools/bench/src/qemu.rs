@@ -117,7 +117,7 @@ impl Server {
 }
 
 /// The profile of the plugin (see `Cargo.toml`).
-const PROFILE: &str = "release";
+const PROFILE: &str = "checks";
 
 /// Counts instructions in the regions that a firmware marks.
 #[derive(Debug)]

@@ -9,8 +9,8 @@ use actq_controller::Limits;
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, bail, ensure};
 
-use crate::limits;
 use crate::setup::{self, cargo};
+use crate::{PROFILE, limits};
 
 const USAGE: &str = "\
 Usage: cargo xtask firmware --board NAME [--image FILE.actq] [--limits LIMITS] [--features LIST] [--key HEX]
@@ -161,12 +161,12 @@ fn example() -> Result<PathBuf> {
     let mut build = cargo();
     // Building it with actq-bench selects the features of tests and measurements; otherwise cargo would build the
     // quantizer twice.
-    build.current_dir(root()).args(["build", "--quiet", "--release", "--bin", "actq"]);
+    build.current_dir(root()).args(["build", "--quiet", "--profile", PROFILE, "--bin", "actq"]);
     let built =
         build.args(["--package", "actq-cli", "--package", "actq-bench"]).status().context("cannot start cargo")?;
     ensure!(built.success(), "cannot build actq");
     let mut command =
-        Command::new(target_dir().join("release").join("actq").with_extension(std::env::consts::EXE_EXTENSION));
+        Command::new(target_dir().join(PROFILE).join("actq").with_extension(std::env::consts::EXE_EXTENSION));
     command.current_dir(root()).args(["quantize", "examples/ur3/policy", "--method", "rtn", "--bits", "3"]);
     let output = command.args(["--group", "32", "--activations", "8", "--out"]).arg(&new).output()?;
     ensure!(output.status.success(), "cannot quantize the UR3 policy: {}", String::from_utf8_lossy(&output.stderr));

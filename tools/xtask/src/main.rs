@@ -19,6 +19,9 @@ use std::process::ExitCode;
 use actq_boards::Target;
 use anyhow::{Context as _, Result, ensure};
 
+/// The profile of what these commands build for the host (see `Cargo.toml`).
+const PROFILE: &str = "checks";
+
 const USAGE: &str = "\
 Commands of the actq workspace. Usage: cargo xtask COMMAND
 
@@ -87,7 +90,7 @@ fn measure(arguments: &[&str], targets: &[Target]) -> Result<()> {
 /// Builds the binary of a package and runs one of its commands.
 fn measuring(package: &str, arguments: &[&str]) -> Result<()> {
     let mut command = setup::cargo();
-    command.args(["run", "--release", "--package", package, "--"]).args(arguments);
+    command.args(["run", "--profile", PROFILE, "--package", package, "--"]).args(arguments);
     println!("building {package}");
     ensure!(command.status().context("cannot start cargo")?.success(), "{} failed", arguments[0]);
     Ok(())

@@ -7,8 +7,8 @@ use std::process::{Command, Stdio};
 use actq_boards::{Clock, Target, root, target_dir, version};
 use anyhow::{Context as _, Result, ensure};
 
-use crate::firmware;
 use crate::setup::cargo;
+use crate::{PROFILE, firmware};
 
 const USAGE: &str = "\
 Usage: cargo xtask python [--optional] [-- PYTEST...]
@@ -84,17 +84,17 @@ fn test(optional: bool, pytest: &[String]) -> Result<()> {
     let package = root().join(PACKAGE);
     let python = environment(&package, optional)?;
     // The features of the extension, so that both share what is built.
-    let command = ["build", "--release", "--package", "actq-cli", "--package", "actq-python", "--bin", "actq"];
+    let command = ["build", "--profile", PROFILE, "--package", "actq-cli", "--package", "actq-python", "--bin", "actq"];
     run(cargo().current_dir(root()).args(command))?;
     let wheels = target_dir().join("python/wheels");
     if wheels.exists() {
         fs::remove_dir_all(&wheels).context("cannot remove the old wheels")?;
     }
-    let build = ["-m", "maturin", "build", "--release", "--locked", "--out"];
+    let build = ["-m", "maturin", "build", "--profile", PROFILE, "--locked", "--out"];
     run(Command::new(&python).current_dir(&package).args(build).arg(&wheels))?;
     let install = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps", "--no-index", "--find-links"];
     run(Command::new(&python).args(install).arg(&wheels).arg("actq"))?;
-    let actq = target_dir().join("release").join(format!("actq{}", std::env::consts::EXE_SUFFIX));
+    let actq = target_dir().join(PROFILE).join(format!("actq{}", std::env::consts::EXE_SUFFIX));
     let mut tests = Command::new(&python);
     tests.current_dir(&package).env("ACTQ", actq).args(["-m", "pytest", "-q"]).args(pytest);
     run(tests.envs(controller()?.map(|command| ("ACTQ_CONTROLLER", command))))?;

@@ -5,7 +5,7 @@ use std::process::Command;
 use actq_boards::{Target, root};
 
 use crate::setup::cargo;
-use crate::{firmware, python, setup};
+use crate::{PROFILE, firmware, python, setup};
 
 /// The oldest supported compiler.
 const OLDEST: &str = concat!(env!("CARGO_PKG_RUST_VERSION"), ".0");
@@ -25,7 +25,7 @@ const ONNX_TESTS: &str = "actq-onnx-tests";
 const C_HEADER: &str = "actq-capi-header";
 
 /// The tests that only `cargo verify --all` runs, modules of `host-tests/tests/all`: those in QEMU beyond the smoke
-/// run, those that learn for long, and those of packages that the short run does not download.
+/// run, and those that learn for long.
 const SKIPPED_TESTS: [&str; 4] = ["--skip", "on_target::", "--skip", "learning::"];
 
 /// A command with a name.
@@ -73,22 +73,23 @@ pub(super) fn all(installed: Installed) -> Vec<Step> {
     steps.board_lints();
     steps.application_lints();
     steps.documentation();
-    steps.add("budgets", &["run", "--release", "--package", "actq-bench", "--", "budgets"]);
-    steps.add("faults on the line", &["run", "--release", "--package", "actq-bench", "--", "faults"]);
-    steps.add("ONNX files against tract", &["test", "--release", "--package", ONNX_TESTS]);
-    steps.add("C header", &["test", "--release", "--package", C_HEADER]);
+    steps.add("budgets", &["run", "--profile", PROFILE, "--package", "actq-bench", "--", "budgets"]);
+    steps.add("faults on the line", &["run", "--profile", PROFILE, "--package", "actq-bench", "--", "faults"]);
+    steps.add("ONNX files against tract", &["test", "--profile", PROFILE, "--package", ONNX_TESTS]);
+    steps.add("C header", &["test", "--profile", PROFILE, "--package", C_HEADER]);
     let publish = ["publish", "--workspace", "--dry-run", "--no-verify", "--allow-dirty", "--locked"];
     steps.add("crates to publish", &publish);
-    let python = ["run", "--release", "--package", "xtask", "--", "python"];
+    let python = ["run", "--profile", PROFILE, "--package", "xtask", "--", "python"];
     steps.add_if(installed.python, "Python package", cargo(), &python);
-    let kernels = ["test", "--release", "--package", "actq-kernels", "--features", "writer", "--target", TARGET_32_BIT];
+    let kernels =
+        ["test", "--profile", PROFILE, "--package", "actq-kernels", "--features", "writer", "--target", TARGET_32_BIT];
     steps.add_if(installed.narrow, "kernels' tests with words of 32 bits", cargo(), &kernels);
-    let check = [&["run", OLDEST, "cargo", "check", "--release"], &host_packages()[..]].concat();
+    let check = [&["run", OLDEST, "cargo", "check", "--profile", PROFILE], &host_packages()[..]].concat();
     steps.add_if(installed.oldest, &format!("oldest compiler, {OLDEST}"), Command::new("rustup"), &check);
     steps.0
 }
 
-const TESTS: [&str; 3] = ["test", "--release", "--no-fail-fast"];
+const TESTS: [&str; 4] = ["test", "--profile", PROFILE, "--no-fail-fast"];
 const DENY: [&str; 3] = ["--", "-D", "warnings"];
 
 /// Returns all packages for the host, without those built only for boards, and without those that take minutes to
@@ -135,16 +136,17 @@ impl Steps {
 
     /// Adds lints and a test of the kernels with the features that every build has.
     fn least_kernels(&mut self) {
-        let least = ["--release", "--package", "actq-kernels", "--no-default-features"];
+        let least = ["--profile", PROFILE, "--package", "actq-kernels", "--no-default-features"];
         self.add("lints of the least kernels", &[&["clippy", "--all-targets"], &least[..], &DENY].concat());
         self.add("test of the least kernels", &[&["test"], &least[..], &["--lib", "--test", "left_out"]].concat());
     }
 
     fn format_and_lints(&mut self) {
         self.add("format", &["fmt", "--all", "--check"]);
-        let arguments = [&["clippy", "--all-targets", "--release"], &host_packages()[..], &DENY].concat();
+        let arguments = [&["clippy", "--all-targets", "--profile", PROFILE], &host_packages()[..], &DENY].concat();
         self.add_of_firmware("lints", &arguments, &[]);
-        let kernels = [&["clippy", "--all-targets", "--release", "--package", "actq-kernels"], &DENY[..]].concat();
+        let kernels =
+            [&["clippy", "--all-targets", "--profile", PROFILE, "--package", "actq-kernels"], &DENY[..]].concat();
         self.add("lints of the kernels without features", &kernels);
     }
 
@@ -178,7 +180,7 @@ impl Steps {
         // Any 64 digits will do.
         let key = "0".repeat(64);
         self.add_of_firmware("lints of the application's other features", &arguments, &[("ACTQ_PUBLIC_KEY", &key)]);
-        let current_loop = ["test", "--release", "--package", APPLICATION, "--lib", "--features", "foc"];
+        let current_loop = ["test", "--profile", PROFILE, "--package", APPLICATION, "--lib", "--features", "foc"];
         self.add("tests of the application's current loop", &current_loop);
         let styles = [&["clippy", "--package", STYLES, "--lib", "--bins"], &fpu[..], &DENY].concat();
         self.add_of_firmware("lints of the styles", &styles, &[]);
@@ -188,9 +190,10 @@ impl Steps {
 
     fn documentation(&mut self) {
         let deny = [("RUSTDOCFLAGS", "-D warnings")];
-        let host = [&["doc", "--no-deps", "--release"], &host_packages()[..], &["--exclude", "xtask"]].concat();
+        let host =
+            [&["doc", "--no-deps", "--profile", PROFILE], &host_packages()[..], &["--exclude", "xtask"]].concat();
         self.add_of_firmware("documentation", &host, &deny);
-        let kernels = ["doc", "--no-deps", "--release", "--package", "actq-kernels"];
+        let kernels = ["doc", "--no-deps", "--profile", PROFILE, "--package", "actq-kernels"];
         self.add_with("documentation of the kernels without features", &kernels, &deny);
         let firmware = FIRMWARE.map(|name| ["--package", name]).concat();
         let firmware = [&["doc", "--no-deps"], &build_for(Target::Fpu)[..], &firmware].concat();
