@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::figures::{CustomResult, Driven, Evaluated, Made};
 use crate::merged::Merged;
 
-/// The version of the files.
-pub const FORMAT: u32 = 1;
+/// The version of the files: 2 since results end in their checksum.
+pub const FORMAT: u32 = 2;
 
 /// A job's result.
 #[derive(Clone, Debug, Serialize, Deserialize)]

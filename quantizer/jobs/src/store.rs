@@ -23,8 +23,9 @@ struct Header {
     version: u32,
 }
 
-/// A store. It holds `store.json` with the version of its files, and for each result `ADDRESS.json`. An image or a
-/// recording is beside it, as `ADDRESS.actq` or `ADDRESS.npz`, and is written first.
+/// A store. It holds `store.json` with the version of its files, and for each result `ADDRESS.json`, which ends in the
+/// SHA-256 of what is before. An image or a recording is beside it, as `ADDRESS.actq` or `ADDRESS.npz`, and is written
+/// first; the result has its SHA-256.
 #[derive(Clone, Debug)]
 pub struct Store {
     folder: PathBuf,
@@ -154,9 +155,36 @@ impl Store {
         self.file(address, "json")
     }
 
-    /// Returns `true` if the store has the result of a job.
+    /// Returns `true` if the store has the result of a job and the file beside it, both whole.
     pub fn has(&self, address: &str) -> bool {
-        is_digest(address) && self.result(address).is_file()
+        is_digest(address) && self.read_whole(address).is_ok()
+    }
+
+    /// Returns what is damaged in the result of a job or in the file beside it; `None` if both are whole, or if there is
+    /// no result.
+    pub fn damage(&self, address: &str) -> Option<Error> {
+        self.read_whole(address).err().filter(|error| !error.again).map(|error| error.error)
+    }
+
+    /// Reads the result of a job, and checks the file beside it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`] and [`Self::read_blob`].
+    pub fn read_whole(&self, address: &str) -> Result<Outcome, JobError> {
+        let result = self.read(address)?;
+        let beside = match &result {
+            Outcome::Made(made) => Some((self.image(address), &made.image)),
+            Outcome::Driven(driven) => driven.recording.as_ref().map(|sha256| (self.recording(address), sha256)),
+            Outcome::Custom(custom) => {
+                custom.file.as_ref().map(|file| (self.file(address, &file.ending), &file.sha256))
+            }
+            Outcome::Impossible(_) | Outcome::Evaluated(_) | Outcome::Merged(_) => None,
+        };
+        if let Some((path, sha256)) = beside {
+            self.read_blob(&path, sha256)?;
+        }
+        Ok(result)
     }
 
     /// Reads the result of a job.
@@ -176,10 +204,11 @@ impl Store {
             Err(error) => return Err(JobError::again(error).context(format!("{name}: cannot read the file"))),
         };
         let damaged = |why: String| {
-            let text = format!("{name}: is damaged ({why}); remove it, and run its job again");
+            let text = format!("{name}: is damaged ({why}); run `actq sweep` or its job again");
             JobError::never(Error::input(text))
         };
-        let record: Record = serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
+        let content = unsealed(&bytes).ok_or_else(|| damaged("its checksum differs".to_owned()))?;
+        let record: Record = serde_json::from_slice(&content).map_err(|error| damaged(error.to_string()))?;
         if record.format != FORMAT || record.address != address {
             return Err(damaged(format!("format {}, address {}", record.format, record.address)));
         }
@@ -195,14 +224,13 @@ impl Store {
         let name = path.display();
         let bytes = fs::read(path).map_err(|error| {
             if error.kind() == ErrorKind::NotFound {
-                let record = path.with_extension("json");
-                let text = format!("{name}: is missing; remove {}, and run its job again", record.display());
+                let text = format!("{name}: is missing, and its result is there; run `actq sweep` or its job again");
                 return JobError::never(Error::input(text));
             }
             JobError::again(error).context(format!("{name}: cannot read the file"))
         })?;
         if of_bytes(&bytes) != sha256 {
-            let text = format!("{name}: is damaged; remove it and its .json, and run its job again");
+            let text = format!("{name}: is damaged (its checksum differs); run `actq sweep` or its job again");
             return Err(JobError::never(Error::input(text)));
         }
         Ok(bytes)
@@ -218,7 +246,7 @@ impl Store {
         if let Some((path, bytes)) = blob {
             host.write(path, bytes).map_err(JobError::again)?;
         }
-        self.write(&format!("{}.json", record.address), &line(record)?, host)
+        self.write(&format!("{}.json", record.address), &sealed(line(record)?), host)
     }
 
     fn write(&self, name: &str, bytes: &[u8], host: &dyn Host) -> Result<(), JobError> {
@@ -230,4 +258,22 @@ impl Store {
 fn line(value: &impl Serialize) -> Result<Vec<u8>, JobError> {
     let text = serde_json::to_string(value).context("cannot format a result").map_err(JobError::never)?;
     Ok((text + "\n").into_bytes())
+}
+
+/// Key of a result's checksum, its last one.
+const SEAL: &str = ",\"sha256\":\"";
+
+/// Adds the SHA-256 of a JSON object, a line, as its last key.
+fn sealed(line: Vec<u8>) -> Vec<u8> {
+    let sha256 = of_bytes(&line);
+    let object = line.strip_suffix(b"}\n").unwrap_or(&line);
+    [object, SEAL.as_bytes(), sha256.as_bytes(), b"\"}\n"].concat()
+}
+
+/// Returns the line that was [`sealed`]; `None` if any byte differs.
+fn unsealed(bytes: &[u8]) -> Option<Vec<u8>> {
+    let sealed = bytes.strip_suffix(b"\"}\n")?;
+    let (rest, sha256) = sealed.split_at_checked(sealed.len().checked_sub(64)?)?;
+    let line = [rest.strip_suffix(SEAL.as_bytes())?, b"}\n"].concat();
+    (of_bytes(&line).as_bytes() == sha256).then_some(line)
 }

@@ -92,6 +92,44 @@ fn results(store: &Path) -> usize {
 }
 
 #[test]
+fn damaged_results_are_named_and_made_again() -> Result<()> {
+    let sweep = Sweep::new()?;
+    let spec = "policies = [\"policy\"]\nmethods = [\"rtn\"]\nbpw = [4, 5]\n";
+    fs::write(sweep.folder()?.join("sweep.toml"), spec)?;
+    let table = succeeded(&sweep.run("sweep sweep.toml --store whole --quiet", "")?)?;
+    let whole = sweep.store("whole")?;
+    let folder = sweep.folder()?.join("whole");
+    for key in ["\"bytes\":", "\"cycles\":", "\"bpw\":", ""] {
+        let (name, content) = whole
+            .iter()
+            .filter_map(|(name, content)| Some((name, content.as_ref()?)))
+            .find(|(name, content)| match key {
+                "" => name.ends_with(".actq"),
+                _ => String::from_utf8_lossy(content).contains(key),
+            })
+            .context("no such result")?;
+        let mut damaged = content.clone();
+        match key {
+            "" => damaged.truncate(damaged.len() / 2),
+            _ => {
+                let at = String::from_utf8_lossy(content).find(key).context("no such key")? + key.len();
+                damaged[at] = if damaged[at] == b'7' { b'8' } else { b'7' };
+            }
+        }
+        fs::write(folder.join(name), damaged)?;
+        let merge = sweep.run("merge sweep.toml --store whole", "")?;
+        failed(&merge, 1, &[name, "is damaged", "1 result damaged; run `actq sweep sweep.toml"])?;
+        ensure!(merge.stdout.is_empty(), "a damaged result is shown");
+        let missing = sweep.run("plan sweep.toml --missing whole", "")?;
+        ensure!(succeeded(&missing)?.lines().count() == 1, "its job is missing");
+        let again = sweep.run("sweep sweep.toml --store whole --quiet", "")?;
+        ensure!(String::from_utf8_lossy(&again.stderr).contains(&format!("{name}: is damaged")));
+        ensure!(succeeded(&again)? == table && sweep.store("whole")? == whole, "{key}");
+    }
+    Ok(())
+}
+
+#[test]
 fn interrupted_sweeps_resume_to_the_same_store() -> Result<()> {
     let sweep = Sweep::new()?;
     let plan = succeeded(&sweep.run("plan sweep.toml", "")?)?;

@@ -16,7 +16,7 @@ use crate::work::{Merge, Row};
 ///
 /// # Errors
 ///
-/// "Again" if a result is missing.
+/// "Again" if a result is missing, "never" if one or its image is damaged.
 pub fn merge(plan: &Merge, store: &Store) -> Result<Merged, JobError> {
     let mut images: Vec<Vec<MergedImage>> = vec![Vec::new(); plan.policies.len()];
     for row in &plan.rows {
@@ -30,12 +30,12 @@ pub fn merge(plan: &Merge, store: &Store) -> Result<Merged, JobError> {
     Ok(Merged { clock_hz: plan.clock_hz, policies })
 }
 
-/// Merges the rows of a plan whose images and evaluations are all in the store; those without all of their episodes
-/// count as not driven. Returns `None` if there is none.
+/// Merges the rows of a plan whose images and evaluations are all in the store, and whole; those without all of their
+/// episodes count as not driven. Returns `None` if there is none.
 ///
 /// # Errors
 ///
-/// If a result is damaged.
+/// If the results are not of one plan.
 pub fn merge_finished(plan: &Merge, store: &Store) -> Result<Option<Merged>, JobError> {
     let finished = |row: &Row| {
         let has_all = |addresses: &[String]| addresses.iter().all(|address| store.has(address));
@@ -50,7 +50,7 @@ pub fn merge_finished(plan: &Merge, store: &Store) -> Result<Option<Merged>, Job
 }
 
 fn image(row: &Row, store: &Store) -> Result<MergedImage, JobError> {
-    let figures = match store.read(&row.image)? {
+    let figures = match store.read_whole(&row.image)? {
         Outcome::Made(made) => Some(figures(row, made, store)?),
         Outcome::Impossible(_) => None,
         _ => return Err(unexpected(&row.image)),

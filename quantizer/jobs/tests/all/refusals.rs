@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use crate::common::{Fake, SPEC, files, folder, jobs};
+use crate::common::{Fake, SPEC, files, folder, jobs, run_all};
 use actq_jobs::job::Job;
 use actq_jobs::order;
 use actq_jobs::run::run;
@@ -98,8 +98,8 @@ fn other_folders_are_no_stores() {
         assert!(!error.again && format!("{:#}", error.error).contains(expected), "{:#}", error.error);
     };
     refused("is not empty, and has no store.json");
-    fs::write(dir.path().join("store.json"), "{\"format\":\"actq-store\",\"version\":2}").expect("written");
-    refused("is a store of version 2, and this is actq with stores of version 1");
+    fs::write(dir.path().join("store.json"), "{\"format\":\"actq-store\",\"version\":1}").expect("written");
+    refused("is a store of version 1, and this is actq with stores of version 2");
     fs::write(dir.path().join("store.json"), "{}").expect("written");
     refused("is not that of a store");
 }
@@ -149,18 +149,49 @@ fn damaged_results_are_not_used() {
     let before = files(store.folder());
     fs::write(store.image(&quantize.address), "other").expect("written");
     let error = run(evaluate).expect_err("a damaged image");
-    assert!(!error.again && format!("{:#}", error.error).contains("is damaged; remove it"), "{:#}", error.error);
+    assert!(!error.again && format!("{:#}", error.error).contains("is damaged (its checksum"), "{:#}", error.error);
     fs::remove_file(store.image(&quantize.address)).expect("removed");
     let error = run(evaluate).expect_err("a missing image");
-    let expected = format!("is missing; remove {}", store.file(&quantize.address, "json").display());
-    assert!(!error.again && format!("{:#}", error.error).contains(&expected), "{:#}", error.error);
+    assert!(!error.again && format!("{:#}", error.error).contains(".actq: is missing"), "{:#}", error.error);
     fs::write(store.folder().join(format!("{}.json", quantize.address)), "{\"format\":1").expect("written");
-    let error = run(quantize).expect_err("a damaged result");
-    assert!(format!("{:#}", error.error).contains("is damaged"), "{:#}", error.error);
-    // As the errors say: remove the files, and run the job again.
-    fs::remove_file(store.folder().join(format!("{}.json", quantize.address))).expect("removed");
+    let error = run(evaluate).expect_err("a damaged result");
+    assert!(format!("{:#}", error.error).contains(".json: is damaged"), "{:#}", error.error);
+    // As the errors say: the job runs again.
     assert!(run(quantize).expect("made again"));
     assert_eq!(files(store.folder()), before);
+}
+
+#[test]
+fn any_changed_byte_of_a_store_is_noticed() {
+    let (dir, host) = (folder(SPEC), Fake::default());
+    let plan = jobs(&dir).expect("a plan");
+    let path = dir.path().join("store");
+    run_all(&plan, &path, &host).expect("they run");
+    let store = Store::open_existing(&path).expect("a store");
+    let kinds: BTreeSet<&str> = plan.iter().map(|job| job.work.kind()).collect();
+    for kind in kinds {
+        let job = plan.iter().find(|job| job.work.kind() == kind && store.has(&job.address)).expect(kind);
+        for ending in ["json", "actq", "npz"] {
+            let file = store.file(&job.address, ending);
+            let Ok(whole) = fs::read(&file) else { continue };
+            let noticed = |bytes: &[u8], what: &str| {
+                fs::write(&file, bytes).expect("written");
+                let damage = store.damage(&job.address).map(|damage| format!("{damage:#}"));
+                let named = damage.as_ref().is_some_and(|text| text.contains(&*file.to_string_lossy()));
+                assert!(named && !store.has(&job.address), "{kind}, {ending}, {what}: {damage:?}");
+            };
+            // A recording has thousands of bytes, all under one digest.
+            for place in (0..whole.len()).step_by(1 + whole.len() / 1000) {
+                let mut other = whole.clone();
+                other[place] ^= 1;
+                noticed(&other, &format!("byte {place}"));
+            }
+            (0..whole.len()).step_by(1 + whole.len() / 50).for_each(|cut| noticed(&whole[..cut], "cut"));
+            noticed(&[&whole[..], b"\n"].concat(), "longer");
+            fs::write(&file, &whole).expect("written");
+            assert!(store.has(&job.address) && store.damage(&job.address).is_none());
+        }
+    }
 }
 
 #[test]

@@ -45,7 +45,7 @@ class Remote:
             return set()
 
     def fetch(self, job: Job, folder: str) -> None:
-        endings = [".json"] if job["kind"] == "merge" else [".json", ".actq", ".npz"]
+        endings = [".json", ".actq"] if job["kind"] == "merge" else [".json", ".actq", ".npz"]
         wanted = ["store.json", *(address + ending for address in job["deps"] for ending in endings)]
         for name in self.names().intersection(wanted):
             self.fs.get_file(f"{self.root}/{name}", os.path.join(folder, name))
@@ -59,11 +59,14 @@ class Remote:
                 self.fs.mv(part, f"{self.root}/{name}")
 
 
-def names(store: str) -> set[str]:
-    """Return the names of a store's files."""
-    if "://" in store:
-        return Remote(store).names()
-    return set(os.listdir(store)) if os.path.isdir(store) else set()
+def open_jobs(plan: list[Job], options: argparse.Namespace) -> set[str]:
+    """Return the addresses of the jobs without a result; in a folder, of those with a damaged one, too."""
+    if "://" not in options.store and os.path.isdir(options.store):
+        command = [options.actq, "plan", options.spec, "--missing", options.store]
+        lines = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
+        return {json.loads(line)["address"] for line in lines}
+    there = Remote(options.store).names() if "://" in options.store else set()
+    return {job["address"] for job in plan if job["address"] + ".json" not in there}
 
 
 def run_job(job: Job, store: str, actq: str) -> tuple[int, str, float]:
@@ -87,8 +90,8 @@ class Sweep:
 
     def __init__(self, plan: list[Job], options: argparse.Namespace) -> None:
         self.options = options
-        there = names(options.store)
-        missing = [job for job in plan if job["address"] + ".json" not in there]
+        without_result = open_jobs(plan, options)
+        missing = [job for job in plan if job["address"] in without_result]
         self.open = {job["address"]: job for job in missing}
         self.waiting = {job["address"]: sum(dep in self.open for dep in job["deps"]) for job in missing}
         self.dependents: dict[str, list[str]] = {address: [] for address in self.open}

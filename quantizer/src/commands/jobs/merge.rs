@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use actq::error::Error;
 use actq::text::count;
 use actq_jobs::job::Job;
 use actq_jobs::merged::Merged;
@@ -25,6 +26,16 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     let store = Store::open_existing(&args.store)?;
     refuse_inside(&args.store, args.svg.iter().chain(&args.json))?;
     let outputs = reserve(args.svg.iter().chain(&args.json), plan::inputs(&args.spec, &jobs))?;
+    let damaged: Vec<Error> = jobs.iter().filter_map(|job| store.damage(&job.address)).collect();
+    note(damaged.iter().map(|damage| format!("{damage:#}")));
+    ensure!(
+        damaged.is_empty(),
+        "{}: {} damaged; run `actq sweep {} --store {}`, which makes them again",
+        args.store.display(),
+        count(damaged.len(), "result"),
+        args.spec.display(),
+        args.store.display()
+    );
     let left = jobs.iter().filter(|job| job.work.kind() != "merge" && !store.has(&job.address)).count();
     ensure!(
         left == 0,

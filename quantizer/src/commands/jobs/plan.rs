@@ -13,13 +13,14 @@ use anyhow::{Context as _, Result};
 
 use super::host::Command;
 use crate::args::jobs::PlanArgs;
-use crate::terminal::print;
+use crate::terminal::{note, print};
 
 /// Prints the jobs of a spec.
 pub(crate) fn run(args: &PlanArgs) -> Result<()> {
     let mut jobs = read(&args.spec, &Command)?;
     if let Some(folder) = &args.missing {
         let store = Store::open_existing(folder)?;
+        note(jobs.iter().filter_map(|job| store.damage(&job.address)).map(|damage| format!("{damage:#}")));
         jobs.retain(|job| !store.has(&job.address));
     }
     jobs.retain(|job| args.stage.is_none_or(|stage| job.stage == stage));

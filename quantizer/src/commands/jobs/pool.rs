@@ -39,13 +39,14 @@ pub struct Pool<'a> {
     pub is_kept: bool,
 }
 
-/// Runs the jobs of a plan that have no result yet, each in a process of its own.
+/// Runs the jobs of a plan that have no result yet, or a damaged one, each in a process of its own.
 ///
 /// # Errors
 ///
 /// At the end, if a job has failed; the store then has the results of the others. [`JobError::again`] is `true` if each
 /// of those that failed may succeed later.
 pub fn complete(jobs: &[Job], store: &Store, pool: &Pool<'_>) -> Result<()> {
+    note(jobs.iter().filter_map(|job| store.damage(&job.address)).map(|damage| format!("{damage:#}; it runs now")));
     let progress = Progress::new(pool.quiet, "starting")?;
     let schedule = Schedule::new(jobs, |job| store.has(&job.address), pool.tries);
     let mut work = Working { jobs, store, schedule, pool, shares: BTreeMap::new(), is_final: false };
