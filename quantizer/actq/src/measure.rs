@@ -5,6 +5,7 @@ pub mod check;
 pub mod eval;
 pub mod interval;
 pub mod own;
+pub mod recorded;
 pub mod size;
 pub mod time;
 pub mod unrounded;

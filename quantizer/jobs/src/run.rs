@@ -11,6 +11,7 @@ use std::path::Path;
 use actq::data::Sizes;
 use actq::error::ensure;
 use actq::measure::eval::ErrorSums;
+use actq::measure::recorded;
 
 use crate::error::JobError;
 use crate::figures::Evaluated;
@@ -58,6 +59,8 @@ fn evaluate(job: &Job, evaluate: &work::Evaluate, store: &Store, host: &dyn Host
     let measure = || {
         let policy = host.load(path_of(evaluate.policy.as_deref())?)?;
         let mut dataset = heldout(job, Sizes::of(&policy))?;
+        // `actq sweep` says how they differ.
+        recorded::use_policy_of(&mut dataset, &policy.graph);
         dataset.fill_actions(&policy.graph);
         let [first, count] = [evaluate.episodes.first, evaluate.episodes.count].map(|n| n as usize);
         let end = first.saturating_add(count);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use actq::budget::{Budget, TimeLimit};
 use actq::data::{Recording, Recordings, Sizes, joined};
-use actq::measure::{check, eval};
+use actq::measure::{check, eval, recorded};
 use actq::methods::{Activations, Effort, MOST_MINUTES, Method, Options};
 use actq::pipeline::{Quantizer, check_budget};
 use actq::runtime::ImageBuffer;
@@ -136,8 +136,9 @@ pub(crate) fn quantize(
     let (policy, in_folder) = (policy.policy.clone(), folder.is_some());
     let (bytes, warnings, notes) = work::run(py, progress, move |worker| {
         check_budget(&policy, &options)?;
-        let recordings = read(&policy, calib, heldout, in_folder)?;
-        let mut warnings: Vec<String> = notes::of_recordings(&recordings).into_iter().collect();
+        let mut recordings = read(&policy, calib, heldout, in_folder)?;
+        let mut warnings = notes::of_recordings(&recordings);
+        warnings.extend(recorded::use_policy(&mut recordings, &policy.graph).iter().map(ToString::to_string));
         let limits = match &policy.around {
             Some(around) => notes::targets_without_limits(around),
             None => notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))),
@@ -182,7 +183,8 @@ fn read(
     Ok(Recordings { calib: calib.map(|learned| learned.dataset), heldout })
 }
 
-/// Runs an image over recordings; returns its errors against the f32 policy as a dict.
+/// Runs an image over recordings; returns its errors against the f32 policy as a dict, and a warning if the recorded
+/// actions are not the policy's.
 #[pyfunction]
 #[pyo3(signature = (image, recordings, policy, progress))]
 pub(crate) fn evaluate<'py>(
@@ -191,10 +193,10 @@ pub(crate) fn evaluate<'py>(
     recordings: &Bound<'py, PyAny>,
     policy: Option<&Policy>,
     progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<(Bound<'py, PyDict>, Option<String>)> {
     let passed = passed(Some(recordings), "recordings")?;
     let (buffer, policy) = (image.get().buffer().clone(), policy.map(|policy| Arc::clone(&policy.policy)));
-    let report = work::run(py, progress, move |worker| {
+    let (report, difference) = work::run(py, progress, move |worker| {
         let image = buffer.image(Path::new("image"))?;
         if image.has_around() {
             bail!("image: it takes raw inputs; compare it with a reference by `actq check`");
@@ -209,9 +211,9 @@ pub(crate) fn evaluate<'py>(
             Ok([one]) => one,
             Err(parts) => joined(&parts, image.state().len)?,
         };
-        eval::fill_actions(&mut dataset, source)?;
+        let difference = eval::fill_actions(&mut dataset, source)?;
         worker.report("running the image over the recordings", 0.0);
-        Ok(eval::evaluate(image, &dataset)?)
+        Ok((eval::evaluate(image, &dataset)?, difference))
     })?;
     let errors = PyDict::new(py);
     errors.set_item("nmse", report.nmse)?;
@@ -220,5 +222,5 @@ pub(crate) fn evaluate<'py>(
     errors.set_item("steps", report.steps)?;
     errors.set_item("bpw", report.bpw)?;
     errors.set_item("bytes", report.bytes)?;
-    Ok(errors)
+    Ok((errors, difference.map(|difference| difference.to_string())))
 }

@@ -35,8 +35,8 @@ pub(crate) fn stand_in(py: Python<'_>, policy: &Policy) -> PyResult<Image> {
 }
 
 /// The last image, those of all rounds, the rounds as JSON, the table of `actq tune`, and the round whose image had the
-/// most success if it is not the last.
-type Outcome = (Image, Vec<Image>, String, String, Option<usize>);
+/// most success if it is not the last, and warnings of recorded actions that are not the policy's.
+type Outcome = (Image, Vec<Image>, String, String, Option<usize>, Vec<String>);
 
 /// Quantizes in rounds. `rollout(round, image)` returns the recordings of a rollout, and its outcome as JSON.
 #[pyfunction]
@@ -101,5 +101,6 @@ pub(crate) fn tune(
         rounds,
         tuned::table(&tuned),
         better,
+        tuned.differences.iter().map(ToString::to_string).collect(),
     ))
 }

@@ -28,7 +28,8 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
     let driven = files_of(&args.driven)?;
     let _progress = Progress::new(args.quiet, "running the image over the recordings")?;
     let source = policy.map(|dir| source_of(dir, &image)).transpose()?.flatten();
-    let dataset = eval::heldout_from(policy, args.heldout.as_deref(), source.as_ref(), &image)?;
+    let (dataset, difference) = eval::heldout_from(policy, args.heldout.as_deref(), source.as_ref(), &image)?;
+    note(difference.map(|difference| difference.to_string()));
     let report = eval::evaluate(image, &dataset)?;
     let own = (!driven.is_empty()).then(|| own::own_path(image, &driven, source.as_ref())).transpose()?;
     for file in &driven {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use actq::budget::Budget;
 use actq::data::{Recording, Recordings, Share, Sizes, driven_by, files_of};
 use actq::measure::time::{CLOCK, StepTime};
-use actq::measure::{check, own};
+use actq::measure::{check, own, recorded};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::stats::Stats;
 use actq::pipeline::{QuantizedPolicy, Quantizer, check_budget};
@@ -47,8 +47,9 @@ pub fn run(
     let (calib, shares) = learned_from(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
     let shares = shares.unwrap_or_default();
     let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
-    let recordings = Recordings { calib, heldout };
+    let mut recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
+    note(recorded::use_policy(&mut recordings, &source.graph).iter().map(ToString::to_string));
     note(match &source.around {
         Some(around) => notes::targets_without_limits(around),
         None => notes::without_limits((0..source.act_len).map(|i| source.contract.limits(i))),

@@ -4,6 +4,7 @@ use std::env;
 use std::path::{Path, PathBuf};
 
 use actq::data::{Recording, Recordings, Sizes, files_of};
+use actq::measure::recorded;
 use actq_jobs::host::Host;
 use actq_jobs::job::Job;
 use actq_jobs::plan;
@@ -31,6 +32,10 @@ pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> 
     let calib = files_of(&args.calib)?;
     let progress = Progress::new(args.run.quiet, "planning")?;
     let spec_jobs = spec.map(|spec| plans::read(spec, host)).transpose()?;
+    if let Some(path) = spec.filter(|path| path.extension().is_some_and(|ending| ending == "toml")) {
+        let Spec { policies, calib, heldout, .. } = Spec::read(path)?;
+        policies.iter().try_for_each(|dir| note_recordings(dir, &calib, heldout.as_deref()))?;
+    }
     let inputs: Vec<PathBuf> = match (spec, &spec_jobs) {
         (Some(spec), Some(jobs)) => plans::inputs(spec, jobs),
         _ => {
@@ -106,16 +111,18 @@ fn planned(args: &SweepArgs, methods: &[String], cores: usize, host: &dyn Host) 
     spec.cpus = (cores / (spec.policies.len() * spec.bpw.len() * spec.methods.len())).max(1);
     let jobs = plan::jobs(&spec, host)?;
     for dir in &args.policy_dirs {
-        note_recordings(args, dir)?;
+        note_recordings(dir, &args.calib, args.heldout.as_deref())?;
     }
     Ok(jobs)
 }
 
 /// Prints notes on the recordings of a policy.
-fn note_recordings(args: &SweepArgs, dir: &Path) -> Result<()> {
+fn note_recordings(dir: &Path, calib: &[PathBuf], heldout: Option<&Path>) -> Result<()> {
     let policy = load(dir)?;
-    let calib = learned(&policy, &files_of(&args.calib)?)?.map(|learned| learned.dataset);
-    let heldout = Recording::Heldout.load(Some(dir), args.heldout.as_deref(), Sizes::of(&policy))?;
-    note(notes::of_recordings(&Recordings { calib, heldout }));
+    let calib = learned(&policy, &files_of(calib)?)?.map(|learned| learned.dataset);
+    let heldout = Recording::Heldout.load(Some(dir), heldout, Sizes::of(&policy))?;
+    let mut recordings = Recordings { calib, heldout };
+    note(notes::of_recordings(&recordings));
+    note(recorded::use_policy(&mut recordings, &policy.graph).iter().map(ToString::to_string));
     Ok(())
 }

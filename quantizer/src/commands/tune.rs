@@ -72,6 +72,7 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
         tuned.quantized.image.len(),
         args.rounds
     ))?;
+    note(tuned.differences.iter().map(ToString::to_string));
     note(report::tuned::better(&tuned, args.keep.as_deref()));
     Ok(())
 }

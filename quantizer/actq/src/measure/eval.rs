@@ -6,6 +6,7 @@ use std::path::Path;
 use actq_kernels::{Head, Image};
 use serde::{Deserialize, Serialize};
 
+use super::recorded::{self, Difference};
 use super::size::bits_per_weight;
 use super::unrounded::Unrounded;
 use crate::data::{Dataset, Recording, Sizes};
@@ -231,26 +232,34 @@ pub fn heldout(policy_dir: &Path, image: &Image<'_>) -> Result<Dataset> {
     let mut dataset = Recording::Heldout.require(Some(policy_dir), None, Sizes::of_image(image), "actq eval")?;
     if dataset.action.is_none() {
         let source = Policy::load(policy_dir).ok().filter(|policy| policy.digest == image.digest());
-        fill_actions(&mut dataset, source.as_ref())?;
+        fill_missing(&mut dataset, source.as_ref())?;
     }
     Ok(dataset)
 }
 
-/// Reads the held-out recording in `file`, or without it in the policy's folder. If it holds no actions, `source` gives
-/// them: the policy that the image was made from.
+/// Reads the held-out recording in `file`, or without it in the policy's folder. If it holds no actions, or others,
+/// `source` gives them: the policy that the image was made from. Returns how they differ, too.
 pub fn heldout_from(
     policy_dir: Option<&Path>,
     file: Option<&Path>,
     source: Option<&Policy>,
     image: &Image<'_>,
-) -> Result<Dataset> {
+) -> Result<(Dataset, Option<Difference>)> {
     let mut dataset = Recording::Heldout.require(policy_dir, file, Sizes::of_image(image), "actq eval")?;
-    fill_actions(&mut dataset, source)?;
-    Ok(dataset)
+    let difference = fill_actions(&mut dataset, source)?;
+    Ok((dataset, difference))
+}
+
+/// Gives a recording the actions of `source`, the policy that the image was made from, if it has none or others. Returns
+/// how they differ. Without a source, recorded actions stay.
+pub fn fill_actions(dataset: &mut Dataset, source: Option<&Policy>) -> Result<Option<Difference>> {
+    let difference = source.and_then(|source| recorded::use_policy_of(dataset, &source.graph));
+    fill_missing(dataset, source)?;
+    Ok(difference)
 }
 
 /// Fills in missing actions by `source`, the policy that the image was made from.
-pub fn fill_actions(dataset: &mut Dataset, source: Option<&Policy>) -> Result<()> {
+pub(super) fn fill_missing(dataset: &mut Dataset, source: Option<&Policy>) -> Result<()> {
     if dataset.action.is_none() {
         let source = source.with_context(|| {
             format!(

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use actq_kernels::Image;
 
-use super::eval::{ErrorReport, evaluate, fill_actions};
+use super::eval::{ErrorReport, evaluate, fill_missing};
 use crate::data::{Dataset, Sizes, driven_by, is_link_log, joined};
 use crate::error::{Result, ensure};
 use crate::policy::Policy;
@@ -28,7 +28,7 @@ pub fn own_path(image: Image<'_>, files: &[PathBuf], source: Option<&Policy>) ->
             "{name}: is a log of actq link stream, recorded by another controller; record a rollout with actq serve --record"
         );
         let mut dataset = Dataset::load(file, Sizes::of_image(&image))?;
-        fill_actions(&mut dataset, source)?;
+        fill_missing(&mut dataset, source)?;
         Ok(dataset)
     };
     let parts = files.iter().map(load).collect::<Result<Vec<_>>>()?;

@@ -12,6 +12,7 @@ use super::watch::Watch;
 use crate::data::{Dataset, Learned, Recording, Recordings, Share};
 use crate::error::{Context as _, Result, ensure};
 use crate::measure::eval;
+use crate::measure::recorded::{self, Difference};
 use crate::measure::time::{CLOCK, StepTime};
 use crate::methods::Options;
 use crate::policy::Policy;
@@ -68,6 +69,8 @@ pub struct Tuned {
     pub rounds: Vec<Round>,
     /// Recording for the errors on the f32 policy's path.
     pub measured_on: String,
+    /// Recorded actions that are not the f32 policy's.
+    pub differences: Vec<Difference>,
 }
 
 impl Tuned {
@@ -96,8 +99,13 @@ pub fn run(
 ) -> Result<Tuned> {
     let TunePlan { policy, calib: mut parts, heldout, options, rounds } = plan;
     ensure!(!parts.is_empty(), "{}", Recording::Calib.missing("actq tune"));
+    let mut differences: Vec<Difference> =
+        parts.iter_mut().filter_map(|part| recorded::use_policy_of(part, &policy.graph)).collect();
     let mut f32_path = match heldout {
-        Some(heldout) => heldout,
+        Some(mut heldout) => {
+            differences.extend(recorded::use_policy_of(&mut heldout, &policy.graph));
+            heldout
+        }
         None => Learned::join(&mut parts, &policy.graph)?.dataset,
     };
     f32_path.fill_actions(&policy.graph);
@@ -132,7 +140,8 @@ pub fn run(
             seconds: started.elapsed().as_secs_f64(),
         });
         if round == rounds {
-            return Ok(Tuned { quantized, rounds: rows, measured_on: f32_path.name().into_owned() });
+            let measured_on = f32_path.name().into_owned();
+            return Ok(Tuned { quantized, rounds: rows, measured_on, differences });
         }
         parts.append(&mut driven.recordings);
     }

@@ -3,6 +3,7 @@
 use actq::budget::Budget;
 use actq::data::{Dataset, Learned, Recordings, Sizes};
 use actq::error::{Cause, Error, Result};
+use actq::measure::recorded;
 use actq::measure::time::{CLOCK, StepTime};
 use actq::methods::Outcome as MatrixOutcome;
 use actq::pipeline::Quantizer;
@@ -88,6 +89,7 @@ fn made(
         false => None,
     };
     let mut recordings = Recordings { calib: learned, heldout };
+    recorded::use_policy(&mut recordings, &policy.graph);
     recordings.fill_actions(&policy.graph);
     let frames = recordings.calib.as_ref().map_or(0, Dataset::frames);
     let options = make.options(method)?;

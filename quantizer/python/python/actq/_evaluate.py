@@ -8,6 +8,7 @@ from typing import Optional
 from . import _actq
 from ._actq import Image, Policy
 from ._progress import Progress, reporter
+from ._quantize import log
 from ._typing import Recordings
 
 
@@ -35,10 +36,14 @@ def evaluate(
     """Runs an image over recordings and compares it with the f32 policy.
 
     image: what `quantize` returned.
-    recordings: as for `quantize`. If they hold no actions, `policy` computes them.
+    recordings: as for `quantize`. If they hold no actions, or others than `policy` gives, `policy` computes them; the
+        log `actq` says how they differ.
     policy: the policy that the image was made from.
 
     Raises `actq.Error` if a recording does not fit, or has no actions and no policy is given.
     """
     with reporter(progress) as report:
-        return ErrorReport(**_actq.evaluate(image, recordings, policy, report))
+        errors, difference = _actq.evaluate(image, recordings, policy, report)
+    if difference is not None:
+        log.warning(difference)
+    return ErrorReport(**errors)

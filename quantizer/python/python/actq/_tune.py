@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple
 from . import _actq
 from ._actq import Head, Image, Policy
 from ._progress import Progress, reporter
-from ._quantize import request
+from ._quantize import log, request
 from ._rollout import Act, Observe, Rollout, Success, rollout
 from ._typing import Recordings
 
@@ -113,7 +113,11 @@ def tune(
             if report is not None:
                 report("rollout of the f32 policy", 0.0)
             recordings = drive(_actq.stand_in(policy), 0).recording
-        image, images, rows, table, better = _actq.tune(policy, recordings, heldout, options, rounds, driven, report)
+        image, images, rows, table, better, warnings = _actq.tune(
+            policy, recordings, heldout, options, rounds, driven, report
+        )
+    for warning in warnings:
+        log.warning(warning)
     found = [
         Round(image, row["episodes"], row["frames"], row["nmse"], row["own_nmse"], driven_by_it)
         for image, row, driven_by_it in zip(images, json.loads(rows), rollouts)
