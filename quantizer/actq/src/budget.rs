@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 pub enum Budget {
     /// One width for every matrix.
     Width(#[serde(with = "bits")] Width),
-    /// The most bits per weight of the whole, everything counted.
+    /// The most bits per weight of all matrices together, with scales and padding.
     BitsPerWeight(f64),
     /// The most bytes of the whole image.
     ImageBytes(usize),
@@ -57,7 +57,7 @@ pub const MIN_USED_SHARE: f64 = 0.97;
 pub enum Rate {
     /// One width for every matrix.
     Width(Width),
-    /// The most bits per weight of the whole, everything counted.
+    /// The most bits per weight of all matrices together, with scales and padding.
     BitsPerWeight(f64),
     /// The most bytes of all that a method decides on: the weights, everything counted, and the vectors that it changes
     /// ([`crate::graph::Graph::changed_vectors`]).

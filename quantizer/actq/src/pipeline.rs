@@ -4,6 +4,7 @@
 mod budgets;
 pub mod driven;
 mod flash;
+mod held_out;
 mod quantizer;
 mod revision;
 mod search;
@@ -16,6 +17,7 @@ mod watch;
 
 pub use budgets::quantize;
 pub use flash::check_budget;
+pub use held_out::HeldOut;
 pub use quantizer::{QuantizedPolicy, Quantizer};
 pub use revision::REVISION;
 pub use tries::{Search, Try};

@@ -10,6 +10,9 @@ use crate::error::{Result, ensure};
 use crate::graph::Graph;
 use crate::text::count;
 
+/// Control steps a second of a policy that states no rate.
+pub const DEFAULT_RATE_HZ: f32 = 50.0;
+
 /// A policy as it was trained.
 #[derive(Clone, Debug)]
 pub struct Policy {
@@ -52,7 +55,7 @@ impl Policy {
             chunk: 1,
             execute: 1,
             act_len: graph.len_of(graph.output()),
-            rate_hz: 50.0,
+            rate_hz: DEFAULT_RATE_HZ,
             contract: ActionContract::default(),
             weights: graph.weights(),
             parameters: graph.parameters(),

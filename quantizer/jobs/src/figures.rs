@@ -18,7 +18,7 @@ pub struct Made {
     pub bytes: usize,
     /// Predicted cycles of a step on a Cortex-M4 with FPU.
     pub cycles: u64,
-    /// True bits per weight, everything counted.
+    /// True bits per weight of the matrices, with scales and padding; biases and header do not count.
     pub bpw: f64,
     /// Steps of distillation that were taken.
     pub steps: usize,

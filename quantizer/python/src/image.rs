@@ -124,7 +124,7 @@ impl Image {
         Ok(hex(&self.image()?.digest()))
     }
 
-    /// Bits per weight of the original network, everything counted.
+    /// Bits per weight of the original network, with scales and padding; biases and header do not count.
     #[getter]
     fn bits_per_weight(&self) -> PyResult<f64> {
         Ok(bits_per_weight(&self.image()?))

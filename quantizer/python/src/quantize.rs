@@ -133,12 +133,16 @@ pub(crate) fn quantize(
         return Err(error!("{}", notes::how_to_record(&policy.policy)));
     }
     let options = request.options(method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }))?;
-    let (policy, in_folder) = (policy.policy.clone(), folder.is_some());
+    let (mut options, policy, in_folder) = (options, policy.policy.clone(), folder.is_some());
     let (bytes, warnings, notes) = work::run(py, progress, move |worker| {
         check_budget(&policy, &options)?;
         let mut recordings = read(&policy, calib, heldout, in_folder)?;
         let mut warnings = notes::of_recordings(&recordings);
         warnings.extend(recorded::use_policy(&mut recordings, &policy.graph).iter().map(ToString::to_string));
+        if recordings.heldout.is_none() {
+            // The other half is for the images without held-out parts.
+            options.minutes = options.minutes.map(|minutes| minutes / 2.0);
+        }
         let limits = match &policy.around {
             Some(around) => notes::targets_without_limits(around),
             None => notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))),
@@ -146,15 +150,21 @@ pub(crate) fn quantize(
         let calibrating = |share| worker.report("calibrating", share);
         let quantizer = Quantizer::new(&policy, &recordings, options.method.clone(), options.minutes, calibrating)?;
         warnings.extend(notes::mixed_units(quantizer.method().mixed_units()));
-        let found = quantizer.quantize(&options, |work: &str, share| worker.report(work, share))?;
+        let mut found = quantizer.quantize(&options, |work: &str, share| worker.report(work, share))?;
         warnings.extend(notes::unused_budget(&found, &options));
-        worker.report("measuring the error", 0.0);
+        let measuring = |share| worker.report("measuring the error", share);
+        let held_out = match found.held_out.take() {
+            Some(held_out) => Some(held_out),
+            None => quantizer.held_out_error(&found, &options, measuring)?,
+        };
         let alone = found.buffer();
-        if let Some(check) = check::check(&policy, alone.image(Path::new("image"))?, &recordings)? {
-            warnings.extend(notes::overfit_warning(&check));
-            warnings.extend(notes::error_warning(&check));
+        let image = alone.image(Path::new("image"))?;
+        let mut notes: Vec<String> = limits.into_iter().collect();
+        if let Some(check) = check::check(&policy, image, &recordings, &options.method, held_out)? {
+            notes.push(notes::errors(&check).trim_end().to_owned());
+            warnings.extend(notes::of_check(&check, &options));
         }
-        Ok((found.whole_image()?, warnings, limits.into_iter().collect()))
+        Ok((found.whole_image()?, warnings, notes))
     })?;
     Ok((Image::of(ImageBuffer::new(&bytes), Path::new("image"))?, warnings, notes))
 }

@@ -22,10 +22,14 @@ pub struct QuantizeArgs {
     /// POLICY_DIR]
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) calib: Vec<PathBuf>,
+    /// The held-out recording to measure on [default: heldout.* in POLICY_DIR, else parts of the calibration recording
+    /// in turn, which takes about as long again as making the image]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) heldout: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) budget: BudgetArgs,
     /// The largest error (NMSE, as eval measures it): searches the fewest bits that keep it, to a tenth of a bit per
-    /// weight. It is measured on the held-out recording, or else on the calibration recording
+    /// weight. It is measured on the held-out recording, or else on held-out parts of the calibration recording
     #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw", "flash", "ms", "clock"], value_parser = positive)]
     pub(crate) max_nmse: Option<f64>,
     /// Force the width of a matrix, by its tensor's name (method distill); may be repeated

@@ -164,6 +164,7 @@ fn quantize_args(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs
         || args.learn.minutes.is_some()
         || args.learn.distill.effort != Effort::Default;
     QuantizeArgs {
+        heldout: None,
         policy_dir: policy.to_owned(),
         out: image.to_owned(),
         calib: args.recordings.clone(),

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use actq::data::{Range, Recording, Sizes, driven_by, files_of};
+use actq::measure::size::{Beside, file_bits_per_weight};
 use actq::measure::{eval, own};
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
@@ -45,6 +46,10 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
         Err(error) => note([format!("cannot check the range of the observations: {error:#}")]),
     }
     note(useless(report.nmse));
+    if source.is_none() && useless(report.nmse).is_some() {
+        note(["only recorded actions are compared; name the image's policy by --policy to compare with its own"
+            .to_owned()]);
+    }
     if args.json {
         let mut json = serde_json::to_value(&report)?;
         if let Some(own) = own {
@@ -65,8 +70,8 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
          worst nmse     {:.3e}   (dimension {})\n\
          largest error  {:.4}\n\
          activations    {}\n\
-         bits/weight    {:.3}\n\
-         image          {} bytes\n",
+         bits/weight    {:.3}   (weights with their scales; {:.3} of the whole file)\n\
+         image          {} bytes   ({} beside the weights)\n",
         report.steps,
         report.nmse,
         report.worst_nmse,
@@ -74,7 +79,9 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
         report.max_abs,
         activation_share(&eval::activation_share(image, &dataset, report.nmse)?),
         report.bpw,
+        file_bits_per_weight(&image),
         report.bytes,
+        Beside::of(&image),
     ))
 }
 

@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use actq::budget::Budget;
 use actq::data::{Recording, Recordings, Share, Sizes, driven_by, files_of};
+use actq::measure::size::{Beside, file_bits_per_weight};
 use actq::measure::time::{CLOCK, StepTime};
 use actq::measure::{check, own, recorded};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::stats::Stats;
-use actq::pipeline::{QuantizedPolicy, Quantizer, check_budget};
+use actq::pipeline::{HeldOut, QuantizedPolicy, Quantizer, check_budget};
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_kernels::Width;
@@ -31,7 +32,7 @@ pub fn run(
     describe: impl FnOnce(&Quantizer<'_>, &QuantizedPolicy) -> String,
 ) -> Result<()> {
     let calib = files_of(&args.calib)?;
-    let inputs = policy_files(&args.policy_dir).into_iter().chain(calib.iter().cloned());
+    let inputs = policy_files(&args.policy_dir).into_iter().chain(calib.iter().chain(&args.heldout).cloned());
     let outputs = reserve([&args.out].into_iter().chain(&args.save_stats), inputs)?;
     refuse_foreign(&args.out)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
@@ -40,16 +41,20 @@ pub fn run(
     if args.policy_dir.is_file() && !has_calib && method != Some(Method::Rtn) {
         bail!("{}: {}", args.policy_dir.display(), notes::how_to_record(&source));
     }
-    let options = options(args, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }));
+    let mut options = options(args, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }));
     options.check()?;
     options.check_length()?;
     check_budget(&source, &options)?;
     let (calib, shares) = learned_from(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
     let shares = shares.unwrap_or_default();
-    let heldout = Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?;
+    let heldout = Recording::Heldout.load(Some(&args.policy_dir), args.heldout.as_deref(), Sizes::of(&source))?;
     let mut recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
     note(recorded::use_policy(&mut recordings, &source.graph).iter().map(ToString::to_string));
+    if recordings.heldout.is_none() {
+        // The other half is for the images without held-out parts.
+        options.minutes = options.minutes.map(|minutes| minutes / 2.0);
+    }
     note(match &source.around {
         Some(around) => notes::targets_without_limits(around),
         None => notes::without_limits((0..source.act_len).map(|i| source.contract.limits(i))),
@@ -76,7 +81,18 @@ pub fn run(
     print(&describe(&quantizer, &found))?;
     report(args, &source, &quantizer, &found, started)?;
     note(notes::unused_budget(&found, &options));
-    measure(args, &source, &recordings, &network, shares)
+    let measuring = |share: f64| progress.set("measuring the error on held-out parts", share);
+    let held_out = match found.held_out.take() {
+        Some(held_out) => Ok(Some(held_out)),
+        None => quantizer.held_out_error(&found, &options, measuring),
+    };
+    // The image is written and correct.
+    let held_out = held_out.unwrap_or_else(|error| {
+        note([format!("the error on held-out parts was not measured: {error:#}")]);
+        None
+    });
+    measure(args, &source, &recordings, &options, &network, held_out)?;
+    own_path(args, &source, &network, shares)
 }
 
 /// Prints the widths, the learning, the size and the time of an image.
@@ -87,6 +103,8 @@ fn report(
     found: &QuantizedPolicy,
     started: Instant,
 ) -> Result<()> {
+    let buffer = found.buffer();
+    let image = buffer.image(&args.out)?;
     let search = found.search.as_ref().map_or(String::new(), |search| quantized::search(search) + "\n");
     let sampled = quantizer.method().sampled().map_or(String::new(), quantized::sampled);
     let imagined =
@@ -94,15 +112,17 @@ fn report(
     let learned = sampled + &imagined + &found.learning.as_ref().map_or(String::new(), quantized::learning);
     let time = match &found.time {
         Some(step) => time::sentence(step),
-        None => time::sentence(&StepTime::new(&found.buffer().image(&args.out)?, CLOCK)),
+        None => time::sentence(&StepTime::new(&image, CLOCK)),
     };
     let (parameters, bytes) = (source.parameters, found.image.len());
     let f32_bytes = 4 * parameters;
     print(&format!(
-        "{search}{}{learned}\n{}: {bytes} bytes. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in \
+        "{search}{}{learned}\n{}: {bytes} bytes, {:.3} bits per weight: also {}. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in \
          bf16 ({:.1}x).\n{time}Took {:.1} s.\n",
         quantized::matrices(found),
         args.out.display(),
+        file_bits_per_weight(&image),
+        Beside::of(&image),
         f32_bytes as f64 / bytes as f64,
         f32_bytes / 2,
         f32_bytes as f64 / 2.0 / bytes as f64,
@@ -110,25 +130,30 @@ fn report(
     ))
 }
 
-/// Measures the errors of the network's image on the recordings, and on those of its own rollouts, and prints them.
+/// Measures the errors of the network's image on the recordings, and prints them.
 fn measure(
     args: &QuantizeArgs,
     source: &Policy,
     recordings: &Recordings,
+    options: &Options,
     network: &ImageBuffer,
-    shares: Vec<Share>,
+    held_out: Option<HeldOut>,
 ) -> Result<()> {
-    let image = network.image(&args.out)?;
-    match check::check(source, image, recordings) {
+    match check::check(source, network.image(&args.out)?, recordings, &options.method, held_out) {
         Ok(Some(check)) => {
             print(&format!("\n{}", notes::errors(&check)))?;
-            note(notes::overfit_warning(&check));
-            note(notes::error_warning(&check));
+            note(notes::of_check(&check, options));
         }
         Ok(None) => note(["the error was not measured, as there is no recording; pass one by --calib FILE".to_owned()]),
         // The image is written and correct.
         Err(error) => note([format!("the error was not measured: {error:#}")]),
     }
+    Ok(())
+}
+
+/// Measures the error of the network's image on recordings of its own rollouts, if there are any, and prints it.
+fn own_path(args: &QuantizeArgs, source: &Policy, network: &ImageBuffer, shares: Vec<Share>) -> Result<()> {
+    let image = network.image(&args.out)?;
     let of_image = |path: &PathBuf| driven_by(path).is_ok_and(|crc| crc == Some(image.crc()));
     let driven: Vec<PathBuf> = shares.into_iter().map(|share| share.path).filter(of_image).collect();
     if !driven.is_empty() {

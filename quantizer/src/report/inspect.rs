@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use actq::graph::ops::Balance;
-use actq::measure::size::{bits_per_weight, hex};
+use actq::measure::size::{Beside, bits_per_weight, file_bits_per_weight, hex};
+use actq::policy::DEFAULT_RATE_HZ;
 use actq::text::{count, printable};
 use actq_kernels::image::Matrix;
 use actq_kernels::image::{Kind, Op, OpKind, Region};
@@ -37,11 +38,14 @@ pub fn report(image: &Image<'_>) -> String {
         kind => format!("{kind:?}"),
     };
     let (obs, act) = (count(image.obs_len(), "observation"), count(image.act_len(), "action"));
-    let rate = image.rate_hz();
+    // An image does not say whether its policy stated the rate.
+    let is_default = image.rate_hz() == DEFAULT_RATE_HZ;
+    let rate =
+        format!("{} Hz{}", image.rate_hz(), if is_default { ", the default of policies without a rate" } else { "" });
     let _ = writeln!(text, "policy        {}", printable(image.name()));
     let _ = writeln!(text, "source        sha256 {digest}");
     let _ = writeln!(text, "image         {} bytes, crc32 {:08x}", image.bytes(), image.crc());
-    let _ = writeln!(text, "kind          {kind}, {obs} -> {act} at {rate} Hz");
+    let _ = writeln!(text, "kind          {kind}, {obs} -> {act} at {rate}");
     for port in image.ports() {
         let what = match port.kind {
             PortKind::Input => "input",
@@ -59,7 +63,10 @@ pub fn report(image: &Image<'_>) -> String {
     if !playback.is_empty() {
         let _ = writeln!(text, "playback      {}", playback.join(", "));
     }
-    let _ = writeln!(text, "weights       {:.3} bits each, with scales and padding", bits_per_weight(image));
+    let (bits, of_file) = (bits_per_weight(image), file_bits_per_weight(image));
+    let _ =
+        writeln!(text, "weights       {bits:.3} bits each, with scales and padding; {of_file:.3} of the whole file");
+    let _ = writeln!(text, "beside them   {}", Beside::of(image));
     let words = image.scratch_words();
     let state = 4 * image.state().len;
     let _ = writeln!(text, "scratch       {words} words ({} bytes), {state} bytes of them state", 4 * words);

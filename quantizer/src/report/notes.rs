@@ -3,10 +3,10 @@
 use actq::around::Around;
 use actq::budget::Budget;
 use actq::data::{Dataset, Range, Recordings, runs};
-use actq::measure::check::{Check, Checked};
+use actq::measure::check::{Cause, Check, Checked};
 use actq::measure::eval::{ActivationShare, ErrorReport};
-use actq::methods::Options;
 use actq::methods::distill::balance::MixedUnits;
+use actq::methods::{Effort, Method, Options};
 use actq::pipeline::{QuantizedPolicy, Reason, Unused};
 use actq::policy::Policy;
 use actq::text::count;
@@ -16,6 +16,9 @@ const OVERFIT_RATIO: f64 = 3.0;
 /// Difference of held-out and calibration error (NMSE) above which there is a warning, if [`OVERFIT_RATIO`] is
 /// exceeded.
 const OVERFIT_DIFFERENCE: f64 = 0.002;
+
+/// Frames of a recording of which some can be held out, in quarters of the fewest to learn from.
+const HELD_OUT_FROM: usize = 5;
 
 /// Error (NMSE) above which there is a warning not to use the image.
 const USELESS: f64 = 0.1;
@@ -76,38 +79,80 @@ pub fn targets_without_limits(around: &Around) -> Option<String> {
 
 /// Formats the errors, a line for each.
 pub fn errors(check: &Check) -> String {
-    let of = |name: &str, checked: &Checked| line(name, &checked.report, checked.recorded);
-    let calib = check.calib.as_ref().map_or(String::new(), |checked| of("calibration nmse", checked));
-    let heldout = check.heldout.as_ref().map_or(String::new(), |checked| of("held-out nmse", checked));
+    let learned = if check.learned { " that it learned from" } else { "" };
+    let others = match check.parts {
+        0 => " that it did not learn from".to_owned(),
+        1 => " that it did not learn from, a part of the calibration recording".to_owned(),
+        parts => format!(" that it did not learn from, {parts} parts of the calibration recording in turn"),
+    };
+    let of = |name: &str, checked: &Checked, which: &str| line(name, &checked.report, checked.recorded, which);
+    let calib = check.calib.as_ref().map_or(String::new(), |checked| of("calibration nmse", checked, learned));
+    let heldout = check.heldout.as_ref().map_or(String::new(), |checked| of("held-out nmse", checked, &others));
     format!("{calib}{heldout}{:<17} {}\n", "activations", activation_share(&check.activations))
 }
 
 /// Formats the error on the image's own path.
 pub fn own_path(report: &ErrorReport) -> String {
-    line("own-path nmse", report, report.steps)
+    line("own-path nmse", report, report.steps, "")
 }
 
-fn line(name: &str, report: &ErrorReport, recorded: usize) -> String {
+fn line(name: &str, report: &ErrorReport, recorded: usize, which: &str) -> String {
     let of = if recorded > report.steps { format!("{} of ", report.steps) } else { String::new() };
-    format!("{name:<17} {:.3e}   ({of}{})\n", report.nmse, count(recorded, "observation"))
+    format!("{name:<17} {:.3e}   ({of}{}{which})\n", report.nmse, count(recorded, "observation"))
+}
+
+/// Returns all notes on the errors of an image made with `options`.
+pub fn of_check(check: &Check, options: &Options) -> Vec<String> {
+    [not_held_out(check, options), overfit_warning(check), error_warning(check, options)]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// Returns a note if no frames could be held out to measure the error.
+fn not_held_out(check: &Check, options: &Options) -> Option<String> {
+    let calib = check.calib.as_ref().filter(|_| check.learned && check.heldout.is_none())?;
+    Some(format!(
+        "the error is that of the frames that the image learned from: {} are too few to hold some out, and the error on others \
+         may be much larger; record {} or more",
+        count(calib.recorded, "frame"),
+        HELD_OUT_FROM * options.method.least_frames() / 4
+    ))
 }
 
 /// Returns a warning if the held-out error is far above the calibration error.
 pub fn overfit_warning(check: &Check) -> Option<String> {
     let (heldout, calib) = (check.heldout.as_ref()?.report.nmse, check.calib.as_ref()?.report.nmse);
     (heldout > OVERFIT_RATIO * calib && heldout > calib + OVERFIT_DIFFERENCE).then(|| {
+        let frames = check.frames_to_record().map_or(String::new(), |frames| format!(", about {frames} steps in all"));
         format!(
             "the held-out error is {:.1} times the calibration error: the image fits the calibration recording better than \
-             new observations; record more episodes, and more varied ones",
+             new observations; record more episodes, and more varied ones{frames}",
             heldout / calib
         )
     })
 }
 
 /// Returns a warning if the image's actions are far from the policy's. An error of 1 is that of a constant action.
-pub fn error_warning(check: &Check) -> Option<String> {
+pub fn error_warning(check: &Check, options: &Options) -> Option<String> {
     let useless = useless(check.nmse()?)?;
-    Some(format!("{useless}; allow more bits (--bpw, --flash), record more steps for --calib, or try --activations 16"))
+    let remedy = match check.cause() {
+        Cause::Activations => "most of it comes from rounding the activations: pass --activations 16".to_owned(),
+        Cause::Recording => {
+            let frames = check.frames_to_record().map_or(String::new(), |frames| format!(", about {frames} in all"));
+            format!("most of it comes from the short recording: record more steps for --calib{frames}")
+        }
+        Cause::Weights => {
+            let short = options.steps.is_some() || options.effort == Effort::Quick;
+            let learn = match options.method {
+                Method::Distill if short => ", or learn longer (--steps, --effort)",
+                Method::Distill => "",
+                _ => ", or let them learn (--method distill)",
+            };
+            format!("it comes from the weights: allow more bits (--bpw, --flash){learn}")
+        }
+    };
+    Some(format!("{useless}; {remedy}"))
 }
 
 /// Returns a warning if actions with this error are far from the policy's.
@@ -179,7 +224,12 @@ mod tests {
     fn check(calib: Option<f64>, heldout: f64) -> Check {
         let activations = ActivationShare { share: 0.125, int16: vec![0, 4], linear: 5 };
         let checked = |nmse: f64, recorded: usize| Checked { report: report(nmse), recorded };
-        Check { heldout: Some(checked(heldout, 7)), calib: calib.map(|nmse| checked(nmse, 30)), activations }
+        let calib = calib.map(|nmse| checked(nmse, 30));
+        Check { heldout: Some(checked(heldout, 7)), parts: 0, learned: true, calib, activations }
+    }
+
+    fn options() -> Options {
+        Options::new(Method::Distill, Budget::BitsPerWeight(2.0))
     }
 
     #[test]
@@ -196,12 +246,39 @@ mod tests {
     fn error_above_a_tenth_warns() {
         let calib_only = |nmse| Check { heldout: None, ..check(Some(nmse), 0.0) };
         for of in [check(Some(0.001), 0.11), check(None, 1.0), check(None, f64::NAN), calib_only(0.2)] {
-            assert!(error_warning(&of).is_some_and(|text| text.contains("--bpw")), "{of:?}");
+            assert!(error_warning(&of, &options()).is_some(), "{of:?}");
         }
         for of in [check(Some(0.5), 0.09), check(None, 0.0), calib_only(0.1)] {
-            assert_eq!(error_warning(&of), None, "{of:?}");
+            assert_eq!(error_warning(&of, &options()), None, "{of:?}");
         }
         assert!(errors(&calib_only(0.2)).starts_with("calibration nmse  2.000e-1"));
+    }
+
+    #[test]
+    fn advice_follows_the_measured_cause() {
+        let advice = |of: &Check, options: &Options| error_warning(of, options).expect("a warning");
+        let rounded = ActivationShare { share: 0.6, int16: Vec::new(), linear: 5 };
+        let activations = advice(&Check { activations: rounded, ..check(Some(0.3), 0.3) }, &options());
+        assert!(activations.ends_with("rounding the activations: pass --activations 16"), "{activations}");
+        let recording = advice(&check(Some(0.1), 0.3), &options());
+        assert!(recording.ends_with("record more steps for --calib, about 75 in all"), "{recording}");
+        let weights = check(Some(0.25), 0.3);
+        assert!(advice(&weights, &options()).ends_with("allow more bits (--bpw, --flash)"));
+        let quick = Options { effort: Effort::Quick, ..options() };
+        assert!(advice(&weights, &quick).ends_with("or learn longer (--steps, --effort)"));
+        let rounding = Options::new(Method::Rtn, Budget::BitsPerWeight(2.0));
+        assert!(advice(&Check { learned: false, ..check(Some(0.1), 0.3) }, &rounding).ends_with("(--method distill)"));
+    }
+
+    #[test]
+    fn an_error_of_learned_frames_is_said() {
+        let short = Check { heldout: None, ..check(Some(0.01), 0.0) };
+        let [note] = &of_check(&short, &options())[..] else { panic!("one note") };
+        assert!(
+            note.contains("30 frames are too few to hold some out") && note.ends_with("record 250 or more"),
+            "{note}"
+        );
+        assert!(of_check(&Check { learned: false, ..short }, &options()).is_empty());
     }
 
     #[test]
@@ -227,15 +304,20 @@ mod tests {
     fn the_summary_has_a_line_for_each_error() {
         assert_eq!(
             errors(&check(Some(0.002), 0.0084)),
-            "calibration nmse  2.000e-3   (7 of 30 observations)\n\
-             held-out nmse     8.400e-3   (7 observations)\n\
+            "calibration nmse  2.000e-3   (7 of 30 observations that it learned from)\n\
+             held-out nmse     8.400e-3   (7 observations that it did not learn from)\n\
              activations       12% of the error (int8; linear operations in int16: 0, 4)\n"
         );
         let mut one = check(None, 0.5);
         one.activations = ActivationShare { int16: Vec::new(), share: -0.01, ..one.activations };
         assert_eq!(
             errors(&one),
-            "held-out nmse     5.000e-1   (7 observations)\nactivations       -1% of the error (int8)\n"
+            "held-out nmse     5.000e-1   (7 observations that it did not learn from)\n\
+             activations       -1% of the error (int8)\n"
+        );
+        one.parts = 5;
+        assert!(
+            errors(&one).contains("(7 observations that it did not learn from, 5 parts of the calibration recording")
         );
         one.activations.int16 = vec![0, 1, 2, 3, 4];
         assert_eq!(activation_share(&one.activations), "-1% of the error (int16)");

@@ -34,7 +34,7 @@ pub fn matrices(quantized: &QuantizedPolicy) -> String {
     let bits = 8.0 * (total + added) as f64 / policy.weights.max(1) as f64;
     let by_row = outcomes.iter().any(|outcome| outcome.allocation.is_some());
     let widths = if by_row { widths::line(policy, outcomes) + "\n" } else { String::new() };
-    format!("{rows}\n\n{total} bytes of weights{with}, {bits:.3} bits per weight\n{widths}")
+    format!("{rows}\n\n{total} bytes of weights with their scales{with}, {bits:.3} bits per weight\n{widths}")
 }
 
 /// Formats the sample sizes of the statistics of a flow or diffusion policy.

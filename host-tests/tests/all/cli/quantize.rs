@@ -325,12 +325,42 @@ fn quantize_reports_both_errors_and_faults_of_recordings() -> Result<()> {
 }
 
 #[test]
-fn without_held_out_data_calibration_error_is_printed() -> Result<()> {
+fn parts_are_held_out_without_a_recording_for_it() -> Result<()> {
     let fixture = Fixture::new()?;
-    fs::remove_file(fixture.policy().join("heldout.npz"))?;
-    let output = fixture.quantize(&fixture.out("image.actq"), "--bits 8")?;
-    let report = succeeded(&output)?;
-    ensure!(report.contains("calibration nmse") && !report.contains("held-out nmse"), "{report}");
+    let heldout = fixture.policy().join("heldout.npz");
+    let named = fixture.out("named.npz");
+    fs::rename(&heldout, &named)?;
+    let quantize = |options: &str| -> Result<String> {
+        succeeded(&fixture.quantize(&fixture.out("image.actq"), &format!("--bits 8 {options}"))?)
+    };
+    let of_parts = quantize("")?;
+    let image = fs::read(fixture.out("image.actq"))?;
+    let said = "47 observations that it did not learn from, 5 parts of the calibration recording in turn)";
+    ensure!(of_parts.contains(said) && of_parts.contains("(47 observations that it learned from)"), "{of_parts}");
+    let of_recording = quantize(&format!("--heldout {}", text(&named)))?;
+    ensure!(of_recording.contains("(47 observations that it did not learn from)"), "{of_recording}");
+    ensure!(fs::read(fixture.out("image.actq"))? == image, "the measurement changes the image");
+    let rounded = quantize("--method rtn")?;
+    ensure!(rounded.contains("(47 observations)") && !rounded.contains("held-out nmse"), "{rounded}");
+    Ok(())
+}
+
+#[test]
+fn the_report_counts_the_weights_and_the_whole_file() -> Result<()> {
+    let fixture = Fixture::new()?;
+    let out = fixture.out("image.actq");
+    let report = succeeded(&fixture.quantize(&out, "--bits 8")?)?;
+    let bytes = fs::metadata(&out)?.len() as usize;
+    let number_before = |what: &str| -> Result<usize> {
+        let (before, _) = report.split_once(what).with_context(|| format!("{what}: {report}"))?;
+        Ok(before.rsplit(|c: char| !c.is_ascii_digit()).next().context("no number")?.parse()?)
+    };
+    let parts = [" bytes of weights", " bytes of biases", " of self-test", " of header and tables"];
+    let sum: usize = parts.into_iter().map(number_before).sum::<Result<usize>>()?;
+    assert_eq!(sum, bytes, "{report}");
+    let weights: usize = HIDDEN * (OBS + HIDDEN + CHUNK * ACT);
+    let bits = 8.0 * bytes as f64 / weights as f64;
+    ensure!(report.contains(&format!("{bytes} bytes, {bits:.3} bits per weight")), "{bits} {report}");
     Ok(())
 }
 

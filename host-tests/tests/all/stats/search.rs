@@ -80,12 +80,15 @@ fn an_error_below_eight_bits_is_refused() -> Result<()> {
 }
 
 #[test]
-fn without_held_out_data_calibration_error_counts() -> Result<()> {
+fn without_held_out_data_parts_are_held_out() -> Result<()> {
     let fixture = Fixture::new()?;
     let options = "--out x.actq --method rtn --max-nmse 0.02";
     ensure!(succeeded(&fixture.quantize(options)?)?.contains("Measured on heldout.npz."));
     fs::remove_file(fixture.policy().join("heldout.npz"))?;
     ensure!(succeeded(&fixture.quantize(options)?)?.contains("Measured on calib.npz"));
+    // A method that learns is measured on frames that it did not learn from.
+    let learned = "--out y.actq --method gptq --max-nmse 0.02";
+    ensure!(succeeded(&fixture.quantize(learned)?)?.contains(" of calib.npz that it did not learn from."));
     // `eval` reports the same error on that recording.
     fs::rename(fixture.policy().join("calib.npz"), fixture.policy().join("heldout.npz"))?;
     let nmse = fixture.nmse("x.actq")?;

@@ -32,6 +32,11 @@ impl<'g> Evaluator<'g> {
         self.state = start_state(self.network.graph, &[state.map(<[f32]>::to_vec)]);
     }
 
+    /// Returns the recurrent state, in the order of [`Graph::state_len`].
+    pub fn state(&self) -> Vec<f32> {
+        self.state.iter().flatten().flat_map(|array| array.row(0).to_vec()).collect()
+    }
+
     /// Returns the network's output for one observation of the graph's length, with its noise. `tap` receives every
     /// matrix's index and input vector.
     pub fn step(&mut self, obs: &[f32], tap: &mut dyn FnMut(usize, &[f32])) -> Vec<f32> {

@@ -13,7 +13,7 @@ use super::tensors::TensorFile;
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::hoist;
 use crate::numbers::positive;
-use crate::policy::Policy;
+use crate::policy::{DEFAULT_RATE_HZ, Policy};
 
 /// Files of a policy in its folder.
 pub const FILES: [&str; 2] = ["policy.json", "policy.safetensors"];
@@ -120,7 +120,7 @@ fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) 
         chunk,
         execute,
         act_len: json.act_dim,
-        rate_hz: positive(json.control_hz.unwrap_or(50.0), "control_hz")?,
+        rate_hz: positive(json.control_hz.unwrap_or(f64::from(DEFAULT_RATE_HZ)), "control_hz")?,
         contract: json.contract(kind)?,
         weights,
         parameters,

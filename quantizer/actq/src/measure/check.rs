@@ -5,6 +5,9 @@ use actq_kernels::Image;
 use super::eval::{self, ActivationShare, ErrorReport};
 use crate::data::{Dataset, Recordings};
 use crate::error::Result;
+use crate::graph::Graph;
+use crate::methods::Method;
+use crate::pipeline::HeldOut;
 use crate::policy::Policy;
 
 /// Most MACs of a run over the calibration recording, about half a second of the executor on a host; a longer recording
@@ -30,33 +33,87 @@ pub struct Checked {
 /// Errors of an image on its policy's recordings.
 #[derive(Clone, Debug)]
 pub struct Check {
-    /// Errors on the held-out recording, if there is one.
+    /// Errors on the held-out recording, if there is one; else on held-out parts of the calibration recording.
     pub heldout: Option<Checked>,
+    /// Number of these parts, 0 with a held-out recording.
+    pub parts: usize,
+    /// `true` if the image has learned from the calibration recording.
+    pub learned: bool,
     /// Errors on the calibration recording, if there is one.
     pub calib: Option<Checked>,
     /// Error added by rounding the activations, on the held-out recording or else on the calibration recording.
     pub activations: ActivationShare,
 }
 
+/// Largest part of an image's error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// The rounding of the activations.
+    Activations,
+    /// A recording that is too short, or too uniform: the error on frames that were not learned from is higher.
+    Recording,
+    /// The rounding and removal of weights.
+    Weights,
+}
+
 impl Check {
+    /// Returns the cause of at least half of the error.
+    pub fn cause(&self) -> Cause {
+        let [heldout, calib] = [&self.heldout, &self.calib].map(|checked| checked.as_ref().map(|of| of.report.nmse));
+        match (heldout, calib) {
+            _ if self.activations.share >= 0.5 => Cause::Activations,
+            (Some(heldout), Some(calib)) if self.learned && heldout >= 2.0 * calib => Cause::Recording,
+            _ => Cause::Weights,
+        }
+    }
+
+    /// Returns the frames of a recording whose held-out parts have at most 1.2 times the error that the two errors
+    /// approach, the mean of both; `None` if this one has. The difference of the errors falls with the frames.
+    pub fn frames_to_record(&self) -> Option<usize> {
+        let (heldout, calib) = (self.heldout.as_ref()?, self.calib.as_ref()?);
+        let frames = calib.recorded as f64;
+        let (held_out, learned) = (heldout.report.nmse, calib.report.nmse);
+        let wanted = 5.0 * frames * (held_out - learned) / (held_out + learned);
+        (self.learned && wanted > frames).then(|| two_digits(wanted))
+    }
+
     /// Returns the error on the held-out recording, or else on the calibration recording.
     pub fn nmse(&self) -> Option<f64> {
         self.heldout.as_ref().or(self.calib.as_ref()).map(|checked| checked.report.nmse)
     }
 }
 
-/// Runs `image`, made from `source`, over the recordings; `None` without any. If one holds no actions, the f32 policy
-/// gives them.
-pub fn check(source: &Policy, image: Image<'_>, recordings: &Recordings) -> Result<Option<Check>> {
-    let thinned = |dataset: &Dataset, most: usize| -> Dataset {
-        let macs = source.graph.weights().max(1) * source.graph.denoising_steps();
-        let mut dataset = dataset.thinned((most / macs).max(LEAST_FRAMES), source.graph.state_len() > 0).into_owned();
-        dataset.fill_actions(&source.graph);
-        dataset
-    };
+/// Rounds up to two digits.
+fn two_digits(number: f64) -> usize {
+    let unit = 10f64.powf((number.max(10.0).log10().floor() - 1.0).max(0.0));
+    ((number / unit).ceil() * unit) as usize
+}
+
+/// Returns the frames of a recording that are learned from or held out that are compared, with actions: all, or evenly
+/// spaced ones of a long recording.
+pub(crate) fn compared(graph: &Graph, dataset: &Dataset) -> Dataset {
+    thinned(graph, dataset, MOST_MACS)
+}
+
+fn thinned(graph: &Graph, dataset: &Dataset, most: usize) -> Dataset {
+    let macs = graph.weights().max(1) * graph.denoising_steps();
+    let mut dataset = dataset.thinned((most / macs).max(LEAST_FRAMES), graph.state_len() > 0).into_owned();
+    dataset.fill_actions(graph);
+    dataset
+}
+
+/// Runs `image`, made from `source` by `method`, over the recordings; `None` without any. If one holds no actions, the
+/// f32 policy gives them. `held_out` is the error on parts of the calibration recording, without a held-out one.
+pub fn check(
+    source: &Policy,
+    image: Image<'_>,
+    recordings: &Recordings,
+    method: &Method,
+    held_out: Option<HeldOut>,
+) -> Result<Option<Check>> {
     let checked = |whole: Option<&Dataset>, most: usize| -> Result<Option<(Dataset, Checked)>> {
         let Some(whole) = whole else { return Ok(None) };
-        let compared = thinned(whole, most);
+        let compared = thinned(&source.graph, whole, most);
         let report = eval::evaluate(image, &compared)?;
         Ok(Some((compared, Checked { report, recorded: whole.frames() })))
     };
@@ -65,5 +122,7 @@ pub fn check(source: &Policy, image: Image<'_>, recordings: &Recordings) -> Resu
     let Some((compared, of)) = heldout.as_ref().or(calib.as_ref()) else { return Ok(None) };
     let activations = eval::activation_share(image, compared, of.report.nmse)?;
     let [heldout, calib] = [heldout, calib].map(|checked| checked.map(|(_, checked)| checked));
-    Ok(Some(Check { heldout, calib, activations }))
+    let parts = held_out.as_ref().map_or(0, |held_out| held_out.parts);
+    let of_parts = held_out.map(|HeldOut { report, .. }| Checked { recorded: report.steps, report });
+    Ok(Some(Check { heldout: heldout.or(of_parts), parts, learned: *method != Method::Rtn, calib, activations }))
 }

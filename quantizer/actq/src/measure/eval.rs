@@ -28,7 +28,7 @@ pub struct ErrorReport {
     pub max_abs: f64,
     /// Compared observations.
     pub steps: usize,
-    /// Bits per weight, everything counted.
+    /// Bits per weight of the matrices, with scales and padding; biases and header do not count.
     pub bpw: f64,
     /// Bytes of the image.
     pub bytes: usize,
@@ -189,6 +189,19 @@ impl ErrorSums {
         self.max_abs = self.max_abs.max(other.max_abs);
         self.steps += other.steps;
         Ok(())
+    }
+
+    /// Takes the recorded values of a whole recording, of which the errors are those of a part: the variance of a short
+    /// part says little.
+    #[must_use]
+    pub fn relative_to(mut self, whole: &Dataset) -> Self {
+        self.signal = vec![Moment::default(); self.signal.len()];
+        for (episode, steps) in whole.length.iter().enumerate() {
+            for recorded in (0..*steps).filter_map(|step| whole.action_at(episode, step)) {
+                self.signal.iter_mut().zip(recorded).for_each(|(signal, r)| signal.add(f64::from(r)));
+            }
+        }
+        self
     }
 
     /// Returns the errors of an image of `bytes` bytes, at `bpw` bits per weight; `recording` names the recording in an

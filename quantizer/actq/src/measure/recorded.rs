@@ -28,6 +28,8 @@ const NAMED_FALL: f64 = 0.7;
 const EXPLAINED: f64 = 1e-3;
 /// Relative size of a factor, an offset or a limit that is named.
 const NAMED: f64 = 0.02;
+/// The same, in deviations of what remains unexplained.
+const NAMED_IN_NOISE: f64 = 0.3;
 /// Largest correlation of successive values of noise.
 const WHITE: f64 = 0.3;
 
@@ -245,7 +247,8 @@ impl Fit {
         if self.rest > NAMED_FALL * self.as_is {
             return Vec::new();
         }
-        let differs = |a: f64, b: f64, size: f64| (a - b).abs() > NAMED * size;
+        let least = NAMED.max(NAMED_IN_NOISE * self.rest.sqrt());
+        let differs = |a: f64, b: f64, size: f64| (a - b).abs() > least * size;
         let mut causes = Vec::new();
         let by_axis = |of: &dyn Fn(&Axis) -> f64| -> Vec<f64> { self.axes.iter().map(of).collect() };
         if self.axes.iter().any(|axis| differs(axis.factor, 1.0, 1.0)) {
@@ -416,7 +419,8 @@ mod tests {
         assert!(foreign.rest > 0.1, "{foreign}");
         let both = |rows: &[Vec<f32>], random: &mut Random| each(&noisy(rows, random), |_, v| 3.0 * v);
         let both = recorded(&graph, both).expect("they differ").to_string();
-        assert!(both.contains("3") && both.contains("times the policy's; ") && both.contains("like noise"), "{both}");
+        assert!(both.contains(" them): 3") && both.contains(" times the policy's; "), "{both}");
+        assert!(both.contains("remains, like noise"), "{both}");
     }
 
     #[test]

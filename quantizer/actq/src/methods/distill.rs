@@ -23,7 +23,7 @@ pub mod train;
 mod trials;
 mod units;
 
-pub use statistics::RowStatistics;
+pub use statistics::{MIN_FRAMES, RowStatistics};
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -85,9 +85,13 @@ fn check_names(graph: &Graph, options: &Options) -> Result<()> {
 /// Chooses the network to quantize, and learning or feedback.
 fn choose_candidate(goal: Goal<'_>, progress: &mut dyn FnMut(Progress)) -> Result<(Candidate, Chosen)> {
     let Goal { statistics: RowStatistics { windows, .. }, options, .. } = goal;
-    let recipe = Recipe::new(Widening::of(windows.recurrent()));
+    let usual = Recipe::new(Widening::of(windows.recurrent()));
+    let recipe = options.choice.and_then(Choice::recipe).unwrap_or(usual);
     let mut choosing = |share, error| progress(Progress::Choosing { share, error });
     let first = Candidate::new(goal, recipe)?;
+    if let Some(choice) = options.choice {
+        return Ok((first, Chosen::untried(choice, goal.statistics.bounds(options))));
+    }
     if options.learns() && first.task(goal, recipe).has_lost_half(windows) {
         return Ok(choose_recipe(goal, first, recipe, &mut choosing));
     }

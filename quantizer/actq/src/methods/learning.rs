@@ -50,6 +50,16 @@ pub enum Choice {
     },
 }
 
+impl Choice {
+    /// Returns the settings of learning.
+    pub fn recipe(self) -> Option<Recipe> {
+        match self {
+            Self::Learning(recipe) => Some(recipe),
+            Self::Feedback { .. } => None,
+        }
+    }
+}
+
 impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

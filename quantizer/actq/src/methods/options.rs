@@ -9,7 +9,10 @@ use actq_kernels::Width;
 use actq_kernels::layout::{GROUPS, is_group};
 use serde::{Deserialize, Serialize};
 
+use super::distill::MIN_FRAMES;
+use super::learning::Choice;
 use super::packing::{Activations, Packing};
+use super::prepared::LEAST_FRAMES;
 use super::quantized::Outcome;
 use crate::budget::{Budget, Rate};
 use crate::data::Dataset;
@@ -42,6 +45,15 @@ impl Method {
             Self::Rtn => 32,
             Self::Gptq | Self::Distill => 0,
             Self::Custom(method) => method.default_group(),
+        }
+    }
+
+    /// Returns the fewest frames that the method takes.
+    pub fn least_frames(&self) -> usize {
+        match self {
+            Self::Rtn => 0,
+            Self::Gptq | Self::Custom(_) => LEAST_FRAMES,
+            Self::Distill => MIN_FRAMES,
         }
     }
 }
@@ -172,6 +184,8 @@ pub struct Options {
     pub seed: u64,
     /// Matrices, by their tensors' names, whose rows all get the given width (method distill).
     pub forced: Vec<(String, Width)>,
+    /// The way to choose codes and its settings; `None`: tried out (method distill).
+    pub choice: Option<Choice>,
 }
 
 impl Options {
@@ -231,6 +245,7 @@ impl Options {
             relative: false,
             seed: 1,
             forced: Vec::new(),
+            choice: None,
         }
     }
 }

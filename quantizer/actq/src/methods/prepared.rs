@@ -20,7 +20,7 @@ use crate::error::{Context as _, Result, ensure};
 use crate::graph::Graph;
 
 /// Least frames of a method with a recording; distill needs more.
-const LEAST_FRAMES: usize = 16;
+pub(super) const LEAST_FRAMES: usize = 16;
 
 /// Most input vectors of an iterative head's matrices in statistics; every frame gives one per denoising step.
 const MOST_VECTORS: usize = 8192;

@@ -1,5 +1,8 @@
 //! A prepared policy and method, and the images made from them.
 
+use std::sync::OnceLock;
+
+use super::held_out::{Fold, HeldOut};
 use super::tries::Search;
 use crate::budget::Rate;
 use crate::data::Recordings;
@@ -16,6 +19,8 @@ pub struct Quantizer<'a> {
     pub(super) policy: &'a Policy,
     pub(super) recordings: &'a Recordings,
     pub(super) method: PreparedMethod<'a>,
+    /// Statistics without held-out parts of the calibration recording, as soon as they are needed.
+    pub(super) folds: OnceLock<Vec<Fold<'a>>>,
 }
 
 /// A quantized policy.
@@ -33,6 +38,8 @@ pub struct QuantizedPolicy {
     pub learning: Option<Learning>,
     /// Search, if the budget is an error.
     pub search: Option<Search>,
+    /// Error on held-out parts of the calibration recording, if the search has measured it.
+    pub held_out: Option<HeldOut>,
     /// Predicted step, if the budget is a time.
     pub time: Option<StepTime>,
 }
@@ -49,7 +56,7 @@ impl<'a> Quantizer<'a> {
     ) -> Result<Self> {
         let mut method = PreparedMethod::before(&policy.graph, method, recordings.calib.as_ref(), minutes, progress)?;
         recordings.heldout.iter().for_each(|held_out| method.watch(held_out));
-        Ok(Self { policy, recordings, method })
+        Ok(Self { policy, recordings, method, folds: OnceLock::new() })
     }
 
     /// Returns the method with its statistics.
@@ -72,7 +79,7 @@ impl<'a> Quantizer<'a> {
         let QuantizedNetwork { graph, outcomes, learning, .. } = network;
         let policy = Policy { graph, ..self.policy.clone() };
         let image = emit::image(&policy, &outcomes)?;
-        Ok(QuantizedPolicy { policy, outcomes, image, rate, learning, search: None, time: None })
+        Ok(QuantizedPolicy { policy, outcomes, image, rate, learning, search: None, held_out: None, time: None })
     }
 }
 

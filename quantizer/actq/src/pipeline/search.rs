@@ -4,7 +4,8 @@
 //! executor. A method that learns first looks with an eighth of the steps, at most `LOOKS` times. From the budget found
 //! in this way, it continues with all its steps. The returned image has kept the limit with all its steps. The search
 //! stops when the next smaller budget is known to fail, or after `TRIES` tries (`PLAIN_TRIES` without learning, or with
-//! too few steps to share). After that many, a smaller budget may still pass, and the tries show which range is open.
+//! too few steps to share). Errors are measured on a held-out recording, or on parts of the calibration recording that are
+//! held out in turn. After that many tries, a smaller budget may still pass, and the tries show which range is open.
 //! The search assumes that errors fall with bits.
 
 use std::borrow::Cow;
@@ -22,6 +23,7 @@ use crate::measure::eval;
 use crate::measure::time::{CLOCK, StepTime};
 use crate::methods::{self, Method, Options, Outcome, Progress};
 use crate::policy::Policy;
+use crate::text::count;
 
 /// Budgets per bit.
 const PER_BIT: usize = 10;
@@ -59,8 +61,9 @@ pub(super) fn smallest(
     let dataset = measured(quantizer.policy, quantizer.recordings)?;
     let top = top(quantizer.policy, options)?;
     let all_steps = quantizer.method.most_steps(options);
-    let mut attempts =
-        Attempts { quantizer, options, limit, dataset: &dataset, all_steps, tries: Vec::new(), found: None };
+    let share = if quantizer.recordings.heldout.is_some() { 1.0 } else { 0.5 };
+    let (tries, found) = (Vec::new(), None);
+    let mut attempts = Attempts { quantizer, options, limit, dataset: &dataset, all_steps, share, tries, found };
     let few = all_steps / SHARE;
     let mut search = |first: usize, most_tries: usize, steps: usize| {
         narrow(first, top, most_tries, limit, |cell| attempts.run(cell, steps, watch))
@@ -80,41 +83,55 @@ pub(super) fn smallest(
         step: 1.0 / PER_BIT as f64,
         fails: fails as f64 / PER_BIT as f64,
         tries,
-        measured_on: dataset.name().into_owned(),
-        held_out: quantizer.recordings.heldout.is_some(),
+        measured_on: match &quantized.held_out {
+            Some(held_out) => {
+                format!("{} of {} that it did not learn from", count(held_out.report.steps, "frame"), dataset.name())
+            }
+            None => dataset.name().into_owned(),
+        },
+        held_out: quantizer.recordings.heldout.is_some()
+            || quantized.held_out.is_some()
+            || options.method == Method::Rtn,
     };
     Ok(QuantizedPolicy { search: Some(search), ..quantized })
 }
 
 /// The tries of a search, and the last image that has kept the limit with all steps.
-struct Attempts<'a> {
-    quantizer: &'a Quantizer<'a>,
+struct Attempts<'a, 'q> {
+    quantizer: &'a Quantizer<'q>,
     options: &'a Options,
     limit: f64,
     dataset: &'a Dataset,
     all_steps: usize,
+    /// Share of a try that makes its image; the rest measures it on held-out parts.
+    share: f64,
     tries: Vec<Try>,
     /// The image with its error and its budget.
     found: Option<(QuantizedPolicy, f64, f64)>,
 }
 
-impl Attempts<'_> {
+impl Attempts<'_, '_> {
     /// Quantizes with the budget of a cell. Returns the error; infinite if the budget is too small.
     fn run(&mut self, cell: usize, steps: usize, watch: &mut impl Watch) -> Result<f64> {
         let budget = cell as f64 / PER_BIT as f64;
         let options = Options { steps: Some(steps), ..self.options.clone() };
         let work = format!("try {}: {budget} bits per weight", self.tries.len() + 1);
-        let mut progress = |state: Progress| watch.progress(&work, state.share());
+        let mut progress = |state: Progress| watch.progress(&work, self.share * state.share());
         let measured = match self.quantizer.at(Rate::BitsPerWeight(budget), &options, &mut progress) {
             Err(error) if error.budget().is_some() => None,
             Err(error) => return Err(error),
             Ok(quantized) => {
                 let buffer = quantized.buffer();
                 let image = buffer.image(Path::new("image in memory"))?;
-                let report = eval::evaluate(image, self.dataset)?;
                 let milliseconds = StepTime::new(&image, CLOCK).milliseconds;
+                let watch = |share: f64| watch.progress(&work, 0.5 + 0.5 * share);
+                let held_out = self.quantizer.held_out_error(&quantized, &options, watch)?;
+                let report = match &held_out {
+                    Some(held_out) => held_out.report.clone(),
+                    None => eval::evaluate(image, self.dataset)?,
+                };
                 if report.nmse <= self.limit && steps == self.all_steps {
-                    self.found = Some((quantized, report.nmse, budget));
+                    self.found = Some((QuantizedPolicy { held_out, ..quantized }, report.nmse, budget));
                 }
                 Some((report, milliseconds))
             }

@@ -34,7 +34,7 @@ pub struct Stats {
     pub crc32: String,
     /// Bytes of the image.
     pub bytes: usize,
-    /// Bits per weight, everything counted.
+    /// Bits per weight of the matrices, with scales and padding; biases and header do not count.
     pub bpw: f64,
     /// The method's name; `best`, the former name of `distill`, is read as `distill`.
     #[serde(deserialize_with = "method_name")]

@@ -50,13 +50,13 @@ pub(super) fn within(
 }
 
 /// Images without learning, to find a rate.
-struct Draft<'a> {
-    quantizer: &'a Quantizer<'a>,
+struct Draft<'a, 'q> {
+    quantizer: &'a Quantizer<'q>,
     options: &'a Options,
     limit: TimeLimit,
 }
 
-impl Draft<'_> {
+impl Draft<'_, '_> {
     fn at(&self, rate: Rate) -> Result<QuantizedPolicy> {
         self.quantizer.at(rate, self.options, &mut |_| {})
     }

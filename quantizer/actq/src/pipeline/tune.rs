@@ -9,12 +9,12 @@ use serde::Serialize;
 use super::driven::{DriveOutcome, Driven};
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use super::watch::Watch;
-use crate::data::{Dataset, Learned, Recording, Recordings, Share};
+use crate::data::{Dataset, Learned, Part, Recording, Recordings, Share};
 use crate::error::{Context as _, Result, ensure};
 use crate::measure::eval;
 use crate::measure::recorded::{self, Difference};
 use crate::measure::time::{CLOCK, StepTime};
-use crate::methods::Options;
+use crate::methods::{Method, Options};
 use crate::policy::Policy;
 
 /// Policy, recordings and options of a tuning.
@@ -24,7 +24,7 @@ pub struct TunePlan<'a> {
     pub policy: &'a Policy,
     /// Recordings of the f32 policy, which all images learn from.
     pub calib: Vec<Dataset>,
-    /// Recording for errors on the f32 policy's path; without it, `calib`.
+    /// Recording for errors on the f32 policy's path; without it, a tenth of `calib` is held out.
     pub heldout: Option<Dataset>,
     /// Method and budget of every image.
     pub options: &'a Options,
@@ -43,7 +43,7 @@ pub struct Round {
     pub episodes: usize,
     /// Frames of them that were kept.
     pub frames: usize,
-    /// Bits per weight, everything counted.
+    /// Bits per weight of the matrices, with scales and padding; biases and header do not count.
     pub bpw: f64,
     /// Bytes of the image.
     pub bytes: usize,
@@ -106,7 +106,7 @@ pub fn run(
             differences.extend(recorded::use_policy_of(&mut heldout, &policy.graph));
             heldout
         }
-        None => Learned::join(&mut parts, &policy.graph)?.dataset,
+        None => hold_out(&mut parts, policy, &options.method)?,
     };
     f32_path.fill_actions(&policy.graph);
     let mut rows: Vec<Round> = Vec::new();
@@ -147,6 +147,20 @@ pub fn run(
     }
 }
 
+/// Takes a tenth of every recording, which no image learns from; all of them if too few frames would stay.
+fn hold_out(parts: &mut [Dataset], policy: &Policy, method: &Method) -> Result<Dataset> {
+    let tenths: Vec<Part> = parts.iter().map(|part| part.part(&policy.graph, 5, 10)).collect();
+    let frames: usize = tenths.iter().map(|tenth| tenth.learned.frames()).sum();
+    if frames < method.least_frames() {
+        return Ok(Learned::join(parts, &policy.graph)?.dataset);
+    }
+    let (learned, mut held_out): (Vec<_>, Vec<_>) =
+        tenths.into_iter().map(|Part { learned, held_out }| (learned, held_out)).unzip();
+    parts.iter_mut().zip(learned).for_each(|(part, learned)| *part = learned);
+    held_out.retain(|part| part.frames() > 0);
+    Ok(Learned::join(&mut held_out, &policy.graph)?.dataset)
+}
+
 fn learn(policy: &Policy, calib: Dataset, options: &Options, mut watch: impl Watch) -> Result<QuantizedPolicy> {
     let recordings = Recordings { calib: Some(calib), heldout: None };
     let quantizer = Quantizer::new(policy, &recordings, options.method.clone(), options.minutes, |share| {
@@ -161,7 +175,6 @@ mod tests {
 
     use super::*;
     use crate::budget::Budget;
-    use crate::methods::Method;
     use crate::random::Random;
     use crate::testing::{dataset, lstm};
 
@@ -204,7 +217,8 @@ mod tests {
         )
         .expect("tuned");
         let learned: Vec<_> = tuned.rounds.iter().map(|r| (r.round, r.recordings, r.episodes, r.frames)).collect();
-        assert_eq!(learned, [(0, 1, 5, 250), (1, 2, 8, 310), (2, 3, 11, 370)]);
+        // A tenth of the first recording is held out.
+        assert_eq!(learned, [(0, 1, 5, 225), (1, 2, 8, 285), (2, 3, 11, 345)]);
         assert_eq!(images[2], tuned.quantized.image, "the last image is rolled out and returned");
         assert!(images[0] != images[1] && images[1] != images[2]);
         assert!(tuned.rounds.iter().all(|r| r.nmse > 0.0 && r.own_nmse.is_some_and(|n| n > 0.0)));

@@ -24,7 +24,7 @@ class ErrorReport:
     max_abs: float
     #: Compared observations.
     steps: int
-    #: Bits per weight, everything counted.
+    #: Bits per weight of the matrices, with scales and padding; biases and header do not count.
     bpw: float
     #: Bytes of the image.
     bytes: int

@@ -96,7 +96,8 @@ def quantize(
     ms, clock: most milliseconds of a step on a Cortex-M4 at a clock in Hz, as predicted.
     max_nmse: largest error; searches the fewest bits that keep it. At most one of these budgets may be given, or flash and
         ms, which are then both kept.
-    heldout: recordings that nothing learns from; errors are measured on them.
+    heldout: recordings that nothing learns from; errors are measured on them. Without them, parts of `recordings` are held
+        out in turn for the error, which takes about as long again. The log `actq` has the errors.
     method: "distill" (the default with recordings), "gptq" or "rtn" (the default without).
     group: columns that share a scale: 0, 32, 64 or 128.
     activations: bits of the activations: 8 or 16.

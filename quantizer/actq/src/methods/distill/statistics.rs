@@ -24,7 +24,7 @@ use crate::graph::{Graph, WeightMatrix};
 use crate::methods::options::Options;
 
 /// Least frames to learn from.
-const MIN_FRAMES: usize = 200;
+pub const MIN_FRAMES: usize = 200;
 /// Most held-out frames to watch.
 const MAX_WATCHED_FRAMES: usize = 2048;
 /// Seed of the statistics, the same for every budget.
