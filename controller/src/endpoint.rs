@@ -103,7 +103,7 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
     ) -> Option<&'b [u8]> {
         let received = self.receiver.push(byte)?;
         self.heard_at = safety.with(|safety| safety.ticks());
-        let of = received.sequence;
+        let (of, is_arm) = (received.sequence, matches!(received.message, Message::Arm { .. }));
         let (guard, settings) = (&mut self.guard, &mut self.settings);
         let answer = match received.message {
             Message::Observation(values) => {
@@ -127,8 +127,11 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
                     Err(refusal) => Answer::Done(Err(refusal)),
                 }
             }
-            message => Answer::Done(request(&message, guard, settings, safety, update)?),
+            message => Answer::Done(request(&message, [received.micros, micros], guard, settings, safety, update)?),
         };
+        if is_arm && matches!(answer, Answer::Done(Ok(()))) {
+            self.bound(true);
+        }
         let message = match answer {
             Answer::Message(message) => message,
             Answer::Report(report) => self.report_message(report, safety),
@@ -165,6 +168,7 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         if state == State::Armed {
             return;
         }
+        self.bound(false);
         let is_quiet = ticks.wrapping_sub(self.heard_at) > self.settings.quiet;
         if stale || is_quiet {
             self.guard.reopen();
@@ -175,6 +179,12 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
                 safety.with(Safety::renew);
             }
         }
+    }
+
+    /// While armed, only frames that follow the arm request, by their numbers and their times, are accepted.
+    fn bound(&mut self, is_armed: bool) {
+        self.receiver.bound(is_armed);
+        self.guard.bound(is_armed);
     }
 
     /// Returns the newest observation once, if it arrived under the current token and a status has reported this token.

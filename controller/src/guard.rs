@@ -41,6 +41,8 @@ pub enum Refused {
         /// Age in µs.
         age: u32,
     },
+    /// The sender's time has jumped forward since the controller was armed.
+    Ahead,
 }
 
 impl fmt::Display for Refused {
@@ -50,6 +52,7 @@ impl fmt::Display for Refused {
             Self::NotFinite { index } => write!(f, "value {index} is not finite"),
             Self::OutOfRange { index } => write!(f, "value {index} is outside its range"),
             Self::Old { age } => write!(f, "{age} µs older than the fastest delivery"),
+            Self::Ahead => f.write_str("the sender's time has jumped forward"),
         }
     }
 }
@@ -65,6 +68,8 @@ pub struct Guard<'r, const OBS: usize> {
     /// Largest `max_age` that the build allows, in µs.
     built_max_age: u32,
     age: Age,
+    /// `true` while the sender's time must not jump forward.
+    is_bounded: bool,
     values: [f32; OBS],
     len: usize,
     /// Sequence number of the kept observation's frame.
@@ -88,6 +93,7 @@ impl<'r, const OBS: usize> Guard<'r, OBS> {
             max_age,
             built_max_age: max_age,
             age: Age::default(),
+            is_bounded: false,
             values: [0.0; OBS],
             len: OBS,
             newest: None,
@@ -122,11 +128,25 @@ impl<'r, const OBS: usize> Guard<'r, OBS> {
         {
             return Err(Refused::OutOfRange { index });
         }
-        let age = self.age.of(remote, local);
-        if age > self.max_age {
-            return Err(Refused::Old { age });
+        self.date(remote, local)
+    }
+
+    /// Checks the age of a frame that was sent at `remote` µs and received at `local` µs.
+    ///
+    /// # Errors
+    ///
+    /// [`Refused::Old`] or [`Refused::Ahead`].
+    pub fn date(&mut self, remote: u32, local: u32) -> Result<(), Refused> {
+        match self.age.of(remote, local, !self.is_bounded) {
+            None => Err(Refused::Ahead),
+            Some(age) if age > self.max_age => Err(Refused::Old { age }),
+            Some(_) => Ok(()),
         }
-        Ok(())
+    }
+
+    /// Refuses jumps of the sender's time from now on, or ends that.
+    pub fn bound(&mut self, is_bounded: bool) {
+        self.is_bounded = is_bounded;
     }
 
     /// Returns the newest observation once, with its frame's number.

@@ -28,9 +28,11 @@ impl Settings {
     }
 }
 
-/// Carries out a request; `None` for a message that only a controller sends.
+/// Carries out a request that was sent at `sent` µs and came at `came` µs; `None` for a message that only a controller
+/// sends.
 pub(crate) fn request<const OBS: usize, const AXES: usize>(
     message: &Message<'_>,
+    [sent, came]: [u32; 2],
     guard: &mut Guard<'_, OBS>,
     settings: &mut Settings,
     safety: &mut impl Shared<AXES>,
@@ -38,7 +40,12 @@ pub(crate) fn request<const OBS: usize, const AXES: usize>(
 ) -> Option<Result<(), Refusal>> {
     let outcome = match *message {
         Message::Arm { .. } if update.is_busy() => Err(Refusal::Busy),
-        Message::Arm { token } => safety.with(|safety| safety.arm(token)),
+        // A request with the token was sent by the host of now, so its time is right: an old one was held up, or the
+        // clocks were learned from recorded frames.
+        Message::Arm { token } => safety.with(|safety| {
+            let is_current = token == safety.token();
+            if is_current && guard.date(sent, came).is_err() { Err(Refusal::Stale) } else { safety.arm(token) }
+        }),
         Message::Disarm => {
             safety.with(Safety::disarm);
             Ok(())

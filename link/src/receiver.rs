@@ -5,7 +5,7 @@ use crate::fields::Reader;
 use crate::frame::{self, VERSION};
 use crate::message::Message;
 use crate::report::Counters;
-use crate::window::{Order, Window};
+use crate::window::{HALF, Order, Window};
 
 /// A message with its frame's sequence number and time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,22 +26,28 @@ pub struct Received<'a> {
 pub struct Receiver<const N: usize> {
     decoder: Decoder<N>,
     window: Window,
+    /// How far ahead of the last accepted number a number may be.
+    reach: u32,
     counters: Counters,
 }
 
 impl<const N: usize> Receiver<N> {
+    /// How far ahead of the last number a bounded receiver accepts one: more frames than a line loses within the longest
+    /// deadline, at 2 kHz.
+    pub const REACH: u32 = 1024;
+
     /// Length of the longest payload that fits, in bytes.
     pub const PAYLOAD: usize = N.saturating_sub(frame::bytes(0));
 
     /// Creates a receiver that accepts the first good frame with any sequence number.
     pub const fn new() -> Self {
         let counters = Counters { good: 0, damaged: 0, malformed: 0, repeated: 0, lost: 0 };
-        Self { decoder: Decoder::new(), window: Window::open(), counters }
+        Self { decoder: Decoder::new(), window: Window::open(), reach: HALF, counters }
     }
 
     /// Takes a byte and returns the message whose frame it ends.
     pub fn push(&mut self, byte: u8) -> Option<Received<'_>> {
-        let Self { decoder, window, counters } = self;
+        let Self { decoder, window, reach, counters } = self;
         let Ok(content) = decoder.push(byte)? else {
             counters.damaged = counters.damaged.wrapping_add(1);
             return None;
@@ -50,7 +56,9 @@ impl<const N: usize> Receiver<N> {
             counters.malformed = counters.malformed.wrapping_add(1);
             return None;
         };
-        match window.admit(received.sequence) {
+        // A disarm stops the outputs, whoever sends it.
+        let reach = if received.message == Message::Disarm { HALF } else { *reach };
+        match window.admit(received.sequence, reach) {
             Order::Repeated => {
                 counters.repeated = counters.repeated.wrapping_add(1);
                 None
@@ -68,6 +76,12 @@ impl<const N: usize> Receiver<N> {
     /// frame that was accepted before may then be accepted again.
     pub fn reopen(&mut self) -> bool {
         self.window.reopen()
+    }
+
+    /// Bounds the accepted numbers, or ends that: a bounded receiver refuses numbers more than [`Self::REACH`] ahead of
+    /// the last one, except a disarm's. Frames that were recorded before the sender restarted may be so far ahead.
+    pub fn bound(&mut self, is_bounded: bool) {
+        self.reach = if is_bounded { Self::REACH } else { HALF };
     }
 
     /// Returns the counters of the frames so far.

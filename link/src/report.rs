@@ -16,7 +16,7 @@ record! {
         pub damaged: u32,
         /// Undamaged frames of another version, of an unknown kind, or whose payload does not match their kind.
         pub malformed: u32,
-        /// Frames that had arrived before, or that arrived after a newer one.
+        /// Frames that had arrived before, that arrived after a newer one, or, while armed, whose number is too far ahead.
         pub repeated: u32,
         /// Missing sequence numbers.
         pub lost: u32,

@@ -6,6 +6,7 @@ mod foc;
 mod guard;
 mod limits;
 mod memory;
+mod replays;
 mod safety;
 mod slots;
 mod transitions;

@@ -27,7 +27,7 @@ enum actq_link_state { ACTQ_LINK_DISARMED = 0, ACTQ_LINK_ARMED = 1, ACTQ_LINK_LA
 
 /* One end of a line. */
 typedef struct {
-    uint32_t sequence;                       /* of the next frame to send: any number to begin with */
+    uint32_t sequence;                       /* of the next frame to send: any number to begin with, but none of an earlier run */
     uint8_t received[ACTQ_LINK_FRAME + 1];   /* the frame in progress, unstuffed */
     size_t length;                           /* bytes in it */
     uint8_t left;                            /* bytes until the next code byte; 0: a code byte is next */
