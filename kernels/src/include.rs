@@ -1,12 +1,14 @@
 //! An image in the program: aligned, and checked at compile time.
 
 use crate::image::ImageInfo;
+use crate::image::features::refusal;
 
 /// Includes an image file, as [`include_bytes!`](core::include_bytes) does, and returns `&'static [u8]`.
 ///
 /// The bytes are aligned to 4, as [`Image::new_checked`](crate::Image::new_checked) needs them. At compile time
 /// [`ImageInfo::read`](crate::ImageInfo::read) checks the file: another format version, another kernel layout, a
-/// truncated or a damaged file does not compile. `Image::new_checked` checks the rest at run time.
+/// truncated or a damaged file does not compile. Nor does an image that needs a feature of this crate which the build
+/// leaves out; the error names the feature. `Image::new_checked` checks the rest at run time.
 ///
 /// A relative path starts at the file that calls the macro.
 ///
@@ -52,5 +54,8 @@ pub struct Aligned<T: ?Sized>(pub T);
 pub const fn check(bytes: &[u8]) {
     if let Err(error) = ImageInfo::read(bytes) {
         panic!("{}", error.text());
+    }
+    if let Some(refusal) = refusal(bytes) {
+        panic!("{}", refusal);
     }
 }

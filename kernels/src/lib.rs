@@ -31,8 +31,9 @@
 //! - `chunks`: action chunks of more than one action, with overlap and temporal ensemble.
 //! - `around`: the operations around a network (`docs/DEPLOY.md`): raw values in, targets out.
 //!
-//! These make the code smaller when they are off; all but `around` are on by default. A build refuses an image that
-//! needs one of them with [`ImageError::LeftOut`]; `actq inspect` lists what an image needs. Three more:
+//! These make the code smaller when they are off; all are on by default. An image that needs one that the build leaves
+//! out does not compile in [`include_image!`], and is refused with [`ImageError::LeftOut`] at run time; `actq inspect`
+//! lists what an image needs. Three more:
 //!
 //! - `compact` shortens the assembler's loops for paired lanes of 3, 4 and 8 bits: less code, more time, the same bits.
 //! - `defmt` derives `defmt::Format` for the error types.

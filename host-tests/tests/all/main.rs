@@ -17,6 +17,7 @@ mod faults;
 mod folder;
 mod format;
 mod learning;
+mod left_out;
 mod malformed;
 mod memory;
 mod on_target;

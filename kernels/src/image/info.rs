@@ -41,7 +41,7 @@ impl ImageInfo {
 }
 
 /// Returns the header's words as in memory; `None` if `bytes` is shorter.
-const fn header(bytes: &[u8]) -> Option<[u32; h::WORDS]> {
+pub(super) const fn header(bytes: &[u8]) -> Option<[u32; h::WORDS]> {
     let mut header = [0; h::WORDS];
     let mut rest = bytes;
     let mut i = 0;

@@ -8,8 +8,7 @@
 mod check;
 mod contract;
 mod crc;
-#[cfg(feature = "writer")]
-mod features;
+pub(crate) mod features;
 mod front;
 pub mod header;
 mod info;

@@ -127,7 +127,7 @@ impl OpKind {
     }
 
     #[cfg(feature = "writer")]
-    fn texts(self) -> [&'static str; 3] {
+    fn texts(self) -> [&'static str; 2] {
         TEXTS.get(usize::from(self.code()).wrapping_sub(1)).copied().unwrap_or_default()
     }
 
@@ -145,15 +145,6 @@ impl OpKind {
     #[cfg(feature = "writer")]
     pub fn label(self) -> &'static str {
         self.texts()[1]
-    }
-
-    /// Returns the feature of this crate without which a build refuses the operation.
-    #[cfg(feature = "writer")]
-    pub fn feature(self) -> Option<&'static str> {
-        match self {
-            Self::Function(function) => function.feature(),
-            kind => Some(kind.texts()[2]).filter(|feature| !feature.is_empty()),
-        }
     }
 
     /// Returns `true` if the operation takes these bits as a single constant: above 0, and finite except for limits.
@@ -219,9 +210,17 @@ macro_rules! operations {
         /// The names of the codes above, from code 1 on.
         pub(crate) const NAMES: &[&str] = &[$(stringify!($NAME)),*];
 
-        /// Human-readable names, what they call their constants and third region, and the feature that has them.
+        /// Human-readable names, and what they call their constants and third region.
         #[cfg(feature = "writer")]
-        static TEXTS: [[&str; 3]; NAMES.len()] = [$([$text, concat!($($label)?), concat!($($feature)?)]),*];
+        static TEXTS: [[&str; 2]; NAMES.len()] = [$([$text, concat!($($label)?)]),*];
+
+        /// Returns the feature of this crate with the operation of a code; empty if every build has it.
+        pub(super) const fn feature(code: u8) -> &'static str {
+            match code {
+                $($NAME => concat!($($feature)?),)*
+                _ => "",
+            }
+        }
 
         /// By operation code, from 1 up to the last that the build has.
         pub(super) static FORMS: [Form; BUILT] = {

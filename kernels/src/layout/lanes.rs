@@ -44,8 +44,7 @@ impl Lanes {
     }
 
     /// Returns the feature of this crate with the kernels of these lanes.
-    #[cfg(feature = "writer")]
-    pub const fn feature(self) -> &'static str {
+    pub(crate) const fn feature(self) -> &'static str {
         match self {
             Self::Single => "single",
             Self::Paired => "paired",

@@ -29,8 +29,7 @@ macro_rules! widths {
             }
 
             /// Returns the feature of this crate with the width's kernels.
-            #[cfg(feature = "writer")]
-            pub const fn feature(self) -> &'static str {
+            pub(crate) const fn feature(self) -> &'static str {
                 match self {
                     $(Self::$width => $feature,)*
                 }

@@ -26,13 +26,11 @@ macro_rules! functions {
                 }
             }
 
-            /// Returns the feature of this crate with the function; `None` if every build has it.
-            #[cfg(feature = "writer")]
-            pub(crate) fn feature(self) -> Option<&'static str> {
-                let features: &[&'static str] = match self {
-                    $(Self::$function => &[$($feature)?],)*
-                };
-                features.first().copied()
+            /// Returns the feature of this crate with the function; empty if every build has it.
+            pub(crate) const fn feature(self) -> &'static str {
+                match self {
+                    $(Self::$function => concat!($($feature)?),)*
+                }
             }
 
             /// Returns `true` if this build has the function.
@@ -73,8 +71,8 @@ functions! {
 
 impl Function {
     /// Returns the function of a code in an image.
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.get(usize::from(code)).copied()
+    pub const fn from_code(code: u8) -> Option<Self> {
+        if (code as usize) < Self::ALL.len() { Some(Self::ALL[code as usize]) } else { None }
     }
 
     /// Applies the function to every element.
