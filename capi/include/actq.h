@@ -118,6 +118,8 @@ enum actq_code {
   ACTQ_STALE = 89,
   /** a value of the observation is outside the range of its raw input */
   ACTQ_OBSERVATION_RANGE = 90,
+  /** a quaternion's length is not near 1, so it is not an orientation */
+  ACTQ_ORIENTATION = 91,
   /** a pointer is null */
   ACTQ_NULL = 128,
   /** a pointer is not aligned for its type */

@@ -132,6 +132,8 @@ codes! {
     Stale = 89, c"no action is young enough to play";
     /// A value of the observation is outside the range of its raw input.
     ObservationRange = 90, c"a value of the observation is outside the range of its raw input";
+    /// A quaternion's length is not near 1.
+    Orientation = 91, c"a quaternion's length is not near 1, so it is not an orientation";
     /// A pointer is null.
     Null = 128, c"a pointer is null";
     /// A pointer is not aligned for its type.

@@ -251,6 +251,8 @@ errors! {
             /// Its position.
             index: usize,
         } = 90, "observation value {index} is outside the range of its raw input";
+        /// A quaternion of the observation is not an orientation: its length is not near 1 (`docs/DEPLOY.md`).
+        Orientation = 91, "a quaternion's length is not near 1, so it is not an orientation";
     }
 }
 
@@ -260,6 +262,7 @@ impl From<Fault> for StepError {
             Fault::NotFinite => Self::NotFinite,
             Fault::Damaged => Self::Damaged,
             Fault::Stale => Self::Stale,
+            Fault::Orientation => Self::Orientation,
         }
     }
 }
@@ -273,6 +276,8 @@ pub(crate) enum Fault {
     Damaged,
     /// See [`StepError::Stale`].
     Stale,
+    /// See [`StepError::Orientation`].
+    Orientation,
 }
 
 impl From<NotFinite> for Fault {
@@ -392,8 +397,9 @@ mod tests {
             StepError::NoiseNotFinite { index: 0 },
             StepError::Stale,
             StepError::ObservationRange { index: 0 },
+            StepError::Orientation,
         ];
-        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86, 87, 88, 89, 90]);
+        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86, 87, 88, 89, 90, 91]);
         let saved = [
             SavedError::Length { needed: 1, given: 0 },
             SavedError::Version,

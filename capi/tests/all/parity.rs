@@ -120,6 +120,7 @@ fn every_error_of_the_kernels_has_a_code() {
         StepError::NotBegun,
         StepError::Stale,
         StepError::ObservationRange { index: 0 },
+        StepError::Orientation,
     ];
     assert!(steps.iter().all(|error| has_code(error.code())));
     let saved = [

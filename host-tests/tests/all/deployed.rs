@@ -21,7 +21,7 @@ use actq_deploy::{
 };
 use actq_kernels::image::OpKind;
 use actq_kernels::ops::run_whole;
-use actq_kernels::{Image, PortKind, Width};
+use actq_kernels::{Image, PortKind, StepError, Width};
 use anyhow::{Context as _, Result, ensure};
 
 use crate::slices::{in_polls, whole};
@@ -129,7 +129,7 @@ fn images_of_bundles_give_their_codes_targets() -> Result<()> {
 /// A description with every operation, and its files.
 pub(crate) struct Made;
 
-const MADE: &str = include_str!("deployed.toml");
+pub(crate) const MADE: &str = include_str!("deployed.toml");
 
 /// Networks with random weights, by the names of their files: one linear function for each output.
 #[derive(Debug)]
@@ -204,7 +204,12 @@ impl Sources for Made {
 
 impl Made {
     pub(crate) fn deployment() -> Result<(Plan, Deployment)> {
-        let plan = Plan::new(&Description::parse(MADE)?, &Self)?;
+        Self::deployment_of(MADE)
+    }
+
+    /// Returns the plan and the compiled form of another description with the same networks.
+    pub(crate) fn deployment_of(text: &str) -> Result<(Plan, Deployment)> {
+        let plan = Plan::new(&Description::parse(text)?, &Self)?;
         let deployment = Deployment::new("every operation", 50.0, &plan)?;
         Ok((plan, deployment))
     }
@@ -212,11 +217,12 @@ impl Made {
     /// Returns raw values of some ticks: the robot stands in some of them.
     pub(crate) fn raw(ticks: usize) -> Vec<Vec<Vec<f64>>> {
         let mut random = Random::new(5);
-        let mut values = |len: usize, scale: f32| (0..len).map(|_| f64::from(scale * random.unit())).collect();
+        let mut values =
+            |len: usize, scale: f32| -> Vec<f64> { (0..len).map(|_| f64::from(scale * random.unit())).collect() };
         (0..ticks)
             .map(|tick| {
                 let command = if tick / 20 % 2 == 0 { 1.0 } else { 0.1 };
-                vec![values(3, 1.0), values(4, 1.0), values(3, 1.5), values(2, command)]
+                vec![values(3, 1.0), scaled(&values(4, 1.0), 1.0), values(3, 1.5), values(2, command)]
             })
             .collect()
     }
@@ -227,9 +233,92 @@ fn every_operation_matches_its_description() -> Result<()> {
     let (plan, deployment) = Made::deployment()?;
     let raw = Made::raw(150);
     let mut runner = Runner::new(plan);
-    let targets: Vec<f64> =
-        raw.iter().flat_map(|raw| runner.step(raw).targets.into_iter().flat_map(|(_, target)| target)).collect();
+    let targets: Vec<f64> = raw
+        .iter()
+        .map(|raw| Ok(runner.step(raw)?.targets))
+        .collect::<Result<Vec<_>>>()?
+        .into_iter()
+        .flatten()
+        .flat_map(|(_, target)| target)
+        .collect();
     gives(&deployment, &raw, &targets)
+}
+
+/// Scales a vector to a length.
+fn scaled(vector: &[f64], length: f64) -> Vec<f64> {
+    let norm = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    vector.iter().map(|x| x / norm * length).collect()
+}
+
+/// A quaternion whose length is not near 1 gives no action, in a whole step, in polls, and in the description's own
+/// execution. Then the head starts anew.
+#[test]
+fn quaternions_far_from_unit_give_no_action() -> Result<()> {
+    const QUATERNION: usize = 1;
+    for order in ["xyzw", "wxyz"] {
+        let description = MADE.replace("gravity = \"xyzw\"", &format!("gravity = \"{order}\""));
+        let (plan, deployment) = Made::deployment_of(&description)?;
+        let bytes = four_bits(&deployment.policy)?;
+        let buffer = ImageBuffer::new(&bytes);
+        let raw = Made::raw(10);
+        let mut runner = Runner::new(plan);
+        let single = |raw: &[Vec<f64>]| raw.concat().iter().map(|x| *x as f32).collect::<Vec<_>>();
+        let later: Vec<_> = raw[5..].iter().map(|raw| single(raw)).collect();
+        let expected = with_head(buffer.image(Path::new("new"))?, |head| whole(head, &later))?;
+        with_head(buffer.image(Path::new("new"))?, |head| {
+            for length in [0.0, 1e-30, 0.5, 0.9, 0.95, 1.0, 1.05, 1.1, 2.0, 100.0, 1e30] {
+                for quaternion in
+                    [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.5, -0.5, 0.5, -0.5], [0.1, 0.7, -0.6, 0.4]]
+                {
+                    let mut raw = raw[..5].to_vec();
+                    raw[4][QUATERNION] = scaled(&quaternion, length);
+                    let (before, far) = (single(&raw[3]), single(&raw[4]));
+                    let is_far = !(0.92..=1.08).contains(&length);
+                    head.reset();
+                    head.step(&before)?;
+                    let stepped = head.step(&far).map(bits);
+                    ensure!(stepped.is_err() == is_far, "{order}, length {length}: {stepped:?}");
+                    ensure!(
+                        runner.step(&raw[4]).is_err() == is_far,
+                        "{order}, length {length}: the description differs"
+                    );
+                    if !is_far {
+                        continue;
+                    }
+                    ensure!(stepped == Err(StepError::Orientation), "{stepped:?}");
+                    ensure!(whole(head, &later)? == expected, "{order}, length {length}: the head does not start anew");
+                    let budget = head.least_budget();
+                    let polled = in_polls(head, &far, || budget).expect_err("no action of polls");
+                    ensure!(polled.downcast_ref() == Some(&StepError::Orientation), "{polled}");
+                    let polled =
+                        later.iter().map(|raw| Ok(in_polls(head, raw, || budget)?.0)).collect::<Result<Vec<_>>>()?;
+                    ensure!(polled == expected, "{order}, length {length}: polls do not start anew");
+                }
+            }
+            Ok(())
+        })?;
+        let mut zero = raw[0].clone();
+        zero[QUATERNION].fill(0.0);
+        let error = format!("{:#}", runner.step(&zero).expect_err("no orientation"));
+        ensure!(error.contains("gravity") && error.contains("length 0.000"), "{error}");
+    }
+    Ok(())
+}
+
+/// A self-test has orientations, also where their inputs are in another unit, order or range.
+#[test]
+fn self_tests_have_orientations_within_ranges() -> Result<()> {
+    let input = "name = \"quaternion\"\nlen = 4";
+    for (range, scale) in [("[-1.01, 1.01]", "1.0"), ("[0.0, 16384.0]", "0.00006103515625"), ("[5.0, 7.5]", "1.0")] {
+        let read = if range == "[5.0, 7.5]" { "{ subtract = 6.0 }" } else { "{ select = [2, 0, 3, 1] }" };
+        let description = MADE
+            .replace(input, &format!("{input}\nrange = {range}"))
+            .replace("{ gravity = \"xyzw\" }", &format!("{read}, {{ scale = {scale} }}, {{ gravity = \"xyzw\" }}"));
+        ensure!(description.contains(range) && description.contains(read), "the fixture has changed");
+        let bytes = four_bits(&Made::deployment_of(&description)?.1.policy)?;
+        with_head(ImageBuffer::new(&bytes).image(Path::new("new"))?, |head| Ok::<_, anyhow::Error>(head.self_test()?))?;
+    }
+    Ok(())
 }
 
 #[test]
@@ -274,7 +363,7 @@ fn description_and_image_balance_the_robot() -> Result<()> {
             return Ok(Vec::new());
         };
         let inputs = runner.plan().split(raw);
-        Ok(runner.step(&inputs).targets[0].1.iter().map(|x| *x as f32).collect())
+        Ok(runner.step(&inputs)?.targets[0].1.iter().map(|x| *x as f32).collect())
     })?;
     let bytes = four_bits(&Deployment::load(folder)?.policy)?;
     let buffer = ImageBuffer::new(&bytes);

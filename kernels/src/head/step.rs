@@ -22,7 +22,8 @@ impl Head<'_, '_> {
     /// [`StepError::ObservationLength`], [`StepError::ObservationNotFinite`] and [`StepError::ObservationRange`] for
     /// the observation;
     /// [`StepError::NotFinite`] if a value inside the network exceeds f32's range, [`StepError::Damaged`] if the
-    /// image's memory has changed since its check, [`StepError::Stale`] if the action is older than its deadline.
+    /// image's memory has changed since its check, [`StepError::Stale`] if the action is older than its deadline,
+    /// [`StepError::Orientation`] if the image reads a quaternion whose length is not near 1.
     ///
     /// An error resets the recurrent state and the chunk, so that no part of a failed evaluation reaches a later
     /// action. The last action stays, and `max_step` limits the next one from it.

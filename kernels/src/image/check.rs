@@ -333,7 +333,7 @@ fn check_around(kind: Around, op: &Op<'_>, front: &mut Front<'_>) -> Result<(), 
     let valid = match kind {
         Around::Select => {
             front.take(op.data(), 1 + n.div_ceil(2))?;
-            op.half(1) == 0 && (0..n).all(|i| op.half(2 + i) < op.half(0))
+            (op.half(1) == 0 || op.half(1) == 1 && op.half(0) == 4) && (0..n).all(|i| op.half(2 + i) < op.half(0))
         }
         Around::Constant | Around::Start => {
             front.take_finite(op.data(), n)?;

@@ -47,7 +47,8 @@ pub enum OpKind {
     /// network's next input. Constants: the limit of the predicted sample, infinite for none; the arena offset of the
     /// first step's noise, or 0; the coefficients of each step.
     Denoise,
-    /// `dst[i] = src[index[i]]`. Data: the length of `src`, the indices.
+    /// `dst[i] = src[index[i]]`. Data: the length of `src`, 1 if `src` is a quaternion whose length must be near 1, the
+    /// indices.
     Select,
     /// `dst = clamp(dst, src, third)`, element by element.
     Clip,

@@ -25,5 +25,5 @@ pub use functions::Function;
 pub use functions::sigmoid;
 #[cfg(feature = "writer")]
 pub use functions::{cos, elu, exp, gelu, gelu_tanh, mish, relu, silu, sin, softplus, tanh};
-pub use limits::clamp;
 pub(crate) use limits::zero_or_nan;
+pub use limits::{ORIENTATION, clamp};

@@ -6,7 +6,7 @@ use core::ops::Range;
 use crate::arena::{part, regions};
 use crate::error::Fault;
 use crate::image::{Around, Op, Region};
-use crate::math::clamp;
+use crate::math::{ORIENTATION, clamp};
 use crate::ops::elementwise::{copy, copy_le};
 
 /// Clips a value, all as bits. A value or a limit that is not finite gives NaN, so that an overflow stays visible.
@@ -20,11 +20,18 @@ fn clip(x: u32, low: u32, high: u32) -> u32 {
     clamp(f32::from_bits(x), f32::from_bits(low), f32::from_bits(high)).to_bits()
 }
 
+/// Returns `true` if a quaternion's length is near 1. Its squares are added from left to right. NaN is not near.
+fn is_orientation(quaternion: &[u32]) -> bool {
+    let squares = quaternion.iter().map(|x| f32::from_bits(*x) * f32::from_bits(*x));
+    ORIENTATION.contains(&squares.fold(0.0, |sum, square| sum + square))
+}
+
 /// Runs a range of an operation's units. Its state advances with the last of them.
 ///
 /// # Errors
 ///
-/// [`Fault::Damaged`] if the image does not have the operation's regions or data.
+/// [`Fault::Damaged`] if the image does not have the operation's regions or data, [`Fault::Orientation`] for a
+/// quaternion whose length is not near 1.
 #[inline(never)]
 pub(super) fn run(kind: Around, op: &Op<'_>, arena: &mut [u32], units: &Range<usize>) -> Result<(), Fault> {
     let [dst, src, third, _] = regions(arena, &op.regions, Region::default());
@@ -36,6 +43,9 @@ pub(super) fn run(kind: Around, op: &Op<'_>, arena: &mut [u32], units: &Range<us
     let count = third.last().copied().unwrap_or(0);
     let next = match kind {
         Around::Select => {
+            if op.half(1) == 1 && !is_orientation(src) {
+                return Err(Fault::Orientation);
+            }
             for (to, i) in part(dst, units).iter_mut().zip(units.clone()) {
                 *to = *src.get(op.half(2 + i)).ok_or(Fault::Damaged)?;
             }

@@ -224,7 +224,7 @@ fn rest(kind: OpKind, len: usize, add: &mut dyn FnMut(Feature, usize)) {
 
 /// Counts the values whose norm an operation computes, in each of its pieces.
 fn squared(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
-    if op.kind == OpKind::Stand {
+    if op.kind == OpKind::Stand || op.kind == OpKind::Select && op.half(1) == 1 {
         add(Feature::SQUARED, op.src().len);
     }
 }

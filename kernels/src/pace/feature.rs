@@ -39,7 +39,7 @@ singles! {
     DENOISED_REST "a value of an iterate after the last eight"
     NORMALIZED_REST "a value normalized after the last eight"
     FRAME "a frame of a history"
-    SQUARED "a value whose norm decides whether the robot stands"
+    SQUARED "a value of a norm that decides: whether the robot stands, or whether a quaternion is an orientation"
     POLL_OP "a call that runs one operation"
     POLL "a call that runs pieces"
     ENTERED "an operation that a poll enters"

@@ -1,6 +1,7 @@
 //! The bytes of an image, from a quantized network.
 
 mod lower;
+mod raw_values;
 mod writer;
 
 pub use lower::{Program, lower};

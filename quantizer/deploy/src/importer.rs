@@ -93,7 +93,8 @@ pub fn observed(folder: &Path, raw: &Dataset) -> Result<Dataset> {
         runner.reset();
         for (step, values) in raw.episode(episode).take(*steps).enumerate() {
             let inputs = runner.plan().split(&values);
-            let tick = runner.step(&inputs);
+            let place = || format!("{}: episode {episode}, step {step}", raw.path.display());
+            let tick = runner.step(&inputs).with_context(place)?;
             for (i, column) in columns.iter().enumerate() {
                 obs[[episode, step, i]] = tick.observation[*column] as f32;
             }

@@ -71,15 +71,21 @@ impl Raw {
         Ok(frames)
     }
 
+    /// Names a tick, for messages.
+    fn at(&self, tick: usize) -> String {
+        format!("{}: tick {tick}", self.name)
+    }
+
     /// Runs a plan on the raw inputs.
     ///
     /// # Errors
     ///
-    /// If an input is missing or has another length.
+    /// If an input is missing or has another length, or a quaternion is not an orientation.
     pub fn run(&self, plan: Plan) -> Result<Vec<Tick>> {
         let frames = self.frames(&plan.inputs)?;
         let mut runner = Runner::new(plan);
-        Ok(frames.iter().map(|frame| runner.step(frame)).collect())
+        let step = |(t, frame): (usize, &Vec<Vec<f64>>)| runner.step(frame).with_context(|| self.at(t));
+        frames.iter().enumerate().map(step).collect()
     }
 }
 
@@ -155,7 +161,7 @@ impl Reference {
     ///
     /// # Errors
     ///
-    /// If an array is missing or has another length.
+    /// If an array is missing or has another length, or a quaternion is not an orientation.
     pub fn compare(&self, plan: Plan) -> Result<Comparison> {
         self.run(plan, false)
     }
@@ -172,7 +178,7 @@ impl Reference {
             if first && comparison.first.is_some() {
                 break;
             }
-            let tick = runner.step(frame);
+            let tick = runner.step(frame).with_context(|| self.raw.at(t))?;
             let target: Vec<f64> = tick.targets.iter().flat_map(|(_, value)| value.iter().copied()).collect();
             for (kind, values) in KINDS.into_iter().zip([&tick.observation, &tick.action, &target]) {
                 let Some(expected) = self.expected.get(kind) else { continue };

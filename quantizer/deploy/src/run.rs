@@ -2,6 +2,9 @@
 
 use std::f64::consts::PI;
 
+use actq::error::{Context as _, Result, bail, ensure};
+use actq_kernels::math::ORIENTATION;
+
 use crate::clock::Phases;
 use crate::description::{End, Orientation, TargetKind};
 use crate::history::Frames;
@@ -74,10 +77,14 @@ impl Runner {
 
     /// Computes a tick from the raw inputs, in the order and the lengths of [`Plan::inputs`].
     ///
+    /// # Errors
+    ///
+    /// If a quaternion is not an orientation: its length is not near 1. An image's step fails then, too.
+    ///
     /// # Panics
     ///
     /// If their number or a length is another.
-    pub fn step(&mut self, raw: &[Vec<f64>]) -> Tick {
+    pub fn step(&mut self, raw: &[Vec<f64>]) -> Result<Tick> {
         assert!(
             raw.iter().map(Vec::len).eq(self.plan.inputs.iter().map(|(_, len)| *len)),
             "raw inputs of other lengths"
@@ -85,17 +92,17 @@ impl Runner {
         let mut observations = vec![Vec::new(); self.plan.networks.len()];
         for i in 0..self.plan.order.len() {
             match self.plan.order[i] {
-                TickStep::Value(index) => self.values[index] = self.make(index, raw),
+                TickStep::Value(index) => self.values[index] = self.make(index, raw)?,
                 TickStep::Network(network) => observations[network] = self.run(network),
             }
         }
         self.states = self.plan.states.iter().map(|state| self.values[state.next].clone()).collect();
         self.tick += 1;
-        Tick {
+        Ok(Tick {
             observation: observations.concat(),
             action: self.values[self.plan.action].clone(),
             targets: self.targets(),
-        }
+        })
     }
 
     fn targets(&self) -> Vec<(TargetKind, Vec<f64>)> {
@@ -109,8 +116,8 @@ impl Runner {
         self.plan.targets.iter().map(limited).collect()
     }
 
-    fn make(&mut self, index: usize, raw: &[Vec<f64>]) -> Vec<f64> {
-        match &self.plan.values[index].source {
+    fn make(&mut self, index: usize, raw: &[Vec<f64>]) -> Result<Vec<f64>> {
+        Ok(match &self.plan.values[index].source {
             ValueSource::Input(i) => raw[*i].clone(),
             ValueSource::State(i) => self.states[*i].clone(),
             ValueSource::Clock(_, of) => {
@@ -131,12 +138,12 @@ impl Runner {
                 for (step, frames) in steps.iter().zip(&mut self.histories[index]) {
                     value = match frames {
                         Some(frames) => frames.step(&value),
-                        None => apply(step, value, &self.values),
+                        None => apply(step, value, &self.values).with_context(|| self.plan.names[index].clone())?,
                     };
                 }
                 value
             }
-        }
+        })
     }
 
     /// Runs a network; returns its inputs, one after the other.
@@ -157,7 +164,7 @@ fn norm(value: &[f64]) -> f64 {
 }
 
 /// Applies an operation that keeps no state.
-fn apply(step: &ValueOp, mut value: Vec<f64>, values: &[Vec<f64>]) -> Vec<f64> {
+fn apply(step: &ValueOp, mut value: Vec<f64>, values: &[Vec<f64>]) -> Result<Vec<f64>> {
     let mut with = |arg: &Arg, f: fn(f64, f64) -> f64| {
         let other = match arg {
             Arg::Numbers(numbers) => numbers,
@@ -168,11 +175,11 @@ fn apply(step: &ValueOp, mut value: Vec<f64>, values: &[Vec<f64>]) -> Vec<f64> {
         }
     };
     match step {
-        ValueOp::Select(places) => return places.iter().map(|place| value[*place]).collect(),
+        ValueOp::Select(places) => return Ok(places.iter().map(|place| value[*place]).collect()),
         ValueOp::Place(places) => {
             let mut placed = vec![0.0; value.len()];
             places.iter().zip(&value).for_each(|(place, x)| placed[*place] = *x);
-            return placed;
+            return Ok(placed);
         }
         ValueOp::Add(arg) => with(arg, |x, y| x + y),
         ValueOp::Subtract(arg) => with(arg, |x, y| x - y),
@@ -185,25 +192,29 @@ fn apply(step: &ValueOp, mut value: Vec<f64>, values: &[Vec<f64>]) -> Vec<f64> {
         ValueOp::Wrap => value.iter_mut().for_each(|x| *x = (*x + PI).rem_euclid(2.0 * PI) - PI),
         ValueOp::Sin => value.iter_mut().for_each(|x| *x = x.sin()),
         ValueOp::Cos => value.iter_mut().for_each(|x| *x = x.cos()),
-        ValueOp::Norm => return vec![norm(&value)],
+        ValueOp::Norm => return Ok(vec![norm(&value)]),
         ValueOp::Gravity(orientation) => return gravity(*orientation, &value),
         // A history has a state.
         ValueOp::History(_) => {}
     }
-    value
+    Ok(value)
 }
 
 /// Returns the direction of gravity, (0, 0, -1) in the world, in the body's frame.
-fn gravity(orientation: Orientation, value: &[f64]) -> Vec<f64> {
+fn gravity(orientation: Orientation, value: &[f64]) -> Result<Vec<f64>> {
     let [w, x, y, z] = match (orientation, value) {
         (Orientation::Wxyz, [w, x, y, z]) | (Orientation::Xyzw, [x, y, z, w]) => {
             let length = norm(value);
+            ensure!(
+                (f64::from(*ORIENTATION.start())..=f64::from(*ORIENTATION.end())).contains(&(length * length)),
+                "the quaternion {value:?} has length {length:.3} and is not an orientation; give one of length 1"
+            );
             [w / length, x / length, y / length, z / length]
         }
         (Orientation::Rpy, [roll, pitch, _]) => {
-            return vec![pitch.sin(), -roll.sin() * pitch.cos(), -roll.cos() * pitch.cos()];
+            return Ok(vec![pitch.sin(), -roll.sin() * pitch.cos(), -roll.cos() * pitch.cos()]);
         }
-        _ => return vec![f64::NAN; 3],
+        _ => bail!("{} values are no orientation", value.len()),
     };
-    vec![2.0 * (w * y - x * z), -2.0 * (y * z + w * x), -(1.0 - 2.0 * (x * x + y * y))]
+    Ok(vec![2.0 * (w * y - x * z), -2.0 * (y * z + w * x), -(1.0 - 2.0 * (x * x + y * y))])
 }

@@ -161,7 +161,7 @@ mod firmware {
                     let act_len = head.image().act_len();
                     let written = match run.step(head, observation) {
                         Ok(action) => output.write_all(bytemuck::must_cast_slice(action)),
-                        Err(StepError::ObservationNotFinite { .. } | StepError::NotFinite) => {
+                        Err(StepError::ObservationNotFinite { .. } | StepError::NotFinite | StepError::Orientation) => {
                             (0..act_len).all(|_| output.write_all(&NO_ACTION.to_le_bytes()))
                         }
                         Err(e) => return Err(message("step", e)),

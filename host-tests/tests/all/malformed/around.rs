@@ -31,7 +31,8 @@ fn impossible_operations_around_a_network_are_refused() -> Result<()> {
     let cases: &[Case] = &[
         ("an index of select after the source", E::Around, |d| d.set_low(d.data(SELECT) + 1, d.low(d.data(SELECT)))),
         ("select of no values", E::Around, |d| d.set_low(d.data(SELECT), 0)),
-        ("a reserved half of select", E::Around, |d| d.set_high(d.data(SELECT), 1)),
+        ("a quaternion of other than 4 values", E::Around, |d| d.set_high(d.data(SELECT), 1)),
+        ("an unknown check of select", E::Around, |d| d.set_high(d.data(SELECT), 2)),
         ("select of words up to its result", E::Overlap, |d| d.set_low(d.data(SELECT), 0xffff)),
         ("a constant NaN", E::Constant, |d| d.set_f32(d.data(CONSTANT), NAN)),
         ("a start NaN", E::Constant, |d| d.set_f32(d.data(START), NAN)),

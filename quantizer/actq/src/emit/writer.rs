@@ -10,6 +10,7 @@ use actq_kernels::image::{
 use actq_kernels::layout::{self, BlockShape};
 
 use super::lower::lower;
+use super::raw_values::raw_values;
 use crate::around::{Around, NamedPort};
 use crate::contract::ActionContract;
 use crate::error::{Context, Result, ensure};
@@ -169,7 +170,7 @@ impl Writer {
         let name = self.push_bytes(policy.name.as_bytes());
         let steps = self_test_steps(policy, program.state.len, obs_len);
         let observations = match around {
-            Some(_) => self_test_observations(&Graph::new(obs_len), steps),
+            Some(around) => raw_values(around, steps),
             None => self_test_observations(&policy.graph, steps),
         };
         let self_test = self.words.len() as u32;

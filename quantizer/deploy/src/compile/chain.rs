@@ -102,7 +102,8 @@ impl Chain {
             (ValueOp::Norm, _) => {
                 // The sum of x * x / |x|.
                 let value = self.flush(to);
-                let parts = direction(to, value);
+                let copy = to.writable_copy(value);
+                let parts = direction(to, copy);
                 to.with(OpKind::Mul, parts, value);
                 let sum = Slice { len: 1, ..parts };
                 for i in 1..len {
@@ -201,15 +202,14 @@ impl Chain {
     }
 }
 
-/// Divides a vector by its Euclidean norm.
-fn direction(to: &mut Operations, value: Slice) -> Slice {
+/// Divides a vector by its Euclidean norm, in place.
+fn direction(to: &mut Operations, vector: Slice) -> Slice {
     // An RMS norm divides by the norm over the root of the length.
-    let weight = 1.0 / (value.len as f32).sqrt();
-    let direction = to.writable_copy(value);
+    let weight = 1.0 / (vector.len as f32).sqrt();
     let mut constants = vec![f32::MIN_POSITIVE];
-    constants.extend(std::iter::repeat_n(weight, value.len));
-    to.emit(OpKind::RmsNorm, direction, None, None, StepData::Constants(constants));
-    direction
+    constants.extend(std::iter::repeat_n(weight, vector.len));
+    to.emit(OpKind::RmsNorm, vector, None, None, StepData::Constants(constants));
+    vector
 }
 
 /// Computes the direction of gravity, as [`crate::run`] does.
@@ -239,7 +239,8 @@ fn gravity(to: &mut Operations, orientation: Orientation, value: Slice) -> Slice
         }
     };
     // 2 (wy - xz), -2 (yz + wx), 2 (xx + yy) - 1
-    let unit = direction(to, value);
+    let orientation = to.orientation(value);
+    let unit = direction(to, orientation);
     let first = product(to, [unit, unit], [[w, y, x], [y, z, x]]);
     let second = product(to, [unit, unit], [[x, w, y], [z, x, y]]);
     let first = to.normalize(first, &[0.0, 0.0, 0.5], &[2.0, -2.0, 2.0], infinity);

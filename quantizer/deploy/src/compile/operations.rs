@@ -82,7 +82,16 @@ impl Operations {
         {
             return Slice { offset: src.offset + first, len: places.len(), ..src };
         }
-        let halves: Vec<usize> = [src.len, 0].into_iter().chain(places.iter().copied()).collect();
+        self.selected(src, 0, places)
+    }
+
+    /// Copies a quaternion; the step fails if it is not an orientation.
+    pub(super) fn orientation(&mut self, quaternion: Slice) -> Slice {
+        self.selected(quaternion, 1, &[0, 1, 2, 3])
+    }
+
+    fn selected(&mut self, src: Slice, is_orientation: usize, places: &[usize]) -> Slice {
+        let halves: Vec<usize> = [src.len, is_orientation].into_iter().chain(places.iter().copied()).collect();
         let dst = self.value(places.len());
         self.emit(OpKind::Select, dst, Some(src), None, StepData::Words(words(&halves)));
         dst

@@ -228,7 +228,7 @@ fn several_actions_become_several_targets() -> Result<()> {
     ensure!(description.joints["action_0"] == ["FL_knee", "FR_knee"], "{:?}", description.joints);
     let mut runner = Runner::new(files.plan(&description)?);
     let raw: Vec<Vec<f64>> = runner.plan().inputs().iter().map(|(name, len)| isaaclab::raw(name, *len, 3)).collect();
-    let tick = runner.step(&raw);
+    let tick = runner.step(&raw)?;
     let expected: Vec<f64> = tick.action[..2].iter().map(|action| 5.0 * action).collect();
     ensure!(tick.targets[0].1.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-9), "{:?}", tick.targets);
     Ok(())

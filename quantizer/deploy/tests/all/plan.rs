@@ -126,15 +126,15 @@ fn every_section_takes_part_in_a_tick() -> Result<()> {
     let mut runner = Runner::new(plan(WHOLE)?);
     for _ in 0..2 {
         // relative: (q - default) as right, left, times 10 and 1.
-        let first = runner.step(&[vec![2.0, 4.0]]);
+        let first = runner.step(&[vec![2.0, 4.0]])?;
         assert_eq!(first.targets[0].1, [1.0, 20.0]);
         // x: relative + last (0) + phase (0, 0.5) + row 0 (0, 1); y: 0.
         assert_eq!(first.observation, [20.0, 2.5, 0.0, 0.0]);
         assert_eq!(first.action, [120.0, 102.5]);
-        let second = runner.step(&[vec![1.0, 2.0]]);
+        let second = runner.step(&[vec![1.0, 2.0]])?;
         // Row 0 again, by the lag; last and y are the output before.
         assert_eq!(second.observation, [120.25, 104.25, 120.0, 102.5]);
-        let third = runner.step(&[vec![1.0, 2.0]]);
+        let third = runner.step(&[vec![1.0, 2.0]])?;
         assert_eq!(third.observation[0], second.action[0] + 0.5 + 10.0);
         runner.reset();
     }

@@ -155,9 +155,9 @@ impl Files {
         let inputs = runner.plan().inputs().to_vec();
         let step = |tick: usize| {
             let given: Vec<Vec<f64>> = inputs.iter().map(|(name, len)| raw(name, *len, tick)).collect();
-            let made = runner.step(&given);
-            (made.observation, made.targets.into_iter().flat_map(|(_, values)| values).collect())
+            let made = runner.step(&given)?;
+            Ok((made.observation, made.targets.into_iter().flat_map(|(_, values)| values).collect()))
         };
-        Ok((0..ticks).map(step).collect())
+        (0..ticks).map(step).collect()
     }
 }
