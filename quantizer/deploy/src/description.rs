@@ -46,6 +46,10 @@ pub struct Description {
     /// Lists of numbers that operations refer to.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constants: BTreeMap<String, Vec<f64>>,
+    /// Largest rounding of constants in the bundle's files, by their names: what a comparison with a reference leaves
+    /// to it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub rounding: BTreeMap<String, f64>,
     /// Raw inputs, which the application writes in every tick.
     #[serde(default, rename = "input", skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<Input>,

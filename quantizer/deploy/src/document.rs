@@ -9,9 +9,6 @@ use actq::text::printable;
 use crate::bundle::Bundle;
 use crate::yaml::Node;
 
-/// Most keys that a message lists.
-const MOST_LISTED: usize = 40;
-
 /// A YAML file.
 #[derive(Debug)]
 pub(crate) struct Document {
@@ -120,11 +117,15 @@ impl Document {
         self.required(path, "a list of texts", Node::texts)
     }
 
-    /// Lists the keys that nothing has read and that no pattern of `ignored` names.
+    /// Returns `true` if something has been read of it: it is of the policy that the user chose.
+    pub(crate) fn is_read(&self) -> bool {
+        !self.read.borrow().is_empty()
+    }
+
+    /// Returns the paths that nothing has read and that no pattern of `ignored` names.
     pub(crate) fn unread(&self, ignored: &[String]) -> Vec<String> {
         let mut unread = Vec::new();
         self.add_unread(&self.root, "", ignored, &mut unread);
-        unread.truncate(MOST_LISTED);
         unread
     }
 
@@ -133,11 +134,19 @@ impl Document {
             return;
         }
         if node.entries().is_empty() {
-            unread.push(self.location(path));
+            unread.push(path.to_owned());
         }
         for (key, inner) in node.entries() {
             let inner_path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
             self.add_unread(inner, &inner_path, ignored, unread);
+        }
+    }
+
+    /// Returns `true` if it has a value at a path, of which `*` stands for any key.
+    pub(crate) fn has(&self, path: &str) -> bool {
+        match path.strip_prefix("*.") {
+            Some(rest) => self.root.entries().iter().any(|(_, inner)| find(inner, rest).is_some()),
+            None => self.peek(path).is_some(),
         }
     }
 }
@@ -150,8 +159,24 @@ fn find<'a>(node: &'a Node, path: &str) -> Option<&'a Node> {
     })
 }
 
-/// Returns `true` if a path is, or is below, one that a pattern names.
-fn fits(pattern: &str, path: &str) -> bool {
+/// Returns `true` if a path is, or is below, one that a pattern names; `*` stands for any text within a key.
+pub(crate) fn fits(pattern: &str, path: &str) -> bool {
     let mut parts = path.split('.');
-    pattern.split('.').all(|wanted| parts.next().is_some_and(|part| wanted == "*" || wanted == part))
+    pattern.split('.').all(|wanted| parts.next().is_some_and(|part| is_like(wanted, part)))
+}
+
+fn is_like(wanted: &str, part: &str) -> bool {
+    match wanted.split_once('*') {
+        None => wanted == part,
+        Some((first, rest)) => part.strip_prefix(first).is_some_and(|mut left| {
+            while !is_like(rest, left) {
+                let mut letters = left.chars();
+                if letters.next().is_none() {
+                    return false;
+                }
+                left = letters.as_str();
+            }
+            true
+        }),
+    }
 }

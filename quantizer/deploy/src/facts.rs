@@ -8,6 +8,12 @@ use actq::text::printable;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
+use crate::document::{Document, fits};
+use crate::yaml::Node;
+
+/// Most places of a key that a question lists.
+const MOST_PLACES: usize = 3;
+
 /// Fixed rules of a family, as data: its file is a `profile.toml`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -18,12 +24,40 @@ pub(crate) struct Profile {
     pub upstream: String,
     /// Its commit.
     pub commit: String,
+    /// Releases that the rules and keys were read in.
+    pub versions: Vec<String>,
+    /// Key of the files that states their version, and its values that were read.
+    #[serde(default)]
+    pub format: Option<Format>,
+    /// Keys by which the family's files are told, a list for each kind of file.
+    #[serde(default, rename = "mark")]
+    pub marks: Vec<Mark>,
+    /// Keys of the family's files that could change a number, with `*` for any text within a part of a path. One that
+    /// nothing reads is a question.
+    pub own: Vec<String>,
     /// Keys of the family's files that no deployment reads, with `*` for any part of a path.
     #[serde(default)]
     pub ignored: Vec<String>,
     /// The rules.
     #[serde(default, rename = "rule")]
     pub rules: Vec<Rule>,
+}
+
+/// Versions of a family's files.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Format {
+    pub key: String,
+    pub read: Vec<String>,
+}
+
+/// Keys that a file of a family has.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Mark {
+    /// Ending of the file's name: "onnx" for its metadata, "yaml" or "json".
+    pub ending: String,
+    pub keys: Vec<String>,
 }
 
 /// A fact that no file of a bundle states.
@@ -233,6 +267,24 @@ impl Facts {
         Ok(None)
     }
 
+    /// Compares an answer, if there is one, with what a file states.
+    ///
+    /// # Errors
+    ///
+    /// If they differ.
+    pub(crate) fn agrees<T>(&mut self, key: &str, stated: &T, at: &str) -> Result<()>
+    where
+        T: DeserializeOwned + PartialEq + fmt::Debug,
+    {
+        let Some(answer) = self.answers.0.get(key) else { return Ok(()) };
+        self.used.insert(key.to_owned());
+        let given: T = read(answer, &format!("answer {key}"))?;
+        if given == *stated {
+            return Ok(());
+        }
+        Err(Self::contradiction(key, ("the answer", &format!("{given:?}")), (at, &format!("{stated:?}"))))
+    }
+
     /// Asks whether the application computes a value that no reader knows.
     ///
     /// # Errors
@@ -241,6 +293,66 @@ impl Facts {
     pub(crate) fn of_application(&mut self, key: &str, meaning: &str) -> Result<()> {
         let given = self.missing::<bool>(key, meaning)?;
         ensure!(given != Some(false), "answer {key} = false: nothing else can compute it; describe it in deploy.toml");
+        Ok(())
+    }
+
+    /// Asks for the keys that nothing reads and that could change a number, and for a version that was not read.
+    /// Returns the other keys that nothing reads, with their files.
+    ///
+    /// # Errors
+    ///
+    /// If an answer is another than those that the question names.
+    pub(crate) fn unread(&mut self, documents: &[Document]) -> Result<Vec<String>> {
+        let profile = self.profile.clone();
+        let (mut other, mut asked) = (Vec::new(), BTreeMap::<String, Vec<String>>::new());
+        for document in documents {
+            if let Some(format) = &profile.format
+                && let Some(version) = document.peek(&format.key).and_then(Node::text)
+                && !format.read.iter().any(|read| read == version)
+            {
+                let (at, read) = (document.location(&format.key), format.read.join(", "));
+                let meaning =
+                    format!("{at} = {}: the rules were read in {read}; do they hold (\"holds\")?", printable(version));
+                self.confirmed("version", &meaning, "holds")?;
+            }
+            for path in document.unread(&profile.ignored) {
+                let node = document.peek(&path);
+                let says_nothing = |node: &Node| node.is_null() || node.text().is_none() && node.items().is_empty();
+                if node.is_some_and(says_nothing) {
+                    continue;
+                }
+                let is_asked = document.is_read() && profile.own.iter().any(|pattern| fits(pattern, &path));
+                let at = document.location(&path);
+                if is_asked {
+                    let value = node.and_then(Node::text).map_or_else(|| "a list".to_owned(), printable_start);
+                    let name = path.rsplit('.').next().unwrap_or(&path).to_owned();
+                    asked.entry(name).or_default().push(format!("{at} = {value}"));
+                } else {
+                    other.push(at);
+                }
+            }
+        }
+        for (name, places) in asked {
+            let more = places.len().saturating_sub(MOST_PLACES);
+            let more = if more > 0 { format!("; {more} more") } else { String::new() };
+            let meaning = format!(
+                "nothing reads {}{more}, which could change a number; the family was read in {}. Does the deployment do without (\"unused\")?",
+                places[..places.len().min(MOST_PLACES)].join("; "),
+                profile.versions.join(", ")
+            );
+            self.confirmed(&format!("unread.{name}"), &meaning, "unused")?;
+        }
+        Ok(other)
+    }
+
+    /// Asks a question that has one answer.
+    fn confirmed(&mut self, key: &str, meaning: &str, answer: &str) -> Result<()> {
+        let given: Option<String> = self.missing(key, meaning)?;
+        let fits = given.as_ref().is_none_or(|given| given == answer);
+        ensure!(
+            fits,
+            "answer {key} = {given:?}: give {answer:?}, or describe the bundle in deploy.toml by docs/DEPLOY.md"
+        );
         Ok(())
     }
 
@@ -282,7 +394,7 @@ impl Facts {
         ))
     }
 
-    /// Returns all sources, the open questions and the keys that nothing ignores.
+    /// Returns all sources and the open questions.
     ///
     /// # Errors
     ///
@@ -304,11 +416,11 @@ impl Facts {
         );
         Ok((self.sources, self.questions))
     }
+}
 
-    /// Returns the keys of the family's files that need no reader.
-    pub(crate) fn ignored(&self) -> &[String] {
-        &self.profile.ignored
-    }
+/// Returns the start of a text, for a message.
+fn printable_start(text: &str) -> String {
+    printable(&text.chars().take(40).collect::<String>()).to_string()
 }
 
 fn read<T: DeserializeOwned>(value: &toml::Value, key: &str) -> Result<T> {

@@ -13,6 +13,7 @@ mod rl_sar;
 mod tensors;
 mod unitree_rl_lab;
 
+pub(crate) use self::common::metadata_document;
 use crate::family::Family;
 
 /// All families; the first that recognizes a bundle reads it.

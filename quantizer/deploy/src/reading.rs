@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use actq::error::{Context as _, Result, bail};
 
 use crate::bundle::Bundle;
-use crate::description::Description;
+use crate::description::{Description, Numbers, Op, Operand};
 use crate::facts::{Answers, Facts, Profile, Question};
 use crate::families::FAMILIES;
+use crate::nearest::nearest;
 
 /// File of a description, in a bundle's folder. Where it is, no reader is needed.
 pub const DESCRIPTION: &str = "deploy.toml";
@@ -27,6 +28,24 @@ pub struct Reading {
     pub questions: Vec<Question>,
     /// Keys of the files that nothing read.
     pub unread: Vec<String>,
+}
+
+/// Limits the targets that end in a clip to its numbers: a controller needs them to arm.
+fn limit_clipped(description: &mut Description, facts: &mut Facts) {
+    for i in 0..description.targets.len() {
+        let target = &description.targets[i];
+        let value = description.values.iter().find(|value| value.name == target.value);
+        let Some(Op::Clip(limits)) = value.and_then(|value| value.ops.last()) else { continue };
+        let numbers = |limit: &Operand| match limit {
+            Operand::Number(number) => Some(Numbers::All(*number)),
+            Operand::List(list) => Some(Numbers::Each(list.clone())),
+            Operand::Name(name) => description.constants.get(name).map(|list| Numbers::Each(list.clone())),
+        };
+        if let ([Some(low), Some(high)], None) = (limits.each_ref().map(numbers), &target.limits) {
+            facts.note("limits", facts.source(&target.value));
+            description.targets[i].limits = Some([low, high]);
+        }
+    }
 }
 
 /// Reads a bundle by the first family that recognizes it.
@@ -50,15 +69,19 @@ pub fn read(bundle: &Bundle, accepted: bool, answers: Answers) -> Result<Reading
         let profile = Profile::parse(family.profile())?;
         let (name, upstream) = (profile.family.clone(), [profile.upstream.clone(), profile.commit.clone()]);
         let mut facts = Facts::new(profile, accepted, answers);
-        let description = family.read(bundle, &found, &mut facts).with_context(|| format!("{name} bundle"))?;
-        let unread = found.documents.iter().flat_map(|document| document.unread(facts.ignored())).collect();
+        let mut description = family.read(bundle, &found, &mut facts).with_context(|| format!("{name} bundle"))?;
+        limit_clipped(&mut description, &mut facts);
+        let unread = facts.unread(&found.documents)?;
         let (sources, questions) = facts.finish()?;
         return Ok(Reading { family: name, profile: Some(upstream), description, sources, questions, unread });
     }
-    let known = FAMILIES.iter().map(|family| Profile::parse(family.profile()).map(|profile| profile.family));
-    let known: Vec<String> = known.collect::<Result<_>>()?;
+    let profiles: Vec<Profile> =
+        FAMILIES.iter().map(|family| Profile::parse(family.profile())).collect::<Result<_>>()?;
+    let known: Vec<&str> = profiles.iter().map(|profile| profile.family.as_str()).collect();
+    let near = nearest(bundle, &profiles);
+    let near = if near.is_empty() { "no file has keys of one".to_owned() } else { near.join("; ") };
     bail!(
-        "{}: no known family of deploy bundles ({}); write deploy.toml beside the files by docs/DEPLOY.md",
+        "{}: no known family of deploy bundles ({}); {near}; write deploy.toml beside the files by docs/DEPLOY.md",
         bundle.root().display(),
         known.join(", ")
     )

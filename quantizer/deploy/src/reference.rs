@@ -11,7 +11,7 @@ use actq::text::count;
 
 use crate::conventions::{Variant, variants};
 use crate::description::Description;
-use crate::plan::Plan;
+use crate::plan::{Plan, PlannedTarget};
 use crate::run::{Runner, Tick};
 use crate::sources::{Array, Sources};
 
@@ -89,6 +89,24 @@ impl Raw {
     }
 }
 
+/// Tick that a comparison ends after.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ends {
+    /// The first that differs.
+    First,
+    /// The last.
+    Last,
+}
+
+/// Actions that targets and states are made of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Fed {
+    /// Those of the reference, if it has some.
+    Recorded,
+    /// Those of the description.
+    Own,
+}
+
 /// A reference: what goes in, and what comes out.
 #[derive(Clone, Debug)]
 pub struct Reference {
@@ -98,7 +116,17 @@ pub struct Reference {
 }
 
 /// Arrays of a reference's second file.
-const KINDS: [&str; 3] = ["observation", "action", "target"];
+const KINDS: [&str; 3] = [OBSERVATION, ACTION, TARGET];
+const OBSERVATION: &str = "observation";
+const ACTION: &str = "action";
+const TARGET: &str = "target";
+
+/// Values of a tick, by kind.
+pub(crate) type Values = [Vec<f64>; 3];
+
+fn values_of(tick: Tick) -> Values {
+    [tick.observation, tick.action, tick.targets.into_iter().flat_map(|(_, values)| values).collect()]
+}
 
 /// Reads all arrays of a file as numbers.
 fn numbers(path: &Path) -> Result<BTreeMap<String, Array>> {
@@ -157,54 +185,126 @@ impl Reference {
         self.expected.get(kind)
     }
 
-    /// Runs a plan on the raw inputs and compares the results.
+    /// Runs a description on the raw inputs and compares the results. Recorded actions, if the reference has them, take
+    /// the place of the description's in all that follows from them, so that rounding does not add up; what the
+    /// description makes of its own actions is the drift.
     ///
     /// # Errors
     ///
-    /// If an array is missing or has another length, or a quaternion is not an orientation.
-    pub fn compare(&self, plan: Plan) -> Result<Comparison> {
-        self.run(plan, false)
+    /// If the description is wrong, an array is missing or has another length, or a quaternion is not an orientation.
+    pub fn compare(&self, description: &Description, sources: &dyn Sources) -> Result<Comparison> {
+        let plan = || Plan::new(description, sources);
+        let mut comparison = self.run(plan()?, &self.rounding(description, sources)?, Ends::Last, Fed::Recorded)?;
+        if comparison.first.is_none() && self.expected.contains_key(ACTION) {
+            comparison.drift = self.run(plan()?, &[], Ends::Last, Fed::Own)?.largest;
+        }
+        Ok(comparison)
     }
 
-    /// Compares, up to the first difference only if `first` is `true`.
-    fn run(&self, plan: Plan, first: bool) -> Result<Comparison> {
+    /// Returns the largest difference that the rounding of constants makes in each value of each tick.
+    fn rounding(&self, description: &Description, sources: &dyn Sources) -> Result<Vec<Values>> {
+        if description.rounding.is_empty() {
+            return Ok(Vec::new());
+        }
+        let own = self.values(Plan::new(description, sources)?)?;
+        let mut sizes = own.clone();
+        sizes.iter_mut().flatten().flatten().for_each(|size| *size = 0.0);
+        for (constant, by) in &description.rounding {
+            let mut other = description.clone();
+            other.constants.get_mut(constant).into_iter().flatten().for_each(|number| *number += by);
+            let other = self.values(Plan::new(&other, sources)?)?;
+            let all = |values: &[Values]| values.iter().flatten().flatten().copied().collect::<Vec<f64>>();
+            let differences = all(&own).into_iter().zip(all(&other)).map(|(a, b)| (a - b).abs());
+            sizes.iter_mut().flatten().flatten().zip(differences).for_each(|(size, difference)| *size += difference);
+        }
+        Ok(sizes)
+    }
+
+    /// Returns what a plan makes of the raw inputs and the recorded actions.
+    pub(crate) fn values(&self, plan: Plan) -> Result<Vec<Values>> {
         let frames = self.raw.frames(&plan.inputs)?;
-        let observation_labels: Vec<String> = plan.observation_labels().iter().map(ToString::to_string).collect();
-        let largest = |array: &Array| array.values.iter().fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()));
-        let scales: BTreeMap<_, _> = self.expected.iter().map(|(kind, array)| (*kind, largest(array))).collect();
         let mut runner = Runner::new(plan);
-        let mut comparison = Comparison { ticks: self.raw.ticks, largest: BTreeMap::new(), first: None };
+        frames.iter().enumerate().map(|(t, frame)| self.tick(&mut runner, t, frame, Fed::Recorded)).collect()
+    }
+
+    fn tick(&self, runner: &mut Runner, t: usize, frame: &[Vec<f64>], fed: Fed) -> Result<Values> {
+        let plan = runner.plan();
+        let len = plan.values[plan.action].labels.len();
+        let recorded = self
+            .expected
+            .get(ACTION)
+            .filter(|_| fed == Fed::Recorded)
+            .map(|array| self.row(array, ACTION, t, len))
+            .transpose()?;
+        Ok(values_of(runner.step_after(frame, recorded).with_context(|| self.raw.at(t))?))
+    }
+
+    /// Returns the values of a tick in an expected array of `len` values a tick.
+    fn row<'a>(&self, array: &'a Array, kind: &str, t: usize, len: usize) -> Result<&'a [f64]> {
+        let (_, row) = array.rows()?;
+        ensure!(len == row, "{kind}: the description gives {len} values, and the reference has {row}");
+        Ok(&array.values[t * row..][..row])
+    }
+
+    /// Returns the largest value of an expected array.
+    fn largest(&self, kind: &str) -> f64 {
+        let values = self.expected.get(kind).into_iter().flat_map(|array| &array.values);
+        values.fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()))
+    }
+
+    /// Compares. `rounding` are the sizes of differences that need no other cause, none if it is empty.
+    fn run(&self, plan: Plan, rounding: &[Values], ends: Ends, fed: Fed) -> Result<Comparison> {
+        let frames = self.raw.frames(&plan.inputs)?;
+        let labels: Vec<String> = plan.observation_labels().iter().map(ToString::to_string).collect();
+        let (limits, scales) = (limits(&plan), KINDS.map(|kind| self.largest(kind)));
+        let mut runner = Runner::new(plan);
+        let mut comparison = Comparison { ticks: self.raw.ticks, ..Comparison::default() };
         for (t, frame) in frames.iter().enumerate() {
-            if first && comparison.first.is_some() {
+            if ends == Ends::First && comparison.first.is_some() {
                 break;
             }
-            let tick = runner.step(frame).with_context(|| self.raw.at(t))?;
-            let target: Vec<f64> = tick.targets.iter().flat_map(|(_, value)| value.iter().copied()).collect();
-            for (kind, values) in KINDS.into_iter().zip([&tick.observation, &tick.action, &target]) {
-                let Some(expected) = self.expected.get(kind) else { continue };
-                let (_, row) = expected.rows()?;
-                ensure!(
-                    values.len() == row,
-                    "{kind}: the description gives {} values, and the reference has {row}",
-                    values.len()
-                );
-                let scale = scales[kind];
-                for (i, (got, expected)) in values.iter().zip(&expected.values[t * row..][..row]).enumerate() {
-                    let difference = (got - expected).abs() / scale;
+            let values = self.tick(&mut runner, t, frame, fed)?;
+            for (i, (kind, values)) in KINDS.into_iter().zip(&values).enumerate() {
+                let Some(array) = self.expected.get(kind) else { continue };
+                let expected = self.row(array, kind, t, values.len())?;
+                let scale = scales[i];
+                for (place, (got, &given)) in values.iter().zip(expected).enumerate() {
+                    let mut expected = given;
+                    if kind == TARGET
+                        && let Some([low, high]) = limits.get(place)
+                    {
+                        expected = given.clamp(*low, *high);
+                        comparison.held += usize::from(expected != given);
+                    }
+                    let difference = (got - expected).abs();
                     let largest = comparison.largest.entry(kind).or_insert(0.0);
                     // A NaN is a difference, too.
-                    let fits = difference <= TOLERANCE;
-                    *largest = if difference.is_nan() { f64::INFINITY } else { largest.max(difference) };
-                    if !fits && comparison.first.is_none() {
-                        let what =
-                            if kind == "observation" { observation_labels[i].clone() } else { format!("{kind}[{i}]") };
-                        comparison.first = Some(Difference { tick: t, kind, what, got: *got, expected: *expected });
+                    *largest = if difference.is_nan() { f64::INFINITY } else { largest.max(difference / scale) };
+                    let size = rounding.get(t).map_or(0.0, |values| values[i][place]);
+                    if difference <= TOLERANCE * scale {
+                        continue;
+                    }
+                    if difference <= TOLERANCE * scale + size {
+                        let [most, of] = comparison.rounded.entry(kind).or_insert([0.0; 2]);
+                        (*most, *of) = (most.max(difference), of.max(size));
+                    } else if comparison.first.is_none() {
+                        let what = if kind == OBSERVATION { labels[place].clone() } else { format!("{kind}[{place}]") };
+                        comparison.first = Some(Difference { tick: t, kind, what, got: *got, expected });
                     }
                 }
             }
         }
         Ok(comparison)
     }
+}
+
+/// Returns the limits of each value of the targets.
+fn limits(plan: &Plan) -> Vec<[f64; 2]> {
+    let of = |target: &PlannedTarget| match &target.limits {
+        Some([low, high]) => low.iter().zip(high).map(|(low, high)| [*low, *high]).collect(),
+        None => vec![[f64::NEG_INFINITY, f64::INFINITY]; plan.values[target.value].labels.len()],
+    };
+    plan.targets.iter().flat_map(of).collect()
 }
 
 /// Returns the conventions that explain a difference: those that agree with the reference if they alone are changed.
@@ -215,7 +315,8 @@ impl Reference {
 pub fn explain(description: &Description, sources: &dyn Sources, reference: &Reference) -> Result<Vec<String>> {
     let agrees = |variant: &Variant| -> bool {
         // A variant whose lengths do not fit is no explanation.
-        let compared = Plan::new(&variant.description, sources).and_then(|plan| reference.run(plan, true));
+        let compared = Plan::new(&variant.description, sources)
+            .and_then(|plan| reference.run(plan, &[], Ends::First, Fed::Recorded));
         compared.is_ok_and(|comparison| comparison.first.is_none())
     };
     reference.raw.frames(&Plan::new(description, sources)?.inputs)?;
@@ -223,12 +324,19 @@ pub fn explain(description: &Description, sources: &dyn Sources, reference: &Ref
 }
 
 /// Result of a comparison.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Comparison {
     /// Ticks that were compared.
     pub ticks: usize,
-    /// Largest difference of each array, as a share of its largest value.
+    /// Largest difference of each array, as a share of its largest value, with recorded actions fed back.
     pub largest: BTreeMap<&'static str, f64>,
+    /// The same with the description's own actions, if the reference has actions.
+    pub drift: BTreeMap<&'static str, f64>,
+    /// Of arrays with differences above [`TOLERANCE`] that the rounding of constants explains: the largest difference,
+    /// and the largest that rounding explains.
+    pub rounded: BTreeMap<&'static str, [f64; 2]>,
+    /// Expected targets beyond the limits of the description, which holds them there.
+    pub held: usize,
     /// The first difference above [`TOLERANCE`].
     pub first: Option<Difference>,
 }

@@ -63,7 +63,11 @@ impl Description {
         for target in &self.targets {
             let joints =
                 target.joints.as_ref().map_or(String::new(), |order| format!(" in the order of joints.{order}"));
-            add("target", &target.value, format!("{:?}{joints}", target.kind).to_lowercase());
+            let limits = target.limits.as_ref().map_or(String::new(), |limits| {
+                let [low, high] = limits.each_ref().map(|numbers| operand_text(&numbers.operand()));
+                format!(", limits {low} to {high}")
+            });
+            add("target", &target.value, format!("{:?}{joints}{limits}", target.kind).to_lowercase());
         }
         rows
     }

@@ -85,24 +85,44 @@ impl Runner {
     ///
     /// If their number or a length is another.
     pub fn step(&mut self, raw: &[Vec<f64>]) -> Result<Tick> {
+        self.step_after(raw, None)
+    }
+
+    /// As [`Self::step`], with a recorded action in place of the network's for all that follows from it: targets, and
+    /// what is fed back. The tick has the network's own action.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::step`].
+    ///
+    /// # Panics
+    ///
+    /// As [`Self::step`], or if the recorded action has another length.
+    pub fn step_after(&mut self, raw: &[Vec<f64>], recorded: Option<&[f64]>) -> Result<Tick> {
         assert!(
             raw.iter().map(Vec::len).eq(self.plan.inputs.iter().map(|(_, len)| *len)),
             "raw inputs of other lengths"
         );
         let mut observations = vec![Vec::new(); self.plan.networks.len()];
+        let mut action = Vec::new();
         for i in 0..self.plan.order.len() {
             match self.plan.order[i] {
-                TickStep::Value(index) => self.values[index] = self.make(index, raw)?,
+                TickStep::Value(index) => {
+                    self.values[index] = self.make(index, raw)?;
+                    if index == self.plan.action {
+                        action.clone_from(&self.values[index]);
+                        if let Some(recorded) = recorded {
+                            assert_eq!(recorded.len(), action.len(), "a recorded action of another length");
+                            self.values[index] = recorded.to_vec();
+                        }
+                    }
+                }
                 TickStep::Network(network) => observations[network] = self.run(network),
             }
         }
         self.states = self.plan.states.iter().map(|state| self.values[state.next].clone()).collect();
         self.tick += 1;
-        Ok(Tick {
-            observation: observations.concat(),
-            action: self.values[self.plan.action].clone(),
-            targets: self.targets(),
-        })
+        Ok(Tick { observation: observations.concat(), action, targets: self.targets() })
     }
 
     fn targets(&self) -> Vec<(TargetKind, Vec<f64>)> {

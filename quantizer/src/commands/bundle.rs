@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use actq::data::NpzWriter;
 use actq::text::count;
 use actq_deploy::description::Description;
-use actq_deploy::{Answers, Bundle, DESCRIPTION, Deployment, Plan, Raw, Reading, Reference, explain, read};
+use actq_deploy::{Answers, Bundle, DESCRIPTION, Deployment, Plan, Raw, Reading, Reference, explain, orders, read};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::import::refuse_existing;
@@ -42,6 +42,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         None => None,
     };
     note(deployment::unread(&reading.unread));
+    note(deployment::without_limits(&reading.description));
 
     let Gathered { mut files, mut inputs } = Gathered::of(&bundle, &reading)?;
     inputs.extend(args.calib.iter().chain(&args.reading.answers).cloned());
@@ -127,18 +128,21 @@ pub fn refuse_open_questions(reading: &Reading) -> Result<()> {
 /// Compares with the reference; an error names the first difference, and the conventions that explain it.
 fn compare(description: &Description, plan: Plan, bundle: &Bundle, reference: &Reference) -> Result<String> {
     let unused: Vec<String> = reference.raw().unused(&plan).map(str::to_owned).collect();
-    let comparison = reference.compare(plan)?;
+    let comparison = reference.compare(description, bundle)?;
     if let Some(first) = &comparison.first {
-        let reasons = explain(description, bundle, reference)?;
-        let reasons = match &reasons[..] {
-            [] => "no single known convention explains it".to_owned(),
-            _ => format!("it agrees if {}", reasons.join(", or if ")),
-        };
+        let (mut reasons, orders) = (explain(description, bundle, reference)?, orders(description, bundle, reference)?);
+        if !reasons.is_empty() {
+            reasons = vec![format!("it agrees if {}", reasons.join(", or if "))];
+        }
+        reasons.extend(orders);
+        let reasons =
+            if reasons.is_empty() { "no single known convention explains it".to_owned() } else { reasons.join("; ") };
         bail!("the reference differs at {first}; {reasons}. Nothing was written");
     }
     if !unused.is_empty() {
         note([format!("no input has the name of these raw arrays of the reference: {}", unused.join(", "))]);
     }
+    note(deployment::held(&comparison));
     Ok(deployment::agreement(&comparison))
 }
 

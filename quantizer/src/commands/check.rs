@@ -3,8 +3,8 @@
 use actq::error::Error;
 use actq::runtime::{ImageBuffer, with_head};
 use actq::text::count;
-use actq_deploy::Reference;
-use actq_kernels::{Port, PortKind};
+use actq_deploy::{Array, Reference};
+use actq_kernels::{Image, Port, PortKind};
 use anyhow::{Context as _, Result, ensure};
 
 use crate::args::CheckArgs;
@@ -40,6 +40,7 @@ pub(crate) fn run(args: &CheckArgs) -> Result<()> {
         frames.len(),
         image.act_len()
     );
+    let expected = &held(expected, &image);
     let step = |head: &mut actq_kernels::Head<'_, '_>, frame: &Vec<Vec<f64>>| -> actq::error::Result<Vec<f32>> {
         let raw: Vec<f32> = frame.iter().flatten().map(|value| *value as f32).collect();
         Ok(head.step(&raw)?.to_vec())
@@ -64,4 +65,19 @@ pub(crate) fn run(args: &CheckArgs) -> Result<()> {
         ensure!(worst <= limit, "{shown}: the targets' NMSE is {worst:.3e}, above {limit:e}; quantize at more bits");
     }
     Ok(())
+}
+
+/// Returns expected targets within an image's limits, which hold those beyond.
+fn held(expected: &Array, image: &Image<'_>) -> Array {
+    let mut held = expected.clone();
+    for (i, value) in held.values.iter_mut().enumerate() {
+        if let Some([low, high]) = image.limits(i % image.act_len()) {
+            *value = value.clamp(low.into(), high.into());
+        }
+    }
+    let moved = held.values.iter().zip(&expected.values).filter(|(held, given)| held != given).count();
+    note((moved > 0).then(|| {
+        format!("{} of the reference are beyond the image's limits, which hold them there", count(moved, "target"))
+    }));
+    held
 }

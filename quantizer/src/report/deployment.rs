@@ -1,9 +1,11 @@
 //! Reports on an imported deploy bundle.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use actq::text::{count, printable};
-use actq_deploy::{Array, Comparison, Question, Reading};
+use actq_deploy::description::{Description, Target as Described};
+use actq_deploy::{Array, Comparison, Question, Reading, TOLERANCE};
 
 use super::table::table;
 
@@ -44,14 +46,52 @@ pub fn unread(keys: &[String]) -> Option<String> {
     (!keys.is_empty()).then(|| format!("nothing reads these keys of the bundle: {}", keys.join("; ")))
 }
 
+/// Formats the targets without limits, as a note.
+pub fn without_limits(description: &Description) -> Option<String> {
+    let without = |target: &&Described| target.limits.is_none();
+    let names: Vec<&str> = description.targets.iter().filter(without).map(|target| target.value.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "the bundle states no limits for {}: a motor controller refuses to arm without them; add limits = [LOW, HIGH] to its [[target]] in \
+             deploy.toml, each a number or one for each joint",
+            names.join(", ")
+        )
+    })
+}
+
 /// Formats an agreement with a reference.
 pub fn agreement(comparison: &Comparison) -> String {
-    let largest: Vec<String> = comparison.largest.iter().map(|(kind, share)| format!("{kind} {share:.1e}")).collect();
-    format!(
+    let of = |shares: &BTreeMap<&str, f64>| {
+        shares.iter().map(|(kind, share)| format!("{kind} {share:.1e}")).collect::<Vec<_>>().join(", ")
+    };
+    let mut text = format!(
         "checked   {} ticks agree; largest difference, as a share of the largest value: {}\n",
         comparison.ticks,
-        largest.join(", ")
-    )
+        of(&comparison.largest)
+    );
+    if comparison.drift.values().any(|share| *share > TOLERANCE) {
+        text += &format!(
+            "drift     with its own actions fed back instead of the recorded ones, rounding adds up to: {}\n",
+            of(&comparison.drift)
+        );
+    }
+    for (kind, [most, of]) in &comparison.rounded {
+        text += &format!(
+            "rounding  {kind} differs by up to {most:.1e}: the bundle's file rounds constants (rounding in deploy.toml), which explains up \
+             to {of:.1e}; give exact constants there\n"
+        );
+    }
+    text
+}
+
+/// Formats the expected targets that limits hold back, as a note.
+pub fn held(comparison: &Comparison) -> Option<String> {
+    (comparison.held > 0).then(|| {
+        format!(
+            "{} of the reference are beyond the limits of [[target]], which hold them there; they are compared at the limits",
+            count(comparison.held, "target")
+        )
+    })
 }
 
 /// Largest error of a target's value that never varies, of 1 plus its magnitude.

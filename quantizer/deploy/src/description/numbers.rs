@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::value::Operand;
+
 /// One number for all values, or one for each.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
@@ -19,6 +21,13 @@ impl Default for Numbers {
 }
 
 impl Numbers {
+    pub(crate) fn operand(&self) -> Operand {
+        match self {
+            Self::All(number) => Operand::Number(*number),
+            Self::Each(list) => Operand::List(list.clone()),
+        }
+    }
+
     pub(super) fn is_zero(&self) -> bool {
         *self == Self::default()
     }

@@ -8,7 +8,8 @@ mod lists;
 mod parts;
 pub(super) mod terms;
 
-pub(super) use graph::{Graph, Ports, known, listed, metadata_document};
+pub(crate) use graph::metadata_document;
+pub(super) use graph::{Graph, Ports, known, listed};
 pub(super) use gravity::{given_gravity, gravity};
 pub(super) use histories::Histories;
 pub(super) use lists::{check_names, count, counts, names, numbers};

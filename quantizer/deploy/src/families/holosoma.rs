@@ -1,4 +1,6 @@
-//! holosoma: one ONNX file, whose metadata have the joints' names and gains only.
+//! holosoma: one ONNX file, whose metadata have the joints' names and gains, and from release 0.0.3 on the observation.
+
+mod layout;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
@@ -6,11 +8,12 @@ use std::f64::consts::{PI, TAU};
 use actq::error::{Context as _, Result, ensure};
 use actq_onnx::Signature;
 
-use super::common::action::{add_zero, clip, fed_back, padded};
+use self::layout::{CLIP, Entry, LAYOUT, entries};
+use super::common::action::{add_zero, clip, clip_to, fed_back, padded};
 use super::common::terms::given;
 use super::common::{Histories, Parts, Ports, given_gravity};
 use crate::bundle::Bundle;
-use crate::description::{Clock, Description, Gains, Op, Operand, Standing, TargetKind, When};
+use crate::description::{Clock, Description, Fill, First, Gains, Op, Operand, Standing, TargetKind, When};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
@@ -22,8 +25,6 @@ pub(super) struct Holosoma;
 
 /// Keys of the metadata that every file of this family has.
 const KEYS: [&str; 3] = ["dof_names", "kp", "kd"];
-/// Source of what is still a question.
-const QUESTION: &str = "a question";
 /// Terms whose scale differs between the family's policies; the rule `scales.other` is that of all others.
 const SCALED: [&str; 3] = ["base_ang_vel", "base_lin_vel", "dof_vel"];
 
@@ -102,15 +103,17 @@ impl Family for Holosoma {
         let mut reader = Reader { parts: Parts::new("policy", rate), facts, n, action_len, rate, has_clock: false };
         reader.parts.joints("robot", joints);
         reader.parts.constant("default", default);
-        let len = reader.observe(&kind)?;
-        let source = reader.facts.source(kind.rule);
+        let (len, source) = match entries(metadata)? {
+            Some(entries) => (reader.observe_stated(metadata, &kind, &entries)?, metadata.location(LAYOUT)),
+            None => (reader.observe(&kind)?, format!("{} ({})", kind.rule, reader.facts.source(kind.rule))),
+        };
         if let Some(fixed) = ports.observation_len.filter(|fixed| *fixed > 1 && *fixed != len)
-            && source != QUESTION
+            && !reader.facts.is_open(kind.rule)
         {
             return Err(Facts::contradiction(
                 "length of the observation",
                 (&format!("{file}, input {:?}", ports.input), &format!("{fixed} values")),
-                (&format!("{} ({source})", kind.rule), &format!("{len} values of {n} joints")),
+                (&source, &format!("{len} values of {n} joints")),
             ));
         }
         reader.parts.network(file, &ports.input, &ports.output);
@@ -146,6 +149,13 @@ fn gains(metadata: &Document, n: usize) -> Result<Gains> {
     Ok(Gains { joints: Some("robot".to_owned()), stiffness, damping })
 }
 
+/// Returns `true` if [`Reader::term`] knows a function of holosoma.
+fn is_known(function: &str) -> bool {
+    const OWN: [&str; 6] = ["dof_pos", "dof_vel", "projected_gravity", "actions", "sin_phase", "cos_phase"];
+    const MOTION: [&str; 3] = ["motion_command", "motion_ref_pos_b", "motion_ref_ori_b"];
+    OWN.contains(&function) || MOTION.contains(&function) || given(function).is_some()
+}
+
 /// Finds the observation's input and the action's output.
 ///
 /// A tracking policy's file also has inputs and outputs of the motion, which its action does not depend on.
@@ -164,7 +174,7 @@ fn ports(file: &str, signature: &Signature) -> Result<Ports> {
 /// Parses the texts of metadata, which are JSON and so YAML. What cannot be parsed stays a text.
 fn parsed(metadata: BTreeMap<String, String>) -> Data {
     let entry = |(key, text): (String, String)| {
-        let node = Node::parse(&text);
+        let node = Node::parse(&text).map(Node::numbered);
         (key, node.unwrap_or(Node { line: 1, data: Data::Scalar(text, true) }))
     };
     Data::Map(metadata.into_iter().map(entry).collect())
@@ -226,6 +236,64 @@ impl Reader<'_> {
         let sources = [key, "order", "history.length"].map(|rule| self.facts.source(rule));
         self.facts.note("observation", sources.join("; "));
         all.checked_mul(length).context("the observation is too long")
+    }
+
+    /// Adds the observation that the metadata state; returns its length. Answers to what they state must agree.
+    fn observe_stated(&mut self, metadata: &Document, kind: &Kind, entries: &[Entry]) -> Result<usize> {
+        let at = metadata.location(LAYOUT);
+        let names: Vec<String> = entries.iter().map(|entry| entry.name.clone()).collect();
+        self.facts.agrees(kind.rule, &names, &at)?;
+        self.facts.agrees("order", &"listed".to_owned(), &at)?;
+        self.facts.agrees("history.layout", &"term".to_owned(), &at)?;
+        self.facts.agrees("history.first", &First::Oldest, &at)?;
+        self.facts.agrees("history.fill", &Fill::Zero, &at)?;
+        let mut all = 0;
+        for (i, entry) in entries.iter().enumerate() {
+            let (from, mut ops, len) = match entry.function() {
+                Some(function) if !entry.has_params && is_known(function) => self.term(function)?,
+                _ => {
+                    let meaning = format!(
+                        "{}: the reader does not know {} with its parameters; does the application compute its {} values?",
+                        entry.at, entry.func, entry.dim
+                    );
+                    self.facts.of_application(&format!("raw.{}", entry.name), &meaning)?;
+                    self.parts.raw(&entry.name, entry.dim, "");
+                    (entry.name.clone(), Vec::new(), entry.dim)
+                }
+            };
+            if len != entry.dim {
+                return Err(Facts::contradiction(
+                    &format!("length of the term {:?}", entry.name),
+                    (&format!("{}.dim", entry.at), &entry.dim.to_string()),
+                    (&format!("the joints of {}", metadata.location("dof_names")), &len.to_string()),
+                ));
+            }
+            let rule = if SCALED.contains(&entry.name.as_str()) { entry.name.as_str() } else { "other" };
+            if let [scale] = entry.scale[..] {
+                self.facts.agrees(&format!("scales.{rule}"), &scale, &entry.at)?;
+            }
+            self.facts.agrees("history.length", &entry.frames, &entry.at)?;
+            ops.push(Op::Scale(match entry.scale[..] {
+                [one] => Operand::Number(one),
+                _ => Operand::List(entry.scale.clone()),
+            }));
+            ops.extend(entry.clip.map(|limits| Op::Clip(limits.map(Operand::Number))));
+            // Terms of two groups may have one name.
+            let is_taken = entries[..i].iter().any(|other| other.name == entry.name);
+            let name = if is_taken { format!("{}_{}", entry.group, entry.name) } else { entry.name.clone() };
+            self.parts.begin(&name, &from);
+            let value = self.parts.term(ops, entry.frames);
+            self.facts.note(&value, entry.at.clone());
+            all += len * entry.frames;
+        }
+        // The format of the layout is oldest first, with zeros before the first frame.
+        self.parts.observe(&Histories { by_term: true, first: First::Oldest, fill: Fill::Zero, stride: 1 })?;
+        let limit = metadata.optional(CLIP, "a number above 0", |node| node.number().filter(|limit| *limit > 0.0))?;
+        if let Some(limit) = limit {
+            self.parts.observed(clip_to(limit));
+        }
+        self.facts.note("observation", format!("{at}; {}", metadata.location(CLIP)));
+        Ok(all)
     }
 
     /// Returns the value that a term is made of, the operations on it, and its length.
@@ -318,7 +386,13 @@ impl Reader<'_> {
         let (n, action_len) = (self.n, self.action_len);
         clip(&mut self.parts, self.facts)?;
         let (scale, source) = match metadata.optional("action_scale", "a finite number, or several", numbers)? {
-            Some(scale) => (scale, metadata.location("action_scale")),
+            Some(scale) => {
+                let at = metadata.location("action_scale");
+                if let [one] = scale[..] {
+                    self.facts.agrees("action_scale", &one, &at)?;
+                }
+                (scale, at)
+            }
             None => {
                 let scale: f64 = self.facts.value_or_default("action_scale")?;
                 (vec![scale], self.facts.source("action_scale"))

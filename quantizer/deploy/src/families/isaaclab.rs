@@ -9,7 +9,10 @@ mod model;
 mod patterns;
 mod values;
 
+use std::collections::BTreeMap;
+
 use actq::error::{Context as _, Result, bail};
+use actq::text::printable;
 use actq_onnx::Signature;
 
 use self::agent::Agent;
@@ -18,17 +21,22 @@ use self::environment::Environment;
 use self::model::{MODULES, Policy};
 use self::patterns::Joints;
 use super::common::{ACTION, Graph, metadata_document, names};
-use crate::bundle::Bundle;
-use crate::description::Description;
+use crate::bundle::{Bundle, beside};
+use crate::description::{Description, Network};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::family::{Family, Found};
+use crate::sources::Sources as _;
 use crate::yaml::Node;
 
 /// Reader of Isaac Lab bundles.
 #[derive(Debug)]
 pub(super) struct IsaacLab;
 
+/// Name of the learner's configuration.
+const AGENT: &str = "agent.yaml";
+/// Recurrent inputs of the exporters of RSL-RL and `isaaclab_rl`, and the outputs that they take.
+const RECURRENT: [(&str, &str); 2] = [("h_in", "h_out"), ("c_in", "c_out")];
 /// Key of the ONNX metadata that some exporters add.
 const JOINT_NAMES: &str = "joint_names";
 
@@ -59,6 +67,12 @@ impl Family for IsaacLab {
         }
         let mut documents: Vec<Document> = exported.into_iter().chain(environments).collect();
         let Some(first) = documents.first() else { return Ok(None) };
+        // That of the training, which stores both.
+        let training = documents.last().map(|environment| beside(&environment.file, AGENT));
+        let agent = match training.filter(|file| bundle.has(file)) {
+            Some(file) => Some(file),
+            None => bundle.find(AGENT)?.map(str::to_owned),
+        };
         let network = match bundle.find("policy.onnx")? {
             Some(file) => file,
             None => match &bundle.with_ending("onnx").collect::<Vec<_>>()[..] {
@@ -74,6 +88,10 @@ impl Family for IsaacLab {
         if signature.metadata.contains_key(JOINT_NAMES) {
             documents.push(metadata_document(network, &signature.metadata));
         }
+        if let Some(file) = agent {
+            let root = bundle.text(&file).and_then(|text| Node::parse(&text).context(file.clone()))?;
+            documents.push(Document::of(&file, root.numbered()));
+        }
         Ok(Some(Found { documents, networks: vec![network.to_owned()], others: Vec::new() }))
     }
 
@@ -85,7 +103,8 @@ impl Family for IsaacLab {
         let (exported, environment) = (find(descriptors::is_one), find(environment::is_one));
         let meta = find(|document| document.peek(JOINT_NAMES).is_some());
         let asset = facts.value("asset")?.unwrap_or_else(|| "robot".to_owned());
-        let agent = environment.map(|yaml| Agent::beside(bundle, yaml)).transpose()?.unwrap_or_default();
+        let learner = found.documents.iter().find(|document| document.file.rsplit('/').next() == Some(AGENT));
+        let agent = learner.map(Agent::of).transpose()?.unwrap_or_default();
         let group = match &agent.group {
             Some((group, at)) => {
                 facts.note("group", at.clone());
@@ -101,15 +120,27 @@ impl Family for IsaacLab {
         if let Some(meta) = meta {
             orders.push(Joints::new(names(meta, JOINT_NAMES)?, meta.location(JOINT_NAMES))?);
         }
-        if let [first, second] = &orders[..] {
-            agree::orders(first, second)?;
+        let ordering = format!("scene.{asset}.joint_ordering");
+        // From release 3.0.0 on; a text names a convention.
+        let stated = environment.filter(|yaml| yaml.peek(&ordering).is_some());
+        if let Some((yaml, names)) = stated.and_then(|yaml| Some((yaml, yaml.peek(&ordering)?.texts()?))) {
+            orders.push(Joints::new(names, yaml.location(&ordering))?);
+        }
+        for other in orders.iter().skip(1) {
+            agree::orders(&orders[0], other)?;
         }
         let joints = match orders.into_iter().next() {
             Some(joints) => joints,
-            None => match facts.value::<Vec<String>>("joints")? {
-                Some(names) => Joints::new(names, "answer joints".to_owned())?,
-                None => Joints::placeholders(graph.actions),
-            },
+            None => {
+                let names = match stated {
+                    Some(yaml) => facts.missing("joints", &asked_order(yaml, &ordering))?,
+                    None => facts.value::<Vec<String>>("joints")?,
+                };
+                match names {
+                    Some(names) => Joints::new(names, "answer joints".to_owned())?,
+                    None => Joints::placeholders(graph.actions),
+                }
+            }
         };
         let exported = exported.map(|yaml| descriptors::read(yaml, &asset, &group, joints.clone())).transpose()?;
         let policy: Policy = match (exported, environment) {
@@ -126,6 +157,33 @@ impl Family for IsaacLab {
         if let Some(meta) = meta {
             agree::with_metadata(&policy, meta, environment.is_some())?;
         }
-        Builder { policy: &policy, graph: &graph, clip: agent.clip, action: ACTION, facts }.make(&signature)
+        let mut states: BTreeMap<String, String> = RECURRENT
+            .iter()
+            .filter(|(input, _)| signature.inputs.iter().any(|(name, _)| name == input))
+            .map(|(input, output)| ((*input).to_owned(), (*output).to_owned()))
+            .collect();
+        let network = Network { name: "policy".to_owned(), file: file.clone(), inputs: [].into(), states: [].into() };
+        let outputs = [graph.output.clone()];
+        if learner.is_some() || !states.is_empty() {
+            let network = bundle.network(&network, &outputs).with_context(|| file.clone())?;
+            // Cells keep their states by themselves.
+            states.retain(|input, _| network.kept().iter().all(|(kept, _)| kept != input));
+            if let (Some(yaml), Some(part)) = (learner, network.part(0)) {
+                agent::agrees(yaml, &part.policy.graph, file, facts)?;
+            }
+        }
+        Builder { policy: &policy, graph: &graph, clip: agent.clip, action: ACTION, facts }.make(states)
     }
+}
+
+/// Returns the question of the joints' order, of an environment that has the key `ordering`.
+fn asked_order(yaml: &Document, ordering: &str) -> String {
+    let given = yaml.peek(ordering).and_then(Node::text).filter(|text| !text.is_empty()).unwrap_or("null");
+    format!(
+        "which joints does the robot have, in the order of its observations? A list of names, as env.scene[\"robot\"].joint_names prints them. \
+         {} = {}: \"physx\" is breadth-first, \"mjwarp\" depth-first, and null the order of the physics of the training, which is breadth-first in \
+         PhysX and depth-first in MJWarp (Newton)",
+        yaml.location(ordering),
+        printable(given)
+    )
 }

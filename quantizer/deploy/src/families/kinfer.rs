@@ -105,6 +105,16 @@ impl Family for Kinfer {
         ensure!(scaled == n, "{file}: output {:?} has {scaled} values, and {:?} {n}", outputs.scaled, outputs.action);
         facts.note("target", format!("{}; {}", facts.source("target.output"), facts.source("target.relative")));
         parts.target_joints(TargetKind::Position, "target", "robot");
+        if let Some(robot) = robot.filter(|robot| robot.ranges.iter().any(Option::is_some))
+            && facts.is_choice("target.limits", "range")?
+        {
+            let each = |i: usize| {
+                let no_limit = [f64::NEG_INFINITY, f64::INFINITY];
+                robot.ranges.iter().map(|range| range.unwrap_or(no_limit)[i]).collect()
+            };
+            parts.limit([each(0), each(1)]);
+            facts.note("limits", format!("{}: range of the joints; {}", robot.file, facts.source("target.limits")));
+        }
         if let Some(gains) = gains(meta, &joints, facts)? {
             parts.gains(gains);
         }

@@ -5,6 +5,7 @@ mod agreed;
 mod frames;
 mod robot;
 mod ros;
+mod stated;
 mod target;
 mod terms;
 

@@ -32,6 +32,12 @@ impl Plan {
         );
         let rate = description.rate_hz;
         ensure!(rate.is_finite() && rate > 0.0, "rate_hz = {rate}: give a number above 0");
+        for (constant, by) in &description.rounding {
+            ensure!(
+                description.constants.contains_key(constant) && (0.0..f64::INFINITY).contains(by),
+                "rounding.{constant} = {by}: give the name of a constant, and 0 or a number above it"
+            );
+        }
         let names = Names::of(description)?;
         let mut builder = Builder {
             description,

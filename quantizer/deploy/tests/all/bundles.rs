@@ -74,8 +74,10 @@ fn every_convention_is_explained(name: &str, without_effect: &[&str]) -> Result<
     let reference = Reference::read(&folder.join("raw.npz"), &folder.join("expect.npz"))?;
     let mut found = 0;
     for Variant { convention, description, lacks } in variants(&reading.description) {
-        let Ok(plan) = Plan::new(&description, &bundle) else { continue };
-        let same = reference.compare(plan)?.first.is_none();
+        if Plan::new(&description, &bundle).is_err() {
+            continue;
+        }
+        let same = reference.compare(&description, &bundle)?.first.is_none();
         println!("{convention}: {}", if same { "the same" } else { "differs" });
         ensure!(
             same == without_effect.contains(&convention.as_str()),

@@ -41,7 +41,7 @@ fn every_rule_of_falcon_is_a_question() -> Result<()> {
 }
 
 /// A robot with three joints, the last of which is the upper body.
-const ROBOT: &str = "\
+pub(crate) const ROBOT: &str = "\
 DEFAULT_DOF_ANGLES: [0.1, 0.2, 0.3]
 NUM_JOINTS: 3
 NUM_UPPER_BODY_JOINTS: 1
@@ -51,7 +51,7 @@ obs_scales: {actions: 1.0, base_ang_vel: 1.0, command_stand: 1.0, cos_phase: 1.0
   projected_gravity: 1.0, ref_motion_phase: 1.0, ref_upper_dof_pos: 1.0, history_loco: 1.0, history_mimic: 1.0}
 ";
 
-const FALCON: &str = "
+pub(crate) const FALCON: &str = "
 obs_dict: {actor_obs: [dof_pos, cos_phase, actions, command_stand]}
 history_length_dict: {actor_obs: 2}
 obs_dims: {dof_pos: 3, cos_phase: 1, actions: 2, command_stand: 1}
@@ -73,7 +73,7 @@ motion_length_s: {jump: 2.0, kick: 3.0}
 ";
 
 /// The bundle of a YAML file and networks.
-fn files(yaml: &str, networks: &[(&str, Vec<u8>)]) -> Files {
+pub(crate) fn files(yaml: &str, networks: &[(&str, Vec<u8>)]) -> Files {
     let robot = Files::default().with_file("robot.yaml", yaml);
     networks.iter().fold(robot, |files, (name, network)| files.with_file(name, network.clone()))
 }

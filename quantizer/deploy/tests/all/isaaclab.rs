@@ -2,6 +2,7 @@
 
 use actq::error::{Context as _, Result, ensure};
 use actq_deploy::Runner;
+use actq_deploy::description::Numbers;
 
 use crate::common::isaaclab::{self, DESCRIPTORS, ENVIRONMENT, JOINTS, LEN};
 use crate::common::made::{Files, Tick, message, refused};
@@ -29,7 +30,10 @@ fn both() -> Files {
 
 /// Runs 20 ticks; returns observations and targets.
 fn run(files: &Files, answers: &str) -> Result<Vec<Tick>> {
-    files.run(answers, 20, isaaclab::raw)
+    // Isaac Lab's code does not hold targets within the joints' ranges, which only descriptors have.
+    let limits =
+        if files.0.contains_key("io_descriptors/IO_descriptors.yaml") { "target.limits = \"none\"\n" } else { "" };
+    files.run(&format!("{limits}{answers}"), 20, isaaclab::raw)
 }
 
 fn answers(joints: &[&str]) -> String {
@@ -187,6 +191,194 @@ fn the_agent_limits_the_action() -> Result<()> {
     ensure!(differs(&ticks, true).is_some(), "the limit changes nothing");
     let expected = "params/agent.yaml: clip_actions (line 2) must be a number above 0";
     refused("a limit below 0", with("-1").reading(true, &own), expected)
+}
+
+/// A network with a normalizer, a hidden layer of 5 values and an activation, as a learner makes it.
+fn trained(activation: &str) -> Files {
+    let nodes = [
+        ("Sub", &["obs", "mean"][..], "centered"),
+        ("Div", &["centered", "deviation"], "normalized"),
+        ("Gemm", &["normalized", "w0", "b0"], "first"),
+        (activation, &["first"], "hidden"),
+        ("Gemm", &["hidden", "w1", "b1"], "actions"),
+    ];
+    let len = LEN + 2;
+    let tensors = [
+        ("mean", &[1, len][..], vec![0.1; len]),
+        ("deviation", &[1, len], vec![2.0; len]),
+        ("w0", &[len, 5], onnx::weights(len, 5)),
+        ("b0", &[5], vec![0.5; 5]),
+        ("w1", &[5, 4], onnx::weights(5, 4)),
+        ("b1", &[4], vec![0.5; 4]),
+    ];
+    environment().with_file(NETWORK, onnx::graph(&nodes, &tensors, &[("obs", len)], &[("actions", 4)], &[]))
+}
+
+#[test]
+fn the_agent_must_have_the_graphs_network() -> Result<()> {
+    let own = answers(&JOINTS);
+    let files = trained("Elu");
+    let with = |agent: &str| files.with_file("params/agent.yaml", agent);
+    let said = [
+        "actor: {obs_normalization: true, activation: elu, hidden_dims: [5]}",
+        "empirical_normalization: true\npolicy: {activation: ELU, actor_hidden_dims: [5]}",
+        "params: {config: {normalize_input: True}, network: {mlp: {units: [5], activation: elu}}}",
+        "agent: {state_preprocessor: RunningStandardScaler}\nmodels: {policy: {network: [{layers: [5], activations: elu}]}}",
+        "normalize_input: true\npolicy_kwargs: {activation_fn: nn.ELU, net_arch: [5]}",
+        "actor: {}\nempirical_normalization: null",
+    ];
+    for agent in said {
+        let reading = with(agent).reading(true, &own)?;
+        ensure!(reading.questions.is_empty() && reading.unread.is_empty(), "{agent}: {reading:?}");
+    }
+    let cases = [
+        (
+            "actor: {obs_normalization: false}",
+            "normalizer of the observation",
+            "actor.obs_normalization says no normalizer",
+        ),
+        ("actor: {hidden_dims: [5, 5]}", "lengths of the hidden layers", "actor.hidden_dims says [5, 5]"),
+        ("policy: {actor_hidden_dims: [6]}", "lengths of the hidden layers", "policy.actor_hidden_dims says [6]"),
+        ("actor: {activation: relu}", "activation of the hidden layers", "actor.activation says relu"),
+        ("policy: {rnn_type: lstm, rnn_hidden_dim: 8}", "recurrent cells", "policy.rnn_type says 1 lstm of 8 values"),
+    ];
+    for (agent, what, said) in cases {
+        let error = message(with(agent).reading(true, &own));
+        let both = error.contains(&format!("params/agent.yaml: {said}")) && error.contains("exported/policy.onnx says");
+        ensure!(error.contains(what) && both, "{agent}: {error}");
+        let reading = with(agent).reading(true, &format!("{own}agent.network = \"graph\"\n"))?;
+        ensure!(reading.questions.is_empty(), "{agent}: {:?}", reading.questions);
+    }
+    let plain = environment().with_file("params/agent.yaml", "policy: {actor_obs_normalization: true}\n");
+    let expected = "params/agent.yaml: policy.actor_obs_normalization says a normalizer, and exported/policy.onnx says no normalizer";
+    refused("no normalizer in the graph", plain.reading(true, &own), expected)?;
+    let unread = with("actor: {hidden_dims: [5]}\nother: 3\n").reading(true, &own)?.unread;
+    ensure!(unread == ["params/agent.yaml: other"], "{unread:?}");
+    Ok(())
+}
+
+#[test]
+fn recurrent_policies_carry_their_state() -> Result<()> {
+    const HIDDEN: usize = 2;
+    let shape = [1, 1, HIDDEN];
+    let network = onnx::shaped(
+        &[
+            ("LSTM", &["obs", "w", "r", "b", "", "h_in", "c_in"], &["y", "h_out", "c_out"], &[("hidden_size", HIDDEN)]),
+            ("MatMul", &["h_out", "head"], &["actions"], &[]),
+        ],
+        &[
+            ("w", &[1, 4 * HIDDEN, LEN], onnx::weights(4 * HIDDEN, LEN)),
+            ("r", &[1, 4 * HIDDEN, HIDDEN], onnx::weights(4 * HIDDEN, HIDDEN)),
+            ("b", &[1, 8 * HIDDEN], vec![0.1; 8 * HIDDEN]),
+            ("head", &[HIDDEN, 4], onnx::weights(HIDDEN, 4)),
+        ],
+        &[("obs", &[1, 1, LEN]), ("h_in", &shape), ("c_in", &shape)],
+        &[("actions", &[1, 1, 4]), ("h_out", &shape), ("c_out", &shape)],
+        &[],
+    );
+    let files = descriptors().with_file(NETWORK, network);
+    let mut cell = onnx::Lstm::new(LEN, HIDDEN);
+    let mut before = vec![0.0; 4];
+    for (tick, (observation, target)) in run(&files, "")?.into_iter().enumerate() {
+        ensure!(observation.len() == LEN, "tick {tick}: {} values", observation.len());
+        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
+        ensure!(near(&observation[LEN - 4..], &before), "tick {tick}: {observation:?}, not {before:?}");
+        let (h, head) = (cell.step(&observation), onnx::weights(HIDDEN, 4));
+        before = (0..4).map(|j| (0..HIDDEN).map(|k| h[k] * f64::from(head[4 * k + j])).sum()).collect();
+        let (scale, offset) = ([0.25, 0.5, 0.25, 0.5], [-0.1, -1.5, 0.1, 0.0]);
+        let expected: Vec<f64> = (0..4).map(|i| (before[i] * scale[i] + offset[i]).clamp(-2.0, 0.3)).collect();
+        ensure!(near(&target, &expected), "tick {tick}: {target:?}, not {expected:?}");
+    }
+    Ok(())
+}
+
+/// The environment as release 3.0.0 stores it, with a history of all terms of the group.
+fn of_release_3(order: &str) -> Files {
+    let group = "history_length: null\n    flatten_history_dim: true\n    base_lin_vel";
+    let new = format!("history_length: 2\n    flatten_history_dim: true\n    history_order: {order}\n    base_lin_vel");
+    let files = environment().with(group, &new).with("soft_joint_pos_limit_factor: 0.9", "joint_ordering: null");
+    with_network(&files, 2 * (3 + 3 + 3 + 4 + 3 + 4 + 2), 4)
+}
+
+#[test]
+fn the_order_of_histories_is_read() -> Result<()> {
+    let own = answers(&JOINTS);
+    let [term, time] = ["term", "time"].map(|order| run(&of_release_3(order), &own));
+    let (term, time) = (term?, time?);
+    // The second frame of both has the same terms one after the other.
+    let frame = |observation: &[f64], by_term: bool, newest: usize| -> Vec<f64> {
+        let lens = [3, 3, 3, 4, 3, 4, 2];
+        let all: usize = lens.iter().sum();
+        let starts = lens.iter().scan(0, |start, len| Some(std::mem::replace(start, *start + len)));
+        let places = starts.zip(lens).flat_map(|(start, len)| {
+            let from = if by_term { 2 * start + newest * len } else { newest * all + start };
+            from..from + len
+        });
+        places.map(|place| observation[place]).collect()
+    };
+    for frame_number in [0, 1] {
+        let (by_term, by_time) = (frame(&term[0].0, true, frame_number), frame(&time[0].0, false, frame_number));
+        ensure!(by_term == by_time, "frame {frame_number}: {by_term:?}, not {by_time:?}");
+    }
+    ensure!(term[1].0 != time[1].0, "the order changes nothing");
+    // Without a length of the group the order does nothing.
+    let alone = environment().with("concatenate_dim: -1\n", "concatenate_dim: -1\n    history_order: time\n");
+    ensure!(differs(&run(&alone, &own)?, true).is_none(), "histories of terms alone");
+    refused("another order", of_release_3("space").reading(true, &own), "history_order (line")
+}
+
+#[test]
+fn the_order_of_joints_is_read_or_asked() -> Result<()> {
+    let files = of_release_3("term");
+    let asked = files.reading(true, "raw.gait_phase = 2")?.questions;
+    ensure!(asked.len() == 1 && asked[0].key == "joints", "{asked:?}");
+    for part in ["scene.robot.joint_ordering = null", "breadth-first", "depth-first"] {
+        ensure!(asked[0].meaning.contains(part), "{part}: {}", asked[0].meaning);
+    }
+    let listed = files.with("joint_ordering: null", &format!("joint_ordering: {JOINTS:?}"));
+    let reading = listed.reading(true, "raw.gait_phase = 2")?;
+    ensure!(reading.questions.is_empty() && reading.description.joints["robot"] == JOINTS, "{reading:?}");
+    Ok(())
+}
+
+#[test]
+fn terms_of_later_releases_are_read_or_asked() -> Result<()> {
+    let own = answers(&JOINTS);
+    let of = |function: &str| environment().with("observations:projected_gravity", &format!("observations:{function}"));
+    let reading = of("pva_projected_gravity").reading(true, &own)?;
+    ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
+    ensure!(reading.description.inputs.iter().any(|input| input.name == "pva_projected_gravity"), "no input");
+
+    let quaternion = with_network(&of("root_quat_w"), LEN + 3, 4);
+    assert_eq!(quaternion.asked(true, &own)?, ["quaternion"]);
+    let description = quaternion.reading(true, &format!("{own}quaternion = \"xyzw\""))?.description;
+    let input = description.inputs.iter().find(|input| input.name == "root_quat_w").context("an input")?;
+    ensure!(input.len == Some(4) && input.unit.as_deref() == Some("x, y, z, w"), "{input:?}");
+
+    let delayed = |most: usize| {
+        let term = "params: {}\n      modifiers: null\n      noise: null\n      clip: null\n      scale: null\n      history_length: 3\n";
+        environment().with(term, &format!("{term}      delay_max_lag: {most}\n"))
+    };
+    ensure!(delayed(0).asked(true, &own)?.is_empty(), "no delay");
+    assert_eq!(delayed(2).asked(true, &own)?, ["unread.delay_max_lag"]);
+    // Descriptors of these releases leave out the order of histories.
+    let overloads = "history_length: 3, scale: 0.25}";
+    let descriptors = descriptors().with(overloads, "history_length: 3, scale: 0.25, delay_max_lag: 0}");
+    assert_eq!(descriptors.asked(true, "")?, ["history.layout"]);
+    Ok(())
+}
+
+#[test]
+fn the_joints_ranges_limit_the_targets() -> Result<()> {
+    let description = descriptors().reading(true, "")?.description;
+    // FR_hip, FR_knee, FL_hip, FL_knee.
+    let expected = [vec![-1.0, -3.0, -1.0, -3.0], vec![1.0, 0.0, 1.0, 0.0]].map(Numbers::Each);
+    ensure!(description.targets[0].limits == Some(expected), "{:?}", description.targets);
+    // Without ranges, the clip at the end of the target.
+    let none = environment().reading(true, &answers(&JOINTS))?.description;
+    let clip = [Numbers::All(-2.0), Numbers::All(0.3)];
+    ensure!(none.targets[0].limits == Some(clip), "{:?}", none.targets);
+    Ok(())
 }
 
 #[test]

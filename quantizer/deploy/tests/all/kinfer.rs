@@ -1,7 +1,7 @@
 //! K-Scale's bundles. The published one runs where `ACTQ_SHARED` names the folder of the bundles.
 
 use actq::error::{Context as _, Result, ensure};
-use actq_deploy::description::TargetKind;
+use actq_deploy::description::{Numbers, TargetKind};
 use actq_deploy::{Answers, Bundle, read};
 
 use crate::common::made::{Files, agrees, asked, message, refused, shared};
@@ -57,14 +57,14 @@ const XML: &str = r#"<mujoco><worldbody><body><freejoint name="root"/>
 <keyframe><key name="default" qpos="0 0 0 1 0 0 0 0.1 0.2 0.3"/></keyframe></mujoco>"#;
 
 /// Metadata of a robot with 3 joints, with a part replaced.
-fn json(from: &str, to: &str) -> String {
+pub(crate) fn json(from: &str, to: &str) -> String {
     let text = r#"{"input_params": {"t": {}, "dof_pos": {}, "prev_actions": {}, "buffer": {}}, "sim_dt":0.005, "sim_decimation": 4,
         "num_actions": 3, "num_observations": 12, "robot_stiffness": {"c": 3, "b": 2, "a": 1}, "robot_damping": [4, 5, 6]}"#;
     assert!(text.contains(from), "{from}");
     if from.is_empty() { text.to_owned() } else { text.replace(from, to) }
 }
 
-fn files(xml: &str, json: &str) -> Files {
+pub(crate) fn files(xml: &str, json: &str) -> Files {
     let inputs = [("t.1", 1), ("dof_pos.1", 3), ("prev_actions.1", 3), ("buffer.1", 12)];
     let outputs = [("actions_raw", 3), ("actions", 3), ("x.5", 12)];
     let network = onnx::graph(&[], &[], &inputs, &outputs, &[("kinfer_metadata", json)]);
@@ -86,6 +86,28 @@ fn other_robots_are_read_by_their_own_files() -> Result<()> {
     let gains = description.gains.as_ref().context("gains")?;
     ensure!(gains.stiffness == [1.0, 2.0, 3.0] && gains.damping == [4.0, 5.0, 6.0], "{gains:?}");
     Ok(())
+}
+
+#[test]
+fn ranges_of_joints_limit_the_targets() -> Result<()> {
+    let limits = |xml: &str, answers: &str| -> Result<Option<[Numbers; 2]>> {
+        let reading = files(xml, &json("", "")).reading(true, answers)?;
+        ensure!(reading.questions.is_empty(), "{:?}", reading.questions);
+        Ok(reading.description.targets[0].limits.clone())
+    };
+    let ranged = XML
+        .replace(r#"name="a""#, r#"name="a" range="-90 180""#)
+        .replace(r#"name="b""#, r#"name="b" range="-2 3""#)
+        .replace(r#"name="c""#, r#"name="c" range="-1 1" limited="false""#);
+    let pi = std::f64::consts::PI;
+    let most = f64::from(f32::MAX);
+    let degrees = [vec![-pi / 2.0, -2.0, -most], vec![pi, 3.0, most]].map(Numbers::Each);
+    ensure!(limits(&ranged, "")? == Some(degrees), "degrees");
+    let radians = ranged.replace("<mujoco>", r#"<mujoco><compiler angle="radian"/>"#);
+    let expected = [vec![-90.0, -2.0, -most], vec![180.0, 3.0, most]].map(Numbers::Each);
+    ensure!(limits(&radians, "")? == Some(expected), "radians");
+    ensure!(limits(&ranged, "target.limits = \"none\"")?.is_none() && limits(XML, "")?.is_none(), "no limits");
+    refused("a range", files(&ranged.replace("-2 3", "3 -2"), &json("", "")).reading(true, ""), "the lowest first")
 }
 
 #[test]

@@ -5,7 +5,7 @@ use actq_deploy::description::Description;
 use actq_testkit::f32_tensors;
 
 use crate::common::made::{Files, message, refused};
-use crate::common::onnx::{shaped, weights};
+use crate::common::onnx::{Lstm, shaped, weights};
 
 /// A port: its name and shape.
 type Port = (&'static str, &'static [usize]);
@@ -111,24 +111,9 @@ fn lstm() -> Vec<u8> {
 #[test]
 fn cells_keep_their_states() -> Result<()> {
     let files = bundle(&yaml(&LSTM_INPUTS, &LSTM_OUTPUTS, LSTM_FLOW, false), &lstm(), &[]);
-    let (mut h, mut c) = (vec![0.0; HIDDEN], vec![0.0; HIDDEN]);
-    let (w, r) = (weights(4 * HIDDEN, 4), weights(4 * HIDDEN, HIDDEN));
+    let mut cell = Lstm::new(4, HIDDEN);
     let description = agrees(&files, |q| {
-        // ONNX has the gates in the order input, output, forget, cell, each with a row for each hidden value.
-        let gate = |gate: usize, k: usize| {
-            let row = gate * HIDDEN + k;
-            let of_q: f64 = q.iter().zip(&w[4 * row..]).map(|(q, w)| q * f64::from(*w)).sum();
-            let of_h: f64 = h.iter().zip(&r[HIDDEN * row..]).map(|(h, r)| h * f64::from(*r)).sum();
-            of_q + of_h + 0.2
-        };
-        let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
-        let next: Vec<(f64, f64)> = (0..HIDDEN)
-            .map(|k| {
-                let c = sigmoid(gate(2, k)) * c[k] + sigmoid(gate(0, k)) * gate(3, k).tanh();
-                (sigmoid(gate(1, k)) * c.tanh(), c)
-            })
-            .collect();
-        (h, c) = next.into_iter().unzip();
+        let h = cell.step(q);
         (0..4).map(|j| 10.0 * sum(&h, &weights(HIDDEN, 4), 4, j)).collect()
     })?;
     ensure!(description.states.is_empty(), "{:?}", description.states);

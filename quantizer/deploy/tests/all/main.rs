@@ -12,4 +12,6 @@ mod lerobot;
 mod lerobot_damaged;
 mod mjlab;
 mod plan;
+mod references;
 mod rl_sar;
+mod unread;

@@ -1,6 +1,7 @@
 //! mjlab's bundles. The published one runs where `ACTQ_SHARED` names the folder of the bundles.
 
 use actq::error::{Context as _, Result, ensure};
+use actq_deploy::description::{Op, Operand};
 use actq_deploy::{Answers, Bundle, read};
 use std::fs;
 
@@ -110,6 +111,66 @@ fn histories_are_asked_if_the_length_allows_them() -> Result<()> {
     ensure!(error.contains("contradicts") && error.contains("joint_pos 2"), "{error}");
     let asked = some.reading(true, "rate_hz = 50\nhistory.length = [1, 1, 1, 2, 2, 1, 1]")?.questions;
     ensure!(asked.is_empty(), "{asked:?}");
+    Ok(())
+}
+
+/// Metadata of release 1.6.0 with a key replaced.
+fn stated(key: &str, value: &str) -> Vec<(String, String)> {
+    let new = [
+        ("observation_terms_scale", "1.000,0.250,1.000,1.000,0.050,1.000,2.000;2.000;0.250"),
+        ("observation_terms_clip", "-inf;inf,-inf;inf,-inf;inf,-inf;inf,-10.000;10.000,-inf;inf,-1.000;inf"),
+        ("observation_terms_history_length", "0.000,0.000,0.000,3.000,1.000,2.000,0.000"),
+        ("observation_terms_flatten_history_dim", "1.000,1.000,1.000,1.000,1.000,1.000,1.000"),
+    ];
+    let set = |(name, own): (&str, &str)| (name.to_owned(), if name == key { value } else { own }.to_owned());
+    metadata(key, value).into_iter().chain(new.into_iter().map(set)).collect()
+}
+
+/// Values of the observation with these histories.
+const STATED: usize = FRAME + 2 * 2 + 2;
+
+#[test]
+fn scales_clips_and_histories_are_read() -> Result<()> {
+    let bundle = files(STATED, 2, &stated("", ""), "");
+    let reading = bundle.reading(true, "rate_hz = 50")?;
+    ensure!(reading.questions.is_empty() && reading.unread.is_empty(), "{reading:?}");
+    let description = &reading.description;
+    let constants = &description.constants;
+    ensure!(
+        constants["scale_base_ang_vel"] == [0.25; 3] && constants["scale_command"] == [2.0, 2.0, 0.25],
+        "{constants:?}"
+    );
+    let ops = |name: &str| description.values.iter().find(|value| value.name == name).map(|value| &value.ops[..]);
+    let scale = |name: &str| Op::Scale(Operand::Name(format!("scale_{name}")));
+    let clip = |low: f64, high: f64| Op::Clip([Operand::Number(low), Operand::Number(high)]);
+    // Clipped, then scaled.
+    ensure!(ops("joint_vel_term") == Some(&[clip(-10.0, 10.0), scale("joint_vel")]), "{:?}", description.values);
+    let above = clip(-1.0, f64::from(f32::MAX));
+    ensure!(ops("command_term") == Some(&[above, scale("command")]), "{:?}", description.values);
+    ensure!(ops("base_ang_vel_term") == Some(&[scale("base_ang_vel")]), "{:?}", description.values);
+    let text = format!("{:?}", description.values);
+    for (length, count) in [(3, 1), (2, 1)] {
+        ensure!(text.matches(&format!("History(History {{ length: {length}")).count() == count, "{text}");
+    }
+    ensure!(description.rounding["scale_command"] == 0.0005, "{:?}", description.rounding);
+    Ok(())
+}
+
+#[test]
+fn wrong_statements_of_terms_are_refused() -> Result<()> {
+    let cases = [
+        ("observation_terms_scale", "1,1", "observation_terms_scale has 2 entries, and observation_names 7"),
+        ("observation_terms_scale", "1,1,1,1,1,1,inf", "inf is not finite"),
+        ("observation_terms_scale", "1,1,1,1,1,1,1;2", "term \"command\" has 3 values, and 2 factors"),
+        ("observation_terms_scale", "1,1,1,1,1,1,x", "\"x\" is not a number"),
+        ("observation_terms_clip", "1;0,1;2,1;2,1;2,1;2,1;2,1;2", "give two numbers for each term"),
+        ("observation_terms_history_length", "0,0,0,0.5,0,0,0", "0.5 is not a number of frames"),
+        ("observation_terms_history_length", "0,0,0,0,0,0,0", "length of the observation"),
+        ("observation_terms_flatten_history_dim", "1,1,1,0,1,1,1", "an axis of their own"),
+    ];
+    for (key, value, expected) in cases {
+        refused(value, files(STATED, 2, &stated(key, value), "").reading(true, "rate_hz = 50"), expected)?;
+    }
     Ok(())
 }
 

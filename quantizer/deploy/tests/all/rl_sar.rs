@@ -15,7 +15,7 @@ const TICKS: usize = 25;
 const PRIORITY: &str = "  observations_history_priority: \"time\"  # \"time\" or \"term\" priority\n";
 
 /// The folder of the robot, with one policy.
-fn robot(observation: usize) -> Files {
+pub(crate) fn robot(observation: usize) -> Files {
     Files::default()
         .with_file("base.yaml", BASE)
         .with_file("walk/config.yaml", WALK)

@@ -20,6 +20,11 @@ impl Histories {
     /// Asks for the rules history.layout, history.first and history.fill.
     pub(crate) fn of(facts: &mut Facts) -> Result<Self> {
         let by_term = facts.is_choice("history.layout", "term")?;
+        Self::laid_out(by_term, facts)
+    }
+
+    /// Asks for the rules history.first and history.fill; a file states the layout.
+    pub(crate) fn laid_out(by_term: bool, facts: &mut Facts) -> Result<Self> {
         Ok(Self {
             by_term,
             first: facts.value_or_default("history.first")?,

@@ -27,6 +27,7 @@ impl Parts {
             action: ACTION.to_owned(),
             joints: [].into(),
             constants: [].into(),
+            rounding: [].into(),
             inputs: Vec::new(),
             states: Vec::new(),
             clocks: Vec::new(),
@@ -41,6 +42,19 @@ impl Parts {
 
     pub(crate) fn constant(&mut self, name: &str, numbers: Vec<f64>) {
         self.description.constants.insert(name.to_owned(), numbers);
+    }
+
+    /// Adds a constant whose numbers the bundle has rounded by at most `rounding`.
+    pub(crate) fn rounded_constant(&mut self, name: &str, numbers: Vec<f64>, rounding: f64) {
+        self.constant(name, numbers);
+        if rounding > 0.0 {
+            self.description.rounding.insert(name.to_owned(), rounding);
+        }
+    }
+
+    /// Returns the rounding of a constant.
+    pub(crate) fn rounding(&self, name: &str) -> f64 {
+        self.description.rounding.get(name).copied().unwrap_or(0.0)
     }
 
     /// Adds a raw input, unless it is there.
@@ -148,6 +162,11 @@ impl Parts {
         Ok(())
     }
 
+    /// Adds an operation to the observation that was made.
+    pub(crate) fn observed(&mut self, op: Op) {
+        self.description.values.last_mut().into_iter().for_each(|value| value.ops.push(op.clone()));
+    }
+
     pub(crate) fn value(&mut self, name: &str, from: &str, ops: Vec<Op>) {
         self.description.values.push(Value { name: name.to_owned(), from: From::One(from.to_owned()), ops });
     }
@@ -202,6 +221,15 @@ impl Parts {
             joints: Some(joints.to_owned()),
             limits: None,
         });
+    }
+
+    /// Limits the target that was added last to these lowest and highest values; an infinite one is no limit.
+    pub(crate) fn limit(&mut self, limits: [Vec<f64>; 2]) {
+        let finite = |bound: &f64| bound.clamp(f64::from(f32::MIN), f64::from(f32::MAX));
+        let limits = limits.map(|each| Numbers::Each(each.iter().map(finite).collect()));
+        if let Some(target) = self.description.targets.last_mut() {
+            target.limits = Some(limits);
+        }
     }
 
     pub(crate) fn gains(&mut self, gains: Gains) {

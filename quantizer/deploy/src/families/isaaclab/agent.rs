@@ -1,11 +1,13 @@
-//! `agent.yaml`: the configuration of the learner, which RSL-RL stores beside `env.yaml`.
+//! `agent.yaml`: the configuration of the learner, which Isaac Lab stores beside `env.yaml`.
 
 use actq::error::{Result, bail};
+use actq::graph::{Graph, NodeKind};
 use actq::text::printable;
 
 use super::model::Given;
-use crate::bundle::{Bundle, beside};
 use crate::document::Document;
+use crate::facts::Facts;
+use crate::families::common::count;
 use crate::yaml::Node;
 
 /// Facts about the policy in a learner's configuration.
@@ -17,14 +19,49 @@ pub(super) struct Agent {
     pub(super) group: Option<(String, String)>,
 }
 
+/// Keys of RSL-RL 5, RSL-RL 2 and 3, rl_games, skrl and Stable-Baselines3 that say whether the observation is
+/// normalized; skrl names a class.
+const NORMALIZERS: [&str; 7] = [
+    "actor.obs_normalization",
+    "policy.actor_obs_normalization",
+    "empirical_normalization",
+    "params.config.normalize_input",
+    "agent.state_preprocessor",
+    "agent.observation_preprocessor",
+    "normalize_input",
+];
+/// Keys of the hidden layers' activation.
+const ACTIVATIONS: [&str; 5] = [
+    "actor.activation",
+    "policy.activation",
+    "params.network.mlp.activation",
+    "models.policy.network.0.activations",
+    "policy_kwargs.activation_fn",
+];
+/// Keys of the hidden layers' lengths.
+const WIDTHS: [&str; 5] = [
+    "actor.hidden_dims",
+    "policy.actor_hidden_dims",
+    "params.network.mlp.units",
+    "models.policy.network.0.layers",
+    "policy_kwargs.net_arch",
+];
+/// Activations that are one operation of a graph, and other names of them.
+const FUNCTIONS: [(&str, &str); 9] = [
+    ("elu", "elu"),
+    ("relu", "relu"),
+    ("silu", "silu"),
+    ("swish", "silu"),
+    ("gelu", "gelu"),
+    ("tanh", "tanh"),
+    ("sigmoid", "sigmoid"),
+    ("softplus", "softplus"),
+    ("mish", "mish"),
+];
+
 impl Agent {
-    /// Reads the file beside an environment's, if there is one.
-    pub(super) fn beside(bundle: &Bundle, environment: &Document) -> Result<Self> {
-        let file = beside(&environment.file, "agent.yaml");
-        if !bundle.has(&file) {
-            return Ok(Self::default());
-        }
-        let yaml = Document::read(bundle, &file)?;
+    /// Reads a file.
+    pub(super) fn of(yaml: &Document) -> Result<Self> {
         let limit = |node: &Node| node.number().filter(|limit| *limit > 0.0);
         let limit = yaml.optional("clip_actions", "a number above 0, or null", limit)?;
         let clip = limit.map(|limit| Given { numbers: vec![limit], from: yaml.location("clip_actions") });
@@ -43,5 +80,132 @@ impl Agent {
             },
         };
         Ok(Self { clip, group })
+    }
+}
+
+/// Refuses a graph that is not the network of a learner's configuration, unless the user decides for the graph.
+pub(super) fn agrees(yaml: &Document, graph: &Graph, file: &str, facts: &mut Facts) -> Result<()> {
+    let key = "agent.network";
+    let Some((what, at, declared, found)) = difference(yaml, graph) else { return Ok(()) };
+    let meaning =
+        format!("{}: {what} is {declared}, and {file} has {found}; is the graph right (\"graph\")?", yaml.file);
+    match facts.missing::<String>(key, &meaning)?.as_deref() {
+        Some("graph") => Ok(()),
+        Some(other) => bail!("answer {key} = {other:?}: give \"graph\", or export the policy again"),
+        None => Err(Facts::contradiction(
+            &format!("{what} (answer {key} = \"graph\" if the graph is right)"),
+            (&at, &declared),
+            (file, &found),
+        )),
+    }
+}
+
+/// Returns what differs, the key that declares it, what it declares, and what the graph has.
+fn difference(yaml: &Document, graph: &Graph) -> Option<(&'static str, String, String, String)> {
+    let layers = Layers::of(graph);
+    let normalized = NORMALIZERS.iter().filter_map(|path| Some((*path, is_normalized(yaml, path)?)));
+    let normalized: Vec<(&str, bool)> = normalized.collect();
+    let declared = normalized.iter().find(|(_, is)| *is).or(normalized.first());
+    if let Some((path, declared)) = declared
+        && *declared != layers.is_normalized
+    {
+        let shown = |is: bool| if is { "a normalizer" } else { "no normalizer" }.to_owned();
+        return Some((
+            "normalizer of the observation",
+            yaml.location(path),
+            shown(*declared),
+            shown(layers.is_normalized),
+        ));
+    }
+    let of = |paths: &[&'static str]| paths.iter().copied().find(|path| yaml.peek(path).is_some_and(|n| !n.is_null()));
+    let activation = match of(&ACTIVATIONS) {
+        // Other activations are several operations of the graph, and no layers can be told from them.
+        Some(path) => Some((path, activation(yaml.peek(path)?)?)),
+        None => None,
+    };
+    let widths = of(&WIDTHS).and_then(|path| Some((path, list(yaml.node(path)?)?)));
+    if let Some((path, declared)) = widths {
+        let own = |(given, width): (&i64, &usize)| *given == -1 && *width == graph.obs_len || *given == *width as i64;
+        if declared.len() != layers.widths.len() || !declared.iter().zip(&layers.widths).all(own) {
+            let (declared, found) = (format!("{declared:?}"), format!("{:?}", layers.widths));
+            return Some(("lengths of the hidden layers", yaml.location(path), declared, found));
+        }
+    }
+    if let Some((path, declared)) = activation {
+        yaml.node(path);
+        if let Some(other) = layers.functions.iter().find(|name| !name.starts_with(declared)) {
+            return Some((
+                "activation of the hidden layers",
+                yaml.location(path),
+                declared.to_owned(),
+                (*other).to_owned(),
+            ));
+        }
+    }
+    let part = ["actor", "policy"].into_iter().find(|part| yaml.peek(&format!("{part}.rnn_type")).is_some())?;
+    let (kind, len) = (format!("{part}.rnn_type"), format!("{part}.rnn_hidden_dim"));
+    let declared = (yaml.node(&kind)?.text()?.to_lowercase(), yaml.node(&len).and_then(count));
+    let count = yaml.node(&format!("{part}.rnn_num_layers")).and_then(count).unwrap_or(1);
+    let fits = |(kind, len): &(&str, usize)| *kind == declared.0 && declared.1.is_none_or(|declared| declared == *len);
+    if layers.cells.len() == count && layers.cells.iter().all(fits) {
+        return None;
+    }
+    let len = declared.1.map_or_else(String::new, |len| format!(" of {len} values"));
+    let declared = format!("{count} {}{len}", declared.0);
+    let found: Vec<String> = layers.cells.iter().map(|(kind, len)| format!("{kind} of {len} values")).collect();
+    let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
+    Some(("recurrent cells", yaml.location(&kind), declared, found))
+}
+
+/// Returns what a key says of a normalizer; nothing if it says nothing, as a null or an empty map.
+fn is_normalized(yaml: &Document, path: &str) -> Option<bool> {
+    let node = yaml.node(path)?;
+    // A class, as in skrl, is a normalizer.
+    node.truth().or_else(|| node.text().map(|_| true))
+}
+
+/// Reads lengths; -1 stands for that of the observation.
+fn list(node: &Node) -> Option<Vec<i64>> {
+    let lens = node.numbers()?;
+    lens.iter().all(|len| len.fract() == 0.0 && len.abs() < 1e6).then(|| lens.iter().map(|len| *len as i64).collect())
+}
+
+/// Reads an activation's name, of which Stable-Baselines3 gives the class.
+fn activation(node: &Node) -> Option<&'static str> {
+    let name = node.text()?.rsplit(['.', ':']).next()?.to_lowercase();
+    FUNCTIONS.iter().find(|(own, _)| *own == name).map(|(_, function)| *function)
+}
+
+/// Layers of a network.
+struct Layers {
+    is_normalized: bool,
+    /// Lengths of the hidden layers.
+    widths: Vec<usize>,
+    /// Functions before the last layer.
+    functions: Vec<&'static str>,
+    /// Recurrent cells: kind and length.
+    cells: Vec<(&'static str, usize)>,
+}
+
+impl Layers {
+    fn of(graph: &Graph) -> Self {
+        let mut layers = Self { is_normalized: false, widths: Vec::new(), functions: Vec::new(), cells: Vec::new() };
+        let mut open = Vec::new();
+        for node in &graph.nodes {
+            match &node.kind {
+                NodeKind::Normalize(_) => layers.is_normalized = true,
+                NodeKind::Linear(_) => {
+                    layers.widths.push(node.len);
+                    layers.functions.append(&mut open);
+                }
+                NodeKind::Pointwise(function) => open.push(function.0.name()),
+                NodeKind::Lstm(_) => layers.cells.push(("lstm", node.len)),
+                NodeKind::Gru(_) => layers.cells.push(("gru", node.len)),
+                _ => {}
+            }
+        }
+        // The last one gives the action.
+        layers.widths.pop();
+        layers
     }
 }

@@ -37,6 +37,7 @@ pub(super) fn with_descriptors(environment: &mut Policy, descriptors: &Policy) -
         (Some(_), None) => {}
         (own @ None, other) => own.clone_from(other),
     }
+    environment.limits.clone_from(&descriptors.limits);
     of_actions(&environment.actions, &descriptors.actions)?;
     let total = environment.actions.iter().map(|action| action.joints.len()).sum();
     let mut described = descriptors.terms.iter().peekable();

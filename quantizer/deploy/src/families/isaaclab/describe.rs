@@ -3,17 +3,14 @@
 use std::collections::BTreeMap;
 
 use actq::error::{Result, ensure};
-use actq_onnx::Signature;
 
-use super::model::{Action, Given, Kind, Policy, Term, What, parts_of};
+use super::model::{Action, Given, Kind, Layout, Policy, Term, What, parts_of};
 use crate::description::{Description, Gains, Network, Op, Operand, Order, TargetKind};
 use crate::facts::Facts;
 use crate::families::common::{ACTION, Graph, Histories, Parts, given_gravity};
 
 /// Most values of a term that the application computes.
 const MOST: usize = 1 << 16;
-/// Recurrent inputs of the exporter of `isaaclab_rl`, and the outputs that they take.
-const RECURRENT: [(&str, &str); 2] = [("h_in", "h_out"), ("c_in", "c_out")];
 /// Names of values that this reader adds.
 const RESERVED: [&str; 6] = [CLIPPED, "default", "observation", "processed", "target", "policy"];
 /// Name of the action within its limit.
@@ -31,7 +28,8 @@ pub(super) struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    pub(super) fn make(mut self, signature: &Signature) -> Result<Description> {
+    /// Makes the description. `states` are inputs of the graph that no cell keeps, with the outputs that they take.
+    pub(super) fn make(mut self, states: BTreeMap<String, String>) -> Result<Description> {
         let policy = self.policy;
         let mut parts = Parts::new("policy", policy.rate.numbers[0]);
         self.facts.note("rate_hz", policy.rate.from.clone());
@@ -43,9 +41,6 @@ impl Builder<'_> {
         self.check_actions()?;
         self.clip_action(&mut parts)?;
         self.observe(&mut parts)?;
-        let states = RECURRENT.iter().filter(|(input, _)| signature.inputs.iter().any(|(name, _)| name == input));
-        let states: BTreeMap<String, String> =
-            states.map(|&(input, output)| (input.to_owned(), output.to_owned())).collect();
         parts.wired(Network {
             name: "policy".to_owned(),
             file: self.graph.file.clone(),
@@ -163,15 +158,39 @@ impl Builder<'_> {
             ));
         }
         let histories = if policy.terms.iter().any(|term| term.frames > 1) {
-            let mut histories = Histories::of(self.facts)?;
-            // While it is a question, any layout will do that terms with different histories can have.
-            histories.by_term |= self.facts.is_open("history.layout");
-            self.facts.note("observation", self.facts.source("history.layout"));
-            histories
+            self.histories()?
         } else {
             Histories { by_term: true, first: Default::default(), fill: Default::default(), stride: 1 }
         };
         parts.observe(&histories)
+    }
+
+    /// Returns the conventions of histories: the layout that a file states, or a rule.
+    fn histories(&mut self) -> Result<Histories> {
+        let key = "history.layout";
+        let (by_term, from) = match &self.policy.layout {
+            Some(Layout::Terms(from)) => (true, from.clone()),
+            Some(Layout::Frames(from)) => (false, from.clone()),
+            Some(Layout::Left(from)) => {
+                let meaning = format!(
+                    "the environment's group has history_order, which {from} leaves out: \"term\" (all frames of a term, then the next term), or \"frame\" (history_order \"time\")? Add env.yaml, which has it"
+                );
+                let layout: Option<String> = self.facts.missing(key, &meaning)?;
+                let layout = layout.unwrap_or_else(|| "term".to_owned());
+                ensure!(
+                    ["term", "frame"].contains(&layout.as_str()),
+                    "answer {key} = {layout:?}: give \"term\" or \"frame\""
+                );
+                (layout == "term", self.facts.source(key))
+            }
+            None => {
+                // While it is a question, any layout will do that terms with different histories can have.
+                let by_term = self.facts.is_choice(key, "term")? || self.facts.is_open(key);
+                (by_term, self.facts.source(key))
+            }
+        };
+        self.facts.note("observation", from);
+        Histories::laid_out(by_term, self.facts)
     }
 
     /// Returns `true` if lengths depend on open questions.
@@ -235,6 +254,12 @@ impl Builder<'_> {
                 }
                 ops
             }
+            What::Quaternion(input) => {
+                let order: Option<String> = self.facts.value("quaternion")?;
+                let unit = if order.as_deref() == Some("wxyz") { "w, x, y, z" } else { "x, y, z, w" };
+                also(self.facts, "quaternion");
+                parts.input_as(&name, input, 4, unit)
+            }
             What::Gravity => {
                 let (input, len, ops) = given_gravity(self.facts, "gravity", "vector", "orientation")?;
                 parts.input_as(&name, input, len, "");
@@ -288,7 +313,7 @@ impl Builder<'_> {
             ops.extend(after);
             parts.value(&processed, self.action, ops);
             self.facts.note(&processed, format!("{}; {}", action.from, self.facts.source("action.clip")));
-            self.target(parts, action, &processed, &suffix);
+            self.target(parts, action, &processed, &suffix)?;
             made.push(processed);
         }
         if actions.len() > 1 {
@@ -297,7 +322,7 @@ impl Builder<'_> {
         Ok(())
     }
 
-    fn target(&mut self, parts: &mut Parts, action: &Action, processed: &str, suffix: &str) {
+    fn target(&mut self, parts: &mut Parts, action: &Action, processed: &str, suffix: &str) -> Result<()> {
         let mut value = processed.to_owned();
         if action.kind == Kind::Relative {
             value = format!("target{suffix}");
@@ -317,6 +342,19 @@ impl Builder<'_> {
             Kind::Effort => TargetKind::Torque,
         };
         parts.target_joints(kind, &value, &order);
+        self.limit(parts, action, kind)
+    }
+
+    /// Limits a target of positions to the joints' ranges, by the rule.
+    fn limit(&mut self, parts: &mut Parts, action: &Action, kind: TargetKind) -> Result<()> {
+        let Some(ranges) = &self.policy.limits else { return Ok(()) };
+        let of = |given: &Given| action.joints.iter().map(|place| given.numbers[*place]).collect();
+        let limits = ranges.each_ref().map(of);
+        if kind == TargetKind::Position && self.facts.is_choice("target.limits", "range")? {
+            parts.limit(limits);
+            self.facts.note("limits", format!("{}; {}", ranges[0].from, self.facts.source("target.limits")));
+        }
+        Ok(())
     }
 }
 

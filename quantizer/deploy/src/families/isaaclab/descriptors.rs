@@ -3,9 +3,9 @@
 use actq::error::{Result, ensure};
 use actq::text::printable;
 
-use super::model::{Action, Given, Kind, Policy, Term, What, known, observation, plain};
+use super::model::{Action, Given, Kind, Layout, Policy, Term, What, known, observation, plain};
 use super::patterns::{Joints, MOST};
-use super::values::{bounds, history, numbers};
+use super::values::{bounds, history, no_delay, numbers};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::families::common::count;
@@ -48,13 +48,27 @@ pub(super) fn read(yaml: &Document, asset: &str, group: &str, joints: Joints) ->
         Ok(Given { numbers, from: yaml.location(&path) })
     };
     let (default, default_velocity) = (of_joints("default_joint_pos")?, of_joints("default_joint_vel")?);
+    let limits = limits(yaml, &format!("articulations.{asset}.default_joint_pos_limits"), joints.len())?;
     let gains = [of_joints("default_joint_stiffness")?, of_joints("default_joint_damping")?];
     // Actuators that are networks, and in later versions all that are computed outside of PhysX, have gains of 0 here.
     let gains = gains.iter().any(|gain| gain.numbers.iter().any(|number| *number != 0.0)).then_some(gains);
     let actions = actions(yaml, &joints)?;
     let terms = terms(yaml, group, &joints, &actions)?;
+    // From release 3.0.0 on a group has an order, which the exporter leaves out.
+    let group = format!("observations.{group}");
+    let has_order = yaml.keys(&group).iter().any(|item| no_delay(yaml, &format!("{group}.{item}.overloads")));
+    let layout = has_order.then(|| Layout::Left(yaml.location(&group)));
     let decimation = yaml.number("scene.decimation")?;
-    Ok(Policy { rate, decimation, joints, default, default_velocity, gains, terms, actions })
+    Ok(Policy { rate, decimation, joints, default, default_velocity, limits, gains, terms, layout, actions })
+}
+
+/// Reads the lowest and highest positions of all joints.
+fn limits(yaml: &Document, path: &str, joints: usize) -> Result<Option<[Given; 2]>> {
+    let pairs = |node: &Node| node.items().iter().map(bounds).collect::<Option<Vec<_>>>();
+    let Some(pairs) = yaml.optional(path, "pairs of numbers", pairs)? else { return Ok(None) };
+    ensure!(pairs.len() == joints, "{} has {} pairs, but joint_names {joints}", yaml.location(path), pairs.len());
+    let of = |i: usize| Given { numbers: pairs.iter().map(|pair| pair[i]).collect(), from: yaml.location(path) };
+    Ok(Some([of(0), of(1)]))
 }
 
 fn rate(yaml: &Document) -> Result<Given> {

@@ -3,17 +3,23 @@
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 
-use super::model::{Action, Given, Kind, MODULES, Policy, Term, What, known, observation, parts_of, plain};
+use super::model::{Action, Given, Kind, Layout, MODULES, Policy, Term, What, known, observation, parts_of, plain};
 use super::patterns::{Joints, MOST};
-use super::values::{bounds, history, numbers};
+use super::values::{bounds, history, no_delay, numbers};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::families::common::count;
 use crate::yaml::Node;
 
 /// Keys of a group of observations that are not terms.
-const SETTINGS: [&str; 5] =
-    ["concatenate_terms", "concatenate_dim", "enable_corruption", "history_length", "flatten_history_dim"];
+const SETTINGS: [&str; 6] = [
+    "concatenate_terms",
+    "concatenate_dim",
+    "enable_corruption",
+    "history_length",
+    "flatten_history_dim",
+    "history_order",
+];
 
 /// Returns `true` if a file has the keys of an environment.
 pub(super) fn is_one(yaml: &Document) -> bool {
@@ -64,12 +70,13 @@ impl Environment<'_> {
         // The rest of the robot is for the simulation.
         yaml.node(&format!("scene.{}", self.asset));
         let actions = self.actions(&default, &default_velocity, facts)?;
-        let terms = self.terms(&actions, &default, &default_velocity)?;
+        let (terms, layout) = self.terms(&actions, &default, &default_velocity)?;
         let rate = Given {
             numbers: vec![1.0 / (dt * decimation)],
             from: format!("{}; {}", yaml.location("sim.dt"), yaml.location("decimation")),
         };
-        Ok(Policy { rate, decimation, joints: self.joints, default, default_velocity, gains, terms, actions })
+        let joints = self.joints;
+        Ok(Policy { rate, decimation, joints, default, default_velocity, limits: None, gains, terms, layout, actions })
     }
 
     /// Reads a number for all joints, or numbers by pattern; `otherwise` is that of joints that none matches.
@@ -217,8 +224,13 @@ impl Environment<'_> {
         Ok(())
     }
 
-    /// Reads the terms of the group that the policy reads.
-    fn terms(&self, actions: &[Action], default: &Given, default_velocity: &Given) -> Result<Vec<Term>> {
+    /// Reads the terms of the group that the policy reads, and the layout of their histories, if it is stated.
+    fn terms(
+        &self,
+        actions: &[Action],
+        default: &Given,
+        default_velocity: &Given,
+    ) -> Result<(Vec<Term>, Option<Layout>)> {
         let (yaml, group) = (self.yaml, format!("observations.{}", self.group));
         let in_group = |key: &str| format!("{group}.{key}");
         self.check_group(&group)?;
@@ -226,8 +238,13 @@ impl Environment<'_> {
         let mut terms = Vec::new();
         for name in yaml.keys(&group).into_iter().filter(|name| !SETTINGS.contains(name)) {
             let path = in_group(name);
-            if yaml.peek(&path).is_some_and(Node::is_null) {
+            let Some(node) = yaml.peek(&path) else { continue };
+            if node.is_null() {
                 yaml.node(&path);
+                continue;
+            }
+            // A setting of a later version, which stays unread.
+            if node.entries().is_empty() {
                 continue;
             }
             let mut term = self.term(name, &path, actions, [default, default_velocity])?;
@@ -236,10 +253,18 @@ impl Environment<'_> {
             for key in ["history_length", "flatten_history_dim"] {
                 yaml.node(&format!("{path}.{key}"));
             }
+            no_delay(yaml, &path);
             terms.push(term);
         }
         yaml.node(&in_group("flatten_history_dim"));
-        Ok(terms)
+        let path = in_group("history_order");
+        // Only the group's own length makes an order of time.
+        let layout = yaml.optional(&path, "\"term\" or \"time\"", |node| match node.text()? {
+            "time" if has_history => Some(Layout::Frames(yaml.location(&path))),
+            "term" | "time" => Some(Layout::Terms(yaml.location(&path))),
+            _ => None,
+        })?;
+        Ok((terms, layout))
     }
 
     /// Reads a term without its history. `defaults` are the positions and velocities of all joints.
@@ -304,13 +329,15 @@ impl Environment<'_> {
                 None => unknown(format!("term {name:?} names no command")),
             },
             // An IMU's configuration names the sensor instead.
-            Some(own) if asset == self.asset || own.starts_with("imu_") => match known(function) {
-                Some(found) => Ok(found),
-                None => unknown(format!(
-                    "the function of term {name:?}, {}, is not known to this reader",
-                    printable(function)
-                )),
-            },
+            Some(own) if asset == self.asset || ["imu_", "pva_"].iter().any(|sensor| own.starts_with(sensor)) => {
+                match known(function) {
+                    Some(found) => Ok(found),
+                    None => unknown(format!(
+                        "the function of term {name:?}, {}, is not known to this reader",
+                        printable(function)
+                    )),
+                }
+            }
             Some(_) => unknown(format!("term {name:?} is of {:?}, not of the robot", printable(asset))),
             None => {
                 unknown(format!("the function of term {name:?}, {}, is not known to this reader", printable(function)))

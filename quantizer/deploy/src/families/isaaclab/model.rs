@@ -18,10 +18,25 @@ pub(super) struct Policy {
     /// Default positions and velocities of all joints.
     pub(super) default: Given,
     pub(super) default_velocity: Given,
+    /// Lowest and highest positions of all joints, if they are given.
+    pub(super) limits: Option<[Given; 2]>,
     /// Stiffness and damping of all joints, unless only the robot's USD file has them.
     pub(super) gains: Option<[Given; 2]>,
     pub(super) terms: Vec<Term>,
+    /// Layout of the terms' histories, if it is given.
+    pub(super) layout: Option<Layout>,
     pub(super) actions: Vec<Action>,
+}
+
+/// Layout of histories, and the file and key that state it.
+#[derive(Debug)]
+pub(super) enum Layout {
+    /// All frames of a term, then the next term.
+    Terms(String),
+    /// All terms of a frame, then the next frame.
+    Frames(String),
+    /// The environment has one, and the file does not state it.
+    Left(String),
 }
 
 /// Numbers and where they are.
@@ -58,6 +73,8 @@ pub(super) enum What {
     Raw(String, usize, &'static str),
     /// A command: a raw input of this name and length, and the ranges of its values, if they are given.
     Command(String, usize, Option<Vec<[f64; 2]>>),
+    /// A quaternion, a raw input of this name, whose order differs between releases.
+    Quaternion(String),
     /// The direction of gravity in the frame of the robot's root.
     Gravity,
     /// Values of joints: a raw input of this name and unit.
@@ -73,6 +90,7 @@ impl Term {
     pub(super) fn len(&self, actions: usize) -> Option<usize> {
         match &self.what {
             What::Raw(_, len, _) | What::Command(_, len, _) => Some(*len),
+            What::Quaternion(_) => Some(4),
             What::Gravity => Some(3),
             What::Joints(..) => Some(self.joints.len()),
             What::LastAction(places) => Some(places.as_ref().map_or(actions, Vec::len)),
@@ -96,7 +114,8 @@ pub(super) fn known(function: &str) -> Option<(What, bool)> {
         name @ ("base_ang_vel" | "root_ang_vel_w" | "imu_ang_vel") => raw(name, 3, "rad/s"),
         "root_pos_w" => raw("root_pos_w", 3, "m"),
         "imu_lin_acc" => raw("imu_lin_acc", 3, "m/s^2"),
-        "imu_projected_gravity" => raw("imu_projected_gravity", 3, ""),
+        name @ ("imu_projected_gravity" | "pva_projected_gravity") => raw(name, 3, ""),
+        name @ ("root_quat_w" | "imu_orientation" | "pva_orientation") => (What::Quaternion(name.to_owned()), false),
         "projected_gravity" => (What::Gravity, false),
         "joint_pos" => (What::Joints("joint_pos", "rad"), false),
         "joint_pos_rel" => (What::Joints("joint_pos", "rad"), true),

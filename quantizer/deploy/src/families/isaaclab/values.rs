@@ -39,3 +39,15 @@ pub(super) fn history(yaml: &Document, at: &str) -> Result<usize> {
     );
     Ok(frames)
 }
+
+/// Reads the keys of a term's delay if they say that it has none; others stay unread. Returns `true` if they are there,
+/// as from release 3.0.0 on.
+pub(super) fn no_delay(yaml: &Document, at: &str) -> bool {
+    let most = yaml.peek(&format!("{at}.delay_max_lag"));
+    if most.and_then(Node::number) == Some(0.0) {
+        for key in ["delay_min_lag", "delay_max_lag", "delay_hold_prob"] {
+            yaml.node(&format!("{at}.{key}"));
+        }
+    }
+    most.is_some()
+}

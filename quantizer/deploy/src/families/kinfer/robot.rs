@@ -18,6 +18,10 @@ pub(super) struct Robot {
     pub(super) file: String,
     /// Names of the policy's joints, in the order of `qpos`.
     pub(super) joints: Vec<String>,
+    /// Their ranges in rad or m, where the file has one.
+    pub(super) ranges: Vec<Option<[f64; 2]>>,
+    /// Factor of angles to rad.
+    angle: f64,
     /// Values of `qpos`: 7 of a free joint and 1 of another.
     values: usize,
     /// Values of `qpos` by the keyframe's name.
@@ -60,6 +64,7 @@ impl Robot {
             );
             facts.note("joint selection", format!("the last {n} of {all} joints; {}", facts.source("joints.last")));
             robot.joints.drain(..all - n);
+            robot.ranges.drain(..all - n);
         }
         Ok(Some(robot))
     }
@@ -81,7 +86,11 @@ impl Robot {
                 bail!("line {line}: <{tag}> is not supported; save the compiled model with MuJoCo and use that file");
             }
         }
-        let mut robot = Self { file: file.to_owned(), joints: Vec::new(), values: 0, keyframes: Vec::new() };
+        // MuJoCo's default is degrees.
+        let in_rad = children(root, "compiler").any(|compiler| compiler.attribute("angle") == Some("radian"));
+        let angle = if in_rad { 1.0 } else { std::f64::consts::PI / 180.0 };
+        let (joints, ranges, keyframes) = Default::default();
+        let mut robot = Self { file: file.to_owned(), joints, ranges, angle, values: 0, keyframes };
         for worldbody in children(root, "worldbody") {
             robot.body(worldbody, 0)?;
         }
@@ -131,8 +140,10 @@ impl Robot {
         let name = joint.attribute("name").unwrap_or_default();
         match joint.attribute("type").unwrap_or("hinge") {
             "free" => self.free()?,
-            "hinge" | "slide" => {
+            kind @ ("hinge" | "slide") => {
                 self.values += 1;
+                let factor = if kind == "hinge" { self.angle } else { 1.0 };
+                self.ranges.push(range(joint, factor)?);
                 ensure!(!name.is_empty(), "joint {} has no name", self.joints.len());
                 self.joints.push(name.to_owned());
             }
@@ -153,6 +164,21 @@ impl Robot {
         }
         Ok(qpos.len().checked_sub(self.joints.len()).map(|first| qpos[first..].to_vec()))
     }
+}
+
+/// Reads a joint's range, unless the file says that it does not hold.
+fn range(joint: Element<'_, '_>, factor: f64) -> Result<Option<[f64; 2]>> {
+    let Some(text) = joint.attribute("range").filter(|_| joint.attribute("limited") != Some("false")) else {
+        return Ok(None);
+    };
+    let numbers: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
+    let pair = numbers.and_then(|numbers| <[f64; 2]>::try_from(numbers).ok());
+    let pair = pair.filter(|[low, high]| low <= high && low.is_finite() && high.is_finite());
+    let name = printable(joint.attribute("name").unwrap_or_default());
+    let pair = pair.with_context(|| {
+        format!("joint {name:?}: range = {:?} must be two numbers, the lowest first", printable(text))
+    })?;
+    Ok(Some(pair.map(|bound| bound * factor)))
 }
 
 fn children<'a, 'i>(element: Element<'a, 'i>, tag: &'static str) -> impl Iterator<Item = Element<'a, 'i>> {

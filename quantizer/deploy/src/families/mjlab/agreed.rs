@@ -7,7 +7,7 @@ use actq::text::printable;
 
 use crate::facts::Facts;
 
-/// Largest difference of a number from the metadata's, which has 3 decimals.
+/// Largest difference of two roundings of a number from the metadata's, which has 3 decimals.
 const ROUNDING: f64 = 5.1e-4;
 
 /// Numbers by joint, and where they are.

@@ -4,11 +4,35 @@ use actq::error::{Context as _, Result, ensure};
 use actq::text::printable;
 
 use super::super::common::Graph;
+use super::stated::Stated;
 use crate::document::Document;
 use crate::facts::Facts;
 
 /// Most values of a term and most frames of a history.
 pub(super) const MOST: usize = 1 << 16;
+
+/// Returns the frames of each term that the metadata state; they must give the graph's input. While lengths are
+/// questions, one frame stands for any.
+pub(super) fn stated_frames(
+    meta: &Document,
+    graph: &Graph,
+    given: &[usize],
+    terms: &[String],
+    lens: &[usize],
+    open: bool,
+) -> Result<Vec<usize>> {
+    let sum = total(given, lens);
+    if open || sum == Some(graph.input_len) {
+        return Ok(given.to_vec());
+    }
+    let each = terms.iter().zip(lens).zip(given).map(|((term, len), frames)| format!("{term} {frames} times {len}"));
+    let shown = sum.map_or_else(|| "too many".to_owned(), |sum| sum.to_string());
+    Err(Facts::contradiction(
+        "length of the observation",
+        (&Stated::length_source(meta), &format!("{shown} values: {}", each.collect::<Vec<_>>().join(", "))),
+        (&format!("{}: input {:?}", graph.file, printable(&graph.input)), &format!("{} values", graph.input_len)),
+    ))
+}
 
 /// Returns the number of frames of each term, by the length of the graph's input.
 pub(super) fn frames(
@@ -57,8 +81,7 @@ pub(super) fn frames(
     let frames = frames.filter(|frames| frames.len() == lens.len() && frames.iter().all(|n| (1..=MOST).contains(n)));
     let frames = frames
         .with_context(|| format!("answer {key}: give a number of frames, or a list of {} of them", lens.len()))?;
-    let given =
-        frames.iter().zip(lens).try_fold(0usize, |sum, (frames, len)| sum.checked_add(frames.checked_mul(*len)?));
+    let given = total(&frames, lens);
     ensure!(
         given == Some(all),
         "answer {key}: it gives {} values, and the graph's input {:?} takes {all} ({})",
@@ -67,4 +90,9 @@ pub(super) fn frames(
         shown()
     );
     Ok(frames)
+}
+
+/// Returns the number of values of all frames; nothing if there are too many.
+fn total(frames: &[usize], lens: &[usize]) -> Option<usize> {
+    frames.iter().zip(lens).try_fold(0usize, |sum, (frames, len)| sum.checked_add(frames.checked_mul(*len)?))
 }

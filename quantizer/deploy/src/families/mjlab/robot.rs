@@ -6,11 +6,14 @@ use actq::text::printable;
 use super::super::common::{Graph, Parts, names, numbers};
 use super::agreed::{ByJoint, agreed, order};
 use super::ros::{ROS_KEY, Ros};
+use super::stated::ROUNDING;
 use crate::description::{Op, Operand, Order};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::yaml::Node;
 
+/// Ends the name of a document of metadata.
+const METADATA: &str = " metadata: ";
 /// Key of the joints' names in the metadata.
 const NAMES: &str = "joint_names";
 
@@ -91,8 +94,13 @@ impl Robot {
                 parts.joints(name, list.clone());
             }
         }
-        parts.constant("default", self.default.clone());
-        parts.constant("action_scale", self.scale.clone());
+        let of_metadata = |source: &str| source.contains(METADATA) && !source.contains(';');
+        for (name, list, source) in
+            [("default", &self.default, &self.default_source), ("action_scale", &self.scale, &self.scale_source)]
+        {
+            let rounding = if of_metadata(source) { ROUNDING } else { 0.0 };
+            parts.rounded_constant(name, list.clone(), rounding);
+        }
         if let Some(signs) = &self.signs {
             parts.constant("signs", signs.clone());
         }

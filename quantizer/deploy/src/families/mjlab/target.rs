@@ -22,7 +22,7 @@ pub(super) fn target(parts: &mut Parts, robot: &Robot, ros: Option<&Ros<'_>>, fa
         }
         Some("nothing") => {}
         _ => {
-            parts.constant("target_default", robot.of_moved(&robot.default));
+            parts.rounded_constant("target_default", robot.of_moved(&robot.default), parts.rounding("default"));
             ops.push(Op::Add(Operand::Name("target_default".to_owned())));
         }
     }

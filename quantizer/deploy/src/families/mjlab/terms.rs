@@ -3,9 +3,10 @@
 use actq::error::{Result, ensure};
 
 use super::super::common::{ACTION, Graph, Histories, Parts, gravity, names};
-use super::frames::{MOST, frames};
+use super::frames::{MOST, frames, stated_frames};
 use super::robot::Robot;
 use super::ros::Ros;
+use super::stated::{ROUNDING, Stated};
 use crate::description::{Op, Operand};
 use crate::document::Document;
 use crate::facts::Facts;
@@ -71,22 +72,31 @@ pub(super) fn terms(
     let terms: Vec<(&str, Term)> = names.iter().map(|name| (name.as_str(), Term::of(name, command))).collect();
     // Lengths first: those that nothing states are questions.
     let (lens, open) = lengths(&terms, robot, graph, facts)?;
-    let frames = frames(meta, graph, &names, &lens, open, facts)?;
+    let stated = Stated::of(meta, names.len())?;
+    let frames = match &stated.frames {
+        Some(given) => stated_frames(meta, graph, given, &names, &lens, open)?,
+        None => frames(meta, graph, &names, &lens, open, facts)?,
+    };
 
-    let plain: Option<bool> = facts.value("terms.plain")?;
+    let plain: Option<bool> = if stated.scale.is_some() { Some(true) } else { facts.value("terms.plain")? };
     let relative: bool = facts.value_or_default("joint_pos.relative")?;
     let has_ros = ros.is_some();
     let mut builder = Builder { parts, meta, robot, has_ros, relative, facts };
     builder.joint_inputs(&terms)?;
-    for ((&(name, term), &len), &length) in terms.iter().zip(&lens).zip(&frames) {
+    for (i, ((&(name, term), &len), &length)) in terms.iter().zip(&lens).zip(&frames).enumerate() {
         let (mut ops, mut source) = builder.begin(name, term, len)?;
+        ops.extend(stated.ops(i, name));
+        if !open && let Some(factors) = stated.constant(meta, i, name, len)? {
+            builder.parts.rounded_constant(&format!("scale_{name}"), factors, ROUNDING);
+        }
         if plain == Some(false) {
             ops.push(builder.scale(name, &mut source)?);
         }
         builder.facts.note(name, source);
         builder.parts.term(ops, length);
     }
-    facts.note("scales of terms", facts.source("terms.plain"));
+    let of_rule = facts.source("terms.plain");
+    facts.note("scales of terms", if stated.scale.is_some() { Stated::source(meta) } else { of_rule });
     let histories = if frames.iter().any(|length| *length > 1) {
         Histories::of(facts)?
     } else {

@@ -37,7 +37,7 @@ pub(crate) fn agrees(name: &str, expect: &str, answers: &str) -> Result<()> {
         "{name}: deploy.toml does not keep the description: {text}"
     );
     let reference = Reference::read(&folder.join("raw.npz"), &folder.join(expect))?;
-    let comparison = reference.compare(Plan::new(&reading.description, &bundle)?)?;
+    let comparison = reference.compare(&reading.description, &bundle)?;
     println!("{name}, {expect}: {:?}, unread {:?}", comparison.largest, reading.unread);
     ensure!(reading.unread.is_empty(), "{name}: nothing reads {:?}", reading.unread);
     ensure!(
