@@ -4,14 +4,18 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
+use std::rc::Rc;
 
 use actq::data::arrays;
 use actq::error::{Context as _, Result, bail, ensure};
 
+use crate::archive::Archive;
 use crate::description::Network;
 use crate::network::OnnxNetwork;
 use crate::sources::{Array, Compute, Sources};
 
+/// Ending of files that may be archives.
+const ARCHIVE: &str = ".kinfer";
 /// The most bytes of a text file.
 const MOST_TEXT: u64 = 4 << 20;
 /// The most files and folders of a bundle.
@@ -23,6 +27,8 @@ pub struct Bundle {
     root: PathBuf,
     /// Paths from the root, in alphabetical order.
     files: Vec<String>,
+    /// Archives, whose files have their paths in front.
+    archives: Rc<BTreeMap<String, Archive>>,
     /// Networks by file and outputs, since reading one takes longer than running it.
     opened: RefCell<BTreeMap<(String, Vec<String>), OnnxNetwork>>,
 }
@@ -39,11 +45,7 @@ impl Bundle {
         if is_file {
             let name = path.file_name().and_then(|name| name.to_str());
             let name = name.with_context(|| format!("{}: the name is not UTF-8", shown()))?.to_owned();
-            return Ok(Self {
-                root: path.parent().unwrap_or(Path::new("")).to_owned(),
-                files: vec![name],
-                opened: RefCell::default(),
-            });
+            return Self::of(path.parent().unwrap_or(Path::new("")), vec![name]);
         }
         let mut files = Vec::new();
         let (mut open, mut seen) = (vec![String::new()], 0);
@@ -66,8 +68,20 @@ impl Bundle {
                 }
             }
         }
+        Self::of(path, files)
+    }
+
+    /// Makes a bundle of files, and unpacks those of kinfer that are archives.
+    fn of(root: &Path, mut files: Vec<String>) -> Result<Self> {
+        let mut archives = BTreeMap::new();
+        for file in files.clone().into_iter().filter(|file| file.ends_with(ARCHIVE)) {
+            if let Some(archive) = Archive::open(&root.join(&file)).with_context(|| file.clone())? {
+                files.extend(archive.names.iter().map(|name| format!("{file}/{name}")));
+                archives.insert(file, archive);
+            }
+        }
         files.sort();
-        Ok(Self { root: path.to_owned(), files, opened: RefCell::default() })
+        Ok(Self { root: root.to_owned(), files, archives: Rc::new(archives), opened: RefCell::default() })
     }
 
     /// Returns the folder that paths start at.
@@ -117,7 +131,8 @@ impl Bundle {
             inside && !file.is_empty(),
             "{file:?} is not a file of the bundle: give a path from its folder, without .."
         );
-        Ok(self.root.join(file))
+        let packed = file.rsplit_once('/').and_then(|(archive, name)| Some(self.archives.get(archive)?.path(name)));
+        Ok(packed.unwrap_or_else(|| self.root.join(file)))
     }
 
     /// Reads a text file.

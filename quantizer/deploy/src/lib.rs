@@ -1,6 +1,7 @@
 //! Surroundings of a robot policy's network: raw inputs, histories, clocks, joint orders and targets.
 #![deny(unsafe_code)]
 
+mod archive;
 mod bundle;
 mod clock;
 mod compile;

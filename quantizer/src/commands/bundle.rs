@@ -130,13 +130,12 @@ fn compare(description: &Description, plan: Plan, bundle: &Bundle, reference: &R
     let unused: Vec<String> = reference.raw().unused(&plan).map(str::to_owned).collect();
     let comparison = reference.compare(description, bundle)?;
     if let Some(first) = &comparison.first {
-        let (mut reasons, orders) = (explain(description, bundle, reference)?, orders(description, bundle, reference)?);
-        if !reasons.is_empty() {
-            reasons = vec![format!("it agrees if {}", reasons.join(", or if "))];
-        }
-        reasons.extend(orders);
-        let reasons =
-            if reasons.is_empty() { "no single known convention explains it".to_owned() } else { reasons.join("; ") };
+        let conventions = explain(description, bundle, reference)?;
+        let reasons = match &conventions[..] {
+            [] => orders(description, bundle, reference)?.join("; "),
+            _ => format!("it agrees if {}", conventions.join(", or if ")),
+        };
+        let reasons = if reasons.is_empty() { "no single known convention explains it".to_owned() } else { reasons };
         bail!("the reference differs at {first}; {reasons}. Nothing was written");
     }
     if !unused.is_empty() {

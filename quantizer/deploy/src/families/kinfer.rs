@@ -4,6 +4,7 @@
 mod graph;
 mod inputs;
 mod joints;
+mod packed;
 mod robot;
 
 use std::collections::BTreeMap;
@@ -53,6 +54,9 @@ impl Family for Kinfer {
             [file] => file,
             _ => bail!("several policies: {}; name one of them, or the folder of one", files.join(", ")),
         };
+        if let Some(found) = packed::recognize(bundle, file)? {
+            return Ok(Some(found));
+        }
         let signature = Signature::read(&bundle.path(file)?)?;
         let mut others = Vec::new();
         for file in bundle.with_ending("xml") {
@@ -66,6 +70,9 @@ impl Family for Kinfer {
 
     fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
         let (meta, file) = (&found.documents[0], &found.networks[0]);
+        if file.ends_with(packed::STEP) {
+            return packed::read(bundle, found, facts);
+        }
         let graph = Graph::of(file, Signature::read(&bundle.path(file)?)?)?;
         graph.check_names(meta)?;
         let (dt, decimation) = (meta.number("sim_dt")?, meta.number("sim_decimation")?);
