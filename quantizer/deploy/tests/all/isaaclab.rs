@@ -225,7 +225,7 @@ fn the_agent_must_have_the_graphs_network() -> Result<()> {
         "params: {config: {normalize_input: True}, network: {mlp: {units: [5], activation: elu}}}",
         "agent: {state_preprocessor: RunningStandardScaler}\nmodels: {policy: {network: [{layers: [5], activations: elu}]}}",
         "normalize_input: true\npolicy_kwargs: {activation_fn: nn.ELU, net_arch: [5]}",
-        "actor: {}\nempirical_normalization: null",
+        "actor: {activation: {}, hidden_dims: [5]}\nempirical_normalization: {}",
     ];
     for agent in said {
         let reading = with(agent).reading(true, &own)?;
@@ -237,7 +237,11 @@ fn the_agent_must_have_the_graphs_network() -> Result<()> {
             "normalizer of the observation",
             "actor.obs_normalization says no normalizer",
         ),
-        ("actor: {hidden_dims: [5, 5]}", "lengths of the hidden layers", "actor.hidden_dims says [5, 5]"),
+        (
+            "actor: {hidden_dims: [5, 5], activation: elu, obs_normalization: true}",
+            "lengths of the hidden layers",
+            "actor.hidden_dims says [5, 5]",
+        ),
         ("policy: {actor_hidden_dims: [6]}", "lengths of the hidden layers", "policy.actor_hidden_dims says [6]"),
         ("actor: {activation: relu}", "activation of the hidden layers", "actor.activation says relu"),
         ("policy: {rnn_type: lstm, rnn_hidden_dim: 8}", "recurrent cells", "policy.rnn_type says 1 lstm of 8 values"),

@@ -60,7 +60,7 @@ fn entry(metadata: &Document, path: &str) -> Result<Entry> {
     let get = |key: &str| metadata.node(&format!("{path}.{key}"));
     let text = |key: &str| {
         let text =
-            get(key).and_then(Node::text).filter(|text| !text.is_empty() && printable(text).to_string() == **text);
+            get(key).and_then(Node::text).filter(|text| !text.is_empty() && printable(text) == **text);
         text.map(str::to_owned).ok_or_else(|| Error::input(format!("{at}.{key} must be a name")))
     };
     let whole = |key: &str| {

@@ -46,6 +46,8 @@ const WIDTHS: [&str; 5] = [
     "models.policy.network.0.layers",
     "policy_kwargs.net_arch",
 ];
+/// Keys of the recurrent cells, below "actor" or "policy".
+const RECURRENT: [&str; 3] = ["rnn_type", "rnn_hidden_dim", "rnn_num_layers"];
 /// Activations that are one operation of a graph, and other names of them.
 const FUNCTIONS: [(&str, &str); 9] = [
     ("elu", "elu"),
@@ -85,6 +87,11 @@ impl Agent {
 
 /// Refuses a graph that is not the network of a learner's configuration, unless the user decides for the graph.
 pub(super) fn agrees(yaml: &Document, graph: &Graph, file: &str, facts: &mut Facts) -> Result<()> {
+    let cells = ["actor", "policy"].map(|part| RECURRENT.map(|key| format!("{part}.{key}")));
+    let keys = NORMALIZERS.iter().chain(&ACTIVATIONS).chain(&WIDTHS).copied();
+    for path in keys.chain(cells.iter().flatten().map(String::as_str)) {
+        yaml.node(path);
+    }
     let key = "agent.network";
     let Some((what, at, declared, found)) = difference(yaml, graph) else { return Ok(()) };
     let meaning =
@@ -117,13 +124,15 @@ fn difference(yaml: &Document, graph: &Graph) -> Option<(&'static str, String, S
             shown(layers.is_normalized),
         ));
     }
-    let of = |paths: &[&'static str]| paths.iter().copied().find(|path| yaml.peek(path).is_some_and(|n| !n.is_null()));
+    // An empty map is a value that was never set.
+    let is_set = |node: &Node| !node.is_null() && (node.text().is_some() || !node.items().is_empty());
+    let of = |paths: &[&'static str]| paths.iter().copied().find(|path| yaml.peek(path).is_some_and(is_set));
     let activation = match of(&ACTIVATIONS) {
         // Other activations are several operations of the graph, and no layers can be told from them.
         Some(path) => Some((path, activation(yaml.peek(path)?)?)),
         None => None,
     };
-    let widths = of(&WIDTHS).and_then(|path| Some((path, list(yaml.node(path)?)?)));
+    let widths = of(&WIDTHS).and_then(|path| Some((path, list(yaml.peek(path)?)?)));
     if let Some((path, declared)) = widths {
         let own = |(given, width): (&i64, &usize)| *given == -1 && *width == graph.obs_len || *given == *width as i64;
         if declared.len() != layers.widths.len() || !declared.iter().zip(&layers.widths).all(own) {
@@ -131,21 +140,26 @@ fn difference(yaml: &Document, graph: &Graph) -> Option<(&'static str, String, S
             return Some(("lengths of the hidden layers", yaml.location(path), declared, found));
         }
     }
-    if let Some((path, declared)) = activation {
-        yaml.node(path);
-        if let Some(other) = layers.functions.iter().find(|name| !name.starts_with(declared)) {
-            return Some((
-                "activation of the hidden layers",
-                yaml.location(path),
-                declared.to_owned(),
-                (*other).to_owned(),
-            ));
-        }
+    if let Some((path, declared)) = activation
+        && let Some(other) = layers.functions.iter().find(|name| !name.starts_with(declared))
+    {
+        return Some((
+            "activation of the hidden layers",
+            yaml.location(path),
+            declared.to_owned(),
+            (*other).to_owned(),
+        ));
     }
-    let part = ["actor", "policy"].into_iter().find(|part| yaml.peek(&format!("{part}.rnn_type")).is_some())?;
+    // Classes without cells may have the keys, too.
+    let is_recurrent = |part: &&str| {
+        let class = yaml.peek(&format!("{part}.class_name")).and_then(Node::text);
+        let has_cells = class.is_none_or(|class| class.contains("RNN") || class.contains("Recurrent"));
+        has_cells && yaml.peek(&format!("{part}.rnn_type")).is_some()
+    };
+    let part = ["actor", "policy"].into_iter().find(is_recurrent)?;
     let (kind, len) = (format!("{part}.rnn_type"), format!("{part}.rnn_hidden_dim"));
-    let declared = (yaml.node(&kind)?.text()?.to_lowercase(), yaml.node(&len).and_then(count));
-    let count = yaml.node(&format!("{part}.rnn_num_layers")).and_then(count).unwrap_or(1);
+    let declared = (yaml.peek(&kind)?.text()?.to_lowercase(), yaml.peek(&len).and_then(count));
+    let count = yaml.peek(&format!("{part}.rnn_num_layers")).and_then(count).unwrap_or(1);
     let fits = |(kind, len): &(&str, usize)| *kind == declared.0 && declared.1.is_none_or(|declared| declared == *len);
     if layers.cells.len() == count && layers.cells.iter().all(fits) {
         return None;
