@@ -57,6 +57,21 @@ pub(crate) fn verdict(difference: f64, in_float64: impl FnOnce() -> Result<InFlo
     }
 }
 
+/// Returns the same for a file that onnxruntime cannot run for this `reason`. `policy` is the policy's error against the
+/// run in float64.
+pub(crate) fn float64_verdict(reason: &str, policy: Result<f64>) -> Result<String> {
+    match policy {
+        Ok(policy) if policy <= TOLERANCE => {
+            Ok(format!("against the file in float64: {} at most; {reason}", error_text(policy)))
+        }
+        Ok(policy) => bail!(
+            "against the file in float64 the policy's actions are {}, and {reason}, which could show which is right",
+            error_text(policy)
+        ),
+        Err(second) => bail!("{reason}; {second:#}"),
+    }
+}
+
 fn error_text(error: f64) -> String {
     if error.is_finite() { format!("off by {error:.1e} of the largest action") } else { "not finite".to_owned() }
 }
@@ -101,6 +116,16 @@ mod tests {
             );
             assert!(!said.contains("error of this program"), "{said}");
         }
+    }
+
+    #[test]
+    fn float64_decides_without_onnxruntime() {
+        let text =
+            |policy| float64_verdict("onnxruntime cannot run this file: no Elu", policy).map_err(|e| e.to_string());
+        let agrees = text(Ok(2e-7)).expect("the policy is right");
+        assert!(agrees.contains("2.0e-7") && agrees.ends_with("cannot run this file: no Elu"), "{agrees}");
+        assert!(text(Ok(1e-3)).is_err_and(|said| said.contains("off by 1.0e-3")));
+        assert!(text(Err(anyhow::anyhow!("no onnx"))).is_err_and(|said| said.ends_with("no Elu; no onnx")));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 check.py FILE PLAN onnxruntime: run by onnxruntime without its optimizer, which may change roundings when it fuses.
 check.py FILE PLAN float64: run by the evaluator of the package onnx, with every float32 of the file widened to float64.
+Ends with status 3 if it cannot run this file.
 """
 import json
 import sys
@@ -77,7 +78,7 @@ def main():
     run, fed, given = in_float64() if way == "float64" else by_onnxruntime()
     outputs = [plan["output"]] + [output for _, output in plan["states"]]
     if not set(outputs) <= set(given):
-        sys.exit(f"{plan['output']} is a value inside the file, not an output; onnxruntime cannot return it, so leave out --check")
+        raise ValueError(f"{plan['output']} is a value inside the file, not an output; leave out --check")
     width = sum(length for _, length in plan["inputs"])
     for row in numpy.frombuffer(sys.stdin.buffer.read(), "<f4").reshape(-1, width):
         at = 0
@@ -93,4 +94,6 @@ def main():
 try:
     main()
 except Exception as error:
-    sys.exit(f"{'onnx in float64' if way == 'float64' else way} cannot run this file: {error}")
+    text = str(error).strip() or type(error).__name__
+    print(f"{'onnx in float64' if way == 'float64' else way} cannot run this file: {text}", file=sys.stderr)
+    sys.exit(3)

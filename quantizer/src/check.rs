@@ -5,18 +5,22 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use actq::data::Dataset;
+use actq::data::{Dataset, runs};
 use actq::measure::actions::actions;
 use actq::policy::Policy;
-use actq::random::Random;
 use actq::text::count;
 use actq_onnx::Imported;
 use anyhow::{Context as _, Result, bail, ensure};
 
-use crate::agreement::{InFloat64, error, verdict};
+use crate::agreement::{InFloat64, error, float64_verdict, verdict};
+use crate::probes::probes;
 
-/// Observations of the check, drawn or from a recording.
+/// Observations of the check from a recording, or of each round that is drawn.
 const FRAMES: usize = 256;
+/// Largest magnitude of drawn observations, in deviations of the policy's normalizers.
+const MAGNITUDE: f32 = 2.0;
+/// Status of `check.py` for a file that its runner cannot run.
+const NOT_RUN: i32 = 3;
 
 /// Programs that `check.py` runs the file with.
 #[derive(Clone, Copy)]
@@ -26,47 +30,76 @@ enum Runner {
 }
 
 /// Compares the policy's actions with those of its file. Returns the number of observations, the reference and the
-/// error as text.
+/// error as text. Fails if an action stays constant that depends on an input: nothing is known of it.
 pub(crate) fn check(model: &Path, imported: &Imported, policy: &Policy, calib: Option<&Dataset>) -> Result<String> {
-    let observations = match calib {
-        Some(calib) => calib.episode(0).take(FRAMES).collect(),
-        None => random_observations(imported),
-    };
-    let ours: Vec<f64> = actions(policy, &observations).concat().into_iter().map(f64::from).collect();
-    let of_file = |runner| {
-        let values = run(runner, model, imported, &observations)?;
-        ensure!(
-            values.len() == ours.len(),
-            "the file gives {} values, the policy {}; this is an error of this program, please report it",
-            values.len(),
-            ours.len()
-        );
-        Ok(values)
-    };
-    let expected = of_file(Runner::Onnxruntime)?;
-    let in_float64 = || {
-        let exact = of_file(Runner::Float64)?;
-        ensure!(exact.iter().all(|v| v.is_finite()), "the file's own actions are not finite in float64");
-        Ok(InFloat64 { policy: error(&exact, &ours), onnxruntime: error(&exact, &expected) })
-    };
-    let summary = verdict(error(&expected, &ours), in_float64).with_context(|| model.display().to_string())?;
+    let recorded = calib.map(|calib| calib.episode(0).take(FRAMES).collect::<Vec<_>>());
+    let mut observations = recorded.unwrap_or_default();
+    if observations.is_empty() || !still(imported, &observed(policy, &observations)).is_empty() {
+        observations.extend(probes(imported, policy, &[MAGNITUDE], FRAMES));
+    }
+    let summary = compare(model, imported, policy, &observations).with_context(|| model.display().to_string())?;
     Ok(format!("{} {summary}", count(observations.len(), "observation")))
 }
 
-/// Draws observations for all inputs, rounded if the file takes integers.
-fn random_observations(imported: &Imported) -> Vec<Vec<f32>> {
-    let mut random = Random::new(1);
-    let whole = |(name, len): &(String, usize)| vec![imported.integers.contains(name); *len];
-    let whole: Vec<bool> = imported.inputs.iter().flat_map(whole).collect();
-    let mut value = |whole: &bool| {
-        let value = 2.0 * random.unit();
-        if *whole { (100.0 * value).round() } else { value }
+/// Returns the reference and the error as text.
+fn compare(model: &Path, imported: &Imported, policy: &Policy, observations: &[Vec<f32>]) -> Result<String> {
+    let ours = observed(policy, observations);
+    let of_file = |runner| {
+        let run = run(runner, model, imported, observations)?;
+        if let Ok(values) = &run {
+            ensure!(
+                values.len() == ours.len(),
+                "the file gives {} values, the policy {}; this is an error of this program, please report it",
+                values.len(),
+                ours.len()
+            );
+            let still = still(imported, values);
+            ensure!(
+                still.is_empty(),
+                "the check shows nothing about {} {}, constant over {}; pass observations with --calib over which they change",
+                if still.len() == 1 { "action" } else { "actions" },
+                runs(&still),
+                count(observations.len(), "observation")
+            );
+        }
+        anyhow::Ok(run)
     };
-    (0..FRAMES).map(|_| whole.iter().map(&mut value).collect()).collect()
+    let in_float64 = || match of_file(Runner::Float64)? {
+        Ok(exact) => {
+            ensure!(exact.iter().all(|v| v.is_finite()), "the file's own actions are not finite in float64");
+            Ok(exact)
+        }
+        Err(reason) => bail!(reason),
+    };
+    match of_file(Runner::Onnxruntime)? {
+        Ok(expected) => verdict(error(&expected, &ours), || {
+            let exact = in_float64()?;
+            Ok(InFloat64 { policy: error(&exact, &ours), onnxruntime: error(&exact, &expected) })
+        }),
+        Err(reason) => float64_verdict(&reason, in_float64().map(|exact| error(&exact, &ours))),
+    }
 }
 
-/// Runs the file over the observations in Python. Returns all actions, one after the other.
-fn run(runner: Runner, model: &Path, imported: &Imported, observations: &[Vec<f32>]) -> Result<Vec<f64>> {
+/// Returns the policy's actions, one after the other.
+fn observed(policy: &Policy, observations: &[Vec<f32>]) -> Vec<f64> {
+    actions(policy, observations).concat().into_iter().map(f64::from).collect()
+}
+
+/// Returns the indices of actions that are the same for all observations, without those that depend on no input.
+fn still(imported: &Imported, actions: &[f64]) -> Vec<usize> {
+    let n = imported.output.1;
+    let varies = |i: usize| actions.chunks(n).any(|row| row[i] != actions[i]);
+    (0..n).filter(|i| !imported.constant.contains(i) && !varies(*i)).collect()
+}
+
+/// Runs the file over the observations in Python. Returns all actions, one after the other, or why the runner cannot
+/// run the file.
+fn run(
+    runner: Runner,
+    model: &Path,
+    imported: &Imported,
+    observations: &[Vec<f32>],
+) -> Result<std::result::Result<Vec<f64>, String>> {
     let states: Vec<[&str; 2]> = imported.states.iter().map(|(from, to, _)| [from.as_str(), to]).collect();
     let plan = serde_json::json!({ "inputs": imported.inputs, "states": states, "output": imported.output.0 });
     let python = env::var_os("ACTQ_PYTHON").unwrap_or_else(|| "python3".into());
@@ -91,10 +124,11 @@ fn run(runner: Runner, model: &Path, imported: &Imported, observations: &[Vec<f3
     let output = child.wait_with_output().context(failed)?;
     if !output.status.success() {
         let message = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-        match runner {
-            Runner::Onnxruntime => bail!("{failed}: {message}"),
-            Runner::Float64 => bail!(message),
+        match (output.status.code(), runner) {
+            (Some(NOT_RUN), _) => return Ok(Err(message)),
+            (_, Runner::Onnxruntime) => bail!("{failed}: {message}"),
+            (_, Runner::Float64) => bail!(message),
         }
     }
-    Ok(output.stdout.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect())
+    Ok(Ok(output.stdout.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect()))
 }

@@ -12,6 +12,7 @@ pub mod importers;
 #[cfg(unix)]
 mod interrupts;
 pub mod outputs;
+pub mod probes;
 mod questions;
 pub mod report;
 mod serve;

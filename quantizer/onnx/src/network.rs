@@ -47,6 +47,8 @@ pub struct Imported {
     pub states: Vec<(String, String, usize)>,
     /// The action output, and its number of values.
     pub output: (String, usize),
+    /// Indices of the action's values that depend on no input.
+    pub constant: Vec<usize>,
     /// Names of the ops in order.
     pub ops: Vec<String>,
     /// Inputs that the action does not depend on.
@@ -114,6 +116,8 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
     let Followed { mut exprs, outputs, errors } = follow_outputs(model, choice)?;
     let cells = Cells::find(model, &mut exprs, &outputs, &choice.states);
     let output = &outputs[choose(&exprs, &cells, &outputs, errors, choice)?];
+    let is_constant = |i: &usize| matches!(output.value.elements()[*i], Element::Known(_));
+    let constant = (0..output.value.len()).filter(is_constant).collect();
     let root = action_root(&mut exprs, &cells, output)?;
     let live = exprs.needed_instead(&[root], &cells.instead);
     refuse_integers(model, &exprs, &live)?;
@@ -160,6 +164,7 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
         integers: observation.integers,
         states,
         output: (action, values),
+        constant,
         nodes: model.graph.nodes.len(),
         contract: last,
         bounded,

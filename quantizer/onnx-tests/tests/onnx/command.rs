@@ -157,6 +157,37 @@ fn check_trusts_float64_over_onnxruntime() -> Result<()> {
 }
 
 #[test]
+fn check_draws_around_the_files_own_means() -> Result<()> {
+    let Some(python) = python_with("numpy, onnx, onnxruntime") else { return Ok(()) };
+    // Physical units, limited after the normalization: no observation near 0 moves an action.
+    let normalized = "gemm(Clip((obs - [101325.0, 300.0, 5000.0, 1000000.0, 900.0, 77.0]) * 0.02, -5.0, 5.0), 20, 6)";
+    let printed = succeeded(&checked(&python, &[], normalized)?)?;
+    ensure!(printed.contains("checked   512 observations against onnxruntime: off by"), "{printed}");
+    Ok(())
+}
+
+#[test]
+fn check_refuses_actions_that_stay_constant() -> Result<()> {
+    let Some(python) = python_with("numpy, onnx, onnxruntime") else { return Ok(()) };
+    let dead = "Relu(gemm(obs, 20, 6) - 1000.0)";
+    failed(
+        &checked(&python, &[], dead)?,
+        1,
+        &["the check shows nothing about actions 0-1, constant over 256 observations"],
+    )
+}
+
+#[test]
+fn check_runs_float64_without_onnxruntimes_kernel() -> Result<()> {
+    let Some(python) = python_with("numpy, onnx, onnxruntime") else { return Ok(()) };
+    let printed = succeeded(&checked(&python, &[], "Cast(Elu(Cast(gemm(obs, 20, 6), to=11)), to=1)")?)?;
+    for part in ["256 observations against the file in float64: off by", "onnxruntime cannot run this file:", "Elu"] {
+        ensure!(printed.contains(part), "{printed}");
+    }
+    Ok(())
+}
+
+#[test]
 fn modules_of_pytorch_become_policies() -> Result<()> {
     let Some(python) = python_with("torch, onnx, onnxruntime") else { return Ok(()) };
     let script = actq_boards::root().join("examples/pytorch/test_actq_export.py");

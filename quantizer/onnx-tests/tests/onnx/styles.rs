@@ -375,6 +375,49 @@ fn ambiguous_action_outputs_are_refused() -> Result<()> {
 }
 
 #[test]
+fn a_critic_never_replaces_a_drawn_action() -> Result<()> {
+    let text = "mu = gemm(obs, 3, 11)
+         v = gemm(obs, 1, 11)
+         actions := Identity(mu + RandomNormal(shape=[1, 3]))
+         log_prob := ReduceSum(mu * RandomNormal(shape=[1, 3]), keepdims=0)
+         value := Identity(v)
+         std := Identity([0.5, 0.5, 0.5])
+         mean := Identity(mu)";
+    let with_outputs = |names: &[&str]| {
+        let mut file = begun();
+        file.write(&[], text);
+        names.iter().for_each(|name| file.output(name, &[1, if *name == "value" { 1 } else { 3 }]));
+        file.bytes()
+    };
+    for names in [
+        ["actions", "value", "log_prob"],
+        ["value", "actions", "log_prob"],
+        ["log_prob", "value", "actions"],
+        ["value", "log_prob", "std"],
+        ["std", "log_prob", "value"],
+    ] {
+        refused(&with_outputs(&names), "choose one by actq import --output NAME: value (1 values)");
+    }
+    for names in [["log_prob", "value", "mean"], ["mean", "actions", "value"], ["std", "value", "mean"]] {
+        let bytes = with_outputs(&names);
+        refused(&bytes, "value (1 values)");
+        refused(&bytes, "mean (3 values)");
+        let choice = Choice { output: Some("mean".to_owned()), ..Choice::default() };
+        assert_eq!(imported(&bytes, &choice)?.0.output, ("mean".to_owned(), 3));
+    }
+    Ok(())
+}
+
+#[test]
+fn a_critic_never_replaces_a_constant_action() {
+    let mut file = begun();
+    file.write(&[], "action := Identity([0.5, 0.5])\nvalue := Identity(gemm(obs, 1, 11))");
+    file.output("action", &[1, 2]);
+    file.output("value", &[1, 1]);
+    refused(&file.bytes(), "\"action\" cannot be imported, and no other output is named action");
+}
+
+#[test]
 fn a_refused_action_is_not_replaced_by_states() {
     let mut file = begun();
     for (state, next) in [("h", "h_out"), ("k", "k_out")] {

@@ -5,7 +5,6 @@ use actq::text::printable;
 
 use super::choice::Choice;
 use crate::file::model::Model;
-use crate::nodes::call::RANDOM;
 use crate::states::{Cells, Output, is_state};
 use crate::values::expr::Exprs;
 
@@ -37,9 +36,9 @@ pub(super) fn choose(
             can.retain(|i| keep(i));
         }
     }
-    // An action that cannot be imported must not be replaced by a critic's value or a hidden state. But exporters add
-    // the deterministic action to a random one.
-    errors.retain(|(name, error)| is_action(name) || !is_drawn(error));
+    // An action that cannot be imported, or is constant, must not be replaced by a critic's value or a hidden state.
+    let constant = outputs.iter().filter(|output| output.value.is_known() && is_action(&output.name));
+    errors.extend(constant.map(|output| (output.name.clone(), Error::input("it depends on no input"))));
     let is_called = can.iter().any(|&i| is_action(&outputs[i].name));
     if !is_called && let Some((lost, error)) = refused(errors) {
         can.retain(|i| !is_paired(i) && !named(i));
@@ -61,12 +60,10 @@ pub(super) fn choose(
     }
 }
 
-/// Returns the refused output named action, or else the last refused one.
-fn refused(mut errors: Vec<(String, Error)>) -> Option<(String, Error)> {
-    match errors.iter().position(|(name, _)| is_action(name)) {
-        Some(at) => Some(errors.swap_remove(at)),
-        None => errors.pop(),
-    }
+/// Returns the refused output named action, or else the first refused one.
+fn refused(errors: Vec<(String, Error)>) -> Option<(String, Error)> {
+    let at = errors.iter().position(|(name, _)| is_action(name)).unwrap_or(0);
+    errors.into_iter().nth(at)
 }
 
 /// Lists outputs with their lengths, for a message.
@@ -77,18 +74,47 @@ fn sizes(outputs: &[Output], which: &[usize]) -> String {
 
 /// Returns `true` if a name is an action's, and not that of something about actions.
 fn is_action(name: &str) -> bool {
-    const ABOUT: [&str; 15] = [
-        "shape", "std", "logstd", "var", "variance", "prob", "probs", "logp", "value", "values", "entropy", "mask",
-        "prev", "previous", "last",
+    const ABOUT: [&str; 28] = [
+        "shape",
+        "std",
+        "logstd",
+        "stddev",
+        "sigma",
+        "var",
+        "variance",
+        "logvar",
+        "cov",
+        "scale",
+        "noise",
+        "log",
+        "prob",
+        "probs",
+        "logp",
+        "logprob",
+        "value",
+        "values",
+        "q",
+        "critic",
+        "advantage",
+        "entropy",
+        "mask",
+        "prev",
+        "previous",
+        "last",
+        "reward",
+        "features",
     ];
-    let name = name.to_lowercase();
-    let mut parts = name.split(|c: char| !c.is_ascii_alphanumeric());
-    name.contains("action") && !parts.any(|part| ABOUT.contains(&part))
-}
-
-/// Returns `true` if an output was refused because it draws random numbers.
-fn is_drawn(error: &Error) -> bool {
-    error.cause().to_string() == RANDOM
+    // Words begin at capitals, too, as in actionStd.
+    let mut words = String::new();
+    for c in name.chars() {
+        if c.is_ascii_uppercase() && words.ends_with(|before: char| before.is_ascii_lowercase()) {
+            words.push('_');
+        }
+        words.push(c);
+    }
+    let words = words.to_ascii_lowercase();
+    let is_about = |word: &str| ABOUT.contains(&word);
+    words.contains("action") && !words.split(|c: char| !c.is_ascii_alphanumeric()).any(is_about)
 }
 
 /// Refuses a batch of several observations, whose actions would look like a chunk.
@@ -133,9 +159,19 @@ mod tests {
         for name in ["action", "actions", "Action_Mean", "deterministic_action", "masked_actions", "elastic_action"] {
             assert!(is_action(name), "{name}");
         }
-        for name in
-            ["mu", "action_log_std", "action_value", "action_log_prob", "last_action", "action_mask", "action_shape"]
-        {
+        for name in [
+            "mu",
+            "action_log_std",
+            "action_value",
+            "action_log_prob",
+            "last_action",
+            "action_mask",
+            "action_shape",
+            "actionStd",
+            "ActionLogProb",
+            "action.sigma",
+            "q_action",
+        ] {
             assert!(!is_action(name), "{name}");
         }
     }

@@ -11,8 +11,7 @@ pub(crate) const HELP: &str =
     "docs/IMPORT.md lists the supported operators; actq import --output NAME makes a value before this node the action";
 
 /// Error of an operator that draws random numbers.
-pub(crate) const RANDOM: &str =
-    "draws random numbers; export the deterministic action, or choose it by actq import --output NAME";
+const RANDOM: &str = "draws random numbers; export the deterministic action, or choose it by actq import --output NAME";
 
 /// A node and its inputs.
 #[derive(Clone, Copy)]
