@@ -19,6 +19,7 @@ Needs torch and numpy, and actq in PATH (or the path in ACTQ). torch.onnx writes
 it refuses.
 """
 import argparse
+import copy
 import os
 import subprocess
 import tempfile
@@ -29,13 +30,19 @@ from unittest import mock
 import numpy
 import torch
 
+#: Largest difference of two right runs, as a share of the largest action.
+TOLERANCE = 1e-5
+
 
 def export(module, observations, folder, sizes=None, states=None, check=False, force=False):
     """Writes policy.json, policy.safetensors and calib.npz to `folder`, and returns the report of actq.
 
     sizes: lengths of the module's inputs, if it has several; their sum is the length of an observation.
     states: names and shapes of a recurrent module's states, including a batch of 1.
-    check: compares with onnxruntime, which must be installed beside this torch.
+    check: compares policy and module with onnxruntime, which must be installed beside this torch.
+
+    Raises ValueError if the action depends on values that the module keeps from step to step, or on random numbers, and with
+    `check` if the file gives other actions than the module, as where forward chooses a branch by a value.
     """
     observations = numpy.asarray(observations, numpy.float32)
     if observations.ndim not in (2, 3):
@@ -51,7 +58,11 @@ def export(module, observations, folder, sizes=None, states=None, check=False, f
     with tempfile.TemporaryDirectory() as temporary:
         model, recording = Path(temporary, "policy.onnx"), Path(temporary, "obs.npy")
         numpy.save(recording, observations)
-        write_onnx(module, inputs, model, names, states)
+        module, frames = copy.deepcopy(module).eval().cpu(), torch.from_numpy(observations.reshape(-1, width)[:32].copy())
+        refuse_memory(module, frames, sizes, states)
+        write_onnx(copy.deepcopy(module), inputs, model, names, states)
+        if check:
+            compare(module, model, frames, sizes, states)
         command = [os.environ.get("ACTQ", "actq"), "import", str(model), "--out", str(folder), "--calib", str(recording)]
         command += [f"--state={name}_in={name}_out" for name in states]
         command += ["--check"] * check + ["--force"] * force
@@ -62,24 +73,78 @@ def export(module, observations, folder, sizes=None, states=None, check=False, f
 
 
 def write_onnx(module, inputs, path, names, states):
-    """Writes one step of the module, in evaluation mode, as an ONNX file."""
-    training, device = module.training, next((p.device for p in module.parameters()), torch.device("cpu"))
-    module.eval()
-    try:
-        with torch.no_grad(), warnings.catch_warnings(), mock.patch.object(torch.nn.RMSNorm, "forward", rms_norm):
-            # The tracing exporter needs only torch. It warns of its age, and of a fixed batch.
-            warnings.simplefilter("ignore")
-            torch.onnx.export(
-                module,
-                tuple(tensor.to(device) for tensor in inputs),
-                str(path),
-                input_names=[*names, *(f"{name}_in" for name in states)],
-                output_names=["actions", *(f"{name}_out" for name in states)],
-                opset_version=17,
-                dynamo=False,
+    """Writes one step of the module as an ONNX file."""
+    with torch.no_grad(), warnings.catch_warnings(), mock.patch.object(torch.nn.RMSNorm, "forward", rms_norm):
+        # The tracing exporter needs only torch. It warns of its age, and of a fixed batch. Its warnings that a value becomes
+        # a constant are the user's to see.
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("default", torch.jit.TracerWarning)
+        torch.onnx.export(
+            module,
+            tuple(inputs),
+            str(path),
+            input_names=[*names, *(f"{name}_in" for name in states)],
+            output_names=["actions", *(f"{name}_out" for name in states)],
+            opset_version=17,
+            dynamo=False,
+        )
+
+
+def refuse_memory(module, frames, sizes, states):
+    """Refuses a module that gives other actions on the same observations later. Only a copy of it runs."""
+    used = copy.deepcopy(module)
+    with torch.no_grad():
+        before = [step(used, frame, sizes, states)[0] for frame in frames]
+        after = [step(used, frame, sizes, states)[0] for frame in frames.flip(0)][::-1]
+    if error(torch.stack(after), torch.stack(before)) <= TOLERANCE:
+        return
+    old = dict(module.named_buffers())
+    changed = [name for name, value in used.named_buffers() if name not in old or not torch.equal(value, old[name])]
+    raise ValueError(
+        f"the action depends on values that the module keeps from step to step ({', '.join(changed) or 'none is a buffer'}), or on "
+        "random numbers; take them as inputs, and those of LSTM and GRU layers as states"
+    )
+
+
+def compare(module, path, frames, sizes, states):
+    """Refuses a file that gives other actions than the module, on observations of several sizes and signs."""
+    import onnxruntime
+
+    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    names = [port.name for port in session.get_inputs()]
+
+    def file(*inputs):
+        given = {name: tensor.numpy() for name, tensor in zip(names, inputs)}
+        return tuple(map(torch.from_numpy, session.run(None, given)))
+
+    for factor in (1, -1, 0.001, 0.01, 0.1, 10, 100, 1000):
+        actions = []
+        for run in (copy.deepcopy(module), file):
+            held, rows = {}, []
+            with torch.no_grad():
+                for frame in factor * frames:
+                    action, held = step(run, frame, sizes, states, held)
+                    rows.append(action)
+            actions.append(torch.stack(rows))
+        off = error(actions[1], actions[0])
+        if off > TOLERANCE:
+            raise ValueError(
+                f"the file is off by {off:.1e} of the module's largest action on observations times {factor}; forward chooses by "
+                "values, or computes outside of torch: torch's warnings name the lines"
             )
-    finally:
-        module.train(training)
+
+
+def step(run, frame, sizes, states, held=None):
+    """Returns the action on a frame, and the next states by name; states are zeros at first."""
+    held = held or {name: torch.zeros(shape) for name, shape in states.items()}
+    outputs = run(*torch.split(frame[None], sizes, dim=1), *held.values())
+    action, *after = outputs if isinstance(outputs, (tuple, list)) else (outputs,)
+    # A copy, because a module may write to what it has returned.
+    return action.flatten().clone(), dict(zip(states, after))
+
+
+def error(actions, right):
+    return float((actions - right).abs().max() / right.abs().max().clamp(min=1e-30))
 
 
 def rms_norm(self, x):

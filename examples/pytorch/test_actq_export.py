@@ -40,6 +40,30 @@ class Two(nn.Module):
         return self.head(self.a(a) * torch.sigmoid(self.b(b)))
 
 
+class Filter(nn.Module):
+    """Keeps its last action in a buffer."""
+
+    def __init__(self):
+        super().__init__()
+        self.net = nn.Linear(12, 3)
+        self.register_buffer("low_pass", torch.zeros(1, 3))
+
+    def forward(self, x):
+        self.low_pass.mul_(0.8).add_(0.2 * self.net(x))
+        return self.low_pass.clone()
+
+
+class Mirror(nn.Module):
+    """Chooses a branch by a value."""
+
+    def __init__(self):
+        super().__init__()
+        self.net = nn.Linear(12, 3)
+
+    def forward(self, x):
+        return -self.net(-x) if x[0, 0] < 0 else self.net(x)
+
+
 def layers(*activations):
     return [part for activation in activations for part in (nn.Linear(16, 16), activation)]
 
@@ -72,6 +96,18 @@ def main():
             assert "(Softmax)" in str(error), error
         else:
             raise AssertionError("a softmax was taken")
+        for module, text in ((Filter(), "keeps from step to step (low_pass)"), (Mirror(), "off by")):
+            try:
+                export(module, observations, Path(temporary, "refused"), check=True)
+            except ValueError as error:
+                assert text in str(error), error
+            else:
+                raise AssertionError(f"{type(module).__name__} was taken")
+        assert not Path(temporary, "refused").exists()
+        frozen = nn.Sequential(nn.Linear(12, 8), nn.BatchNorm1d(8), nn.Linear(8, 3)).train()
+        frozen[1].eval()
+        export(frozen, observations, Path(temporary, "frozen"))
+        assert frozen.training and not frozen[1].training, "the export changed the module's modes"
     print(f"{len(CASES)} modules, torch {torch.__version__}")
 
 

@@ -32,13 +32,20 @@ enum Runner {
 /// Compares the policy's actions with those of its file. Returns the number of observations, the reference and the
 /// error as text. Fails if an action stays constant that depends on an input: nothing is known of it.
 pub(crate) fn check(model: &Path, imported: &Imported, policy: &Policy, calib: Option<&Dataset>) -> Result<String> {
-    let recorded = calib.map(|calib| calib.episode(0).take(FRAMES).collect::<Vec<_>>());
-    let mut observations = recorded.unwrap_or_default();
-    if observations.is_empty() || !still(imported, &observed(policy, &observations)).is_empty() {
+    let mut observations = calib.map(|calib| calib.episode(0).take(FRAMES).collect::<Vec<_>>()).unwrap_or_default();
+    let recorded = observations.len();
+    if recorded == 0 || !still(imported, &observed(policy, &observations)).is_empty() {
         observations.extend(probes(imported, policy, &[MAGNITUDE], FRAMES));
     }
     let summary = compare(model, imported, policy, &observations).with_context(|| model.display().to_string())?;
-    Ok(format!("{} {summary}", count(observations.len(), "observation")))
+    // The others were drawn because of these.
+    let first = if recorded == 0 { FRAMES } else { recorded };
+    let still = still(imported, &observed(policy, &observations[..first]));
+    let note = match still.is_empty() {
+        true => String::new(),
+        false => format!("; {} constant over the first {first}", actions_text(&still)),
+    };
+    Ok(format!("{} {summary}{note}", count(observations.len(), "observation")))
 }
 
 /// Returns the reference and the error as text.
@@ -56,9 +63,8 @@ fn compare(model: &Path, imported: &Imported, policy: &Policy, observations: &[V
             let still = still(imported, values);
             ensure!(
                 still.is_empty(),
-                "the check shows nothing about {} {}, constant over {}; pass observations with --calib over which they change",
-                if still.len() == 1 { "action" } else { "actions" },
-                runs(&still),
+                "the check shows nothing about {}, constant over {}; pass observations with --calib over which they change",
+                actions_text(&still),
                 count(observations.len(), "observation")
             );
         }
@@ -90,6 +96,10 @@ fn still(imported: &Imported, actions: &[f64]) -> Vec<usize> {
     let n = imported.output.1;
     let varies = |i: usize| actions.chunks(n).any(|row| row[i] != actions[i]);
     (0..n).filter(|i| !imported.constant.contains(i) && !varies(*i)).collect()
+}
+
+fn actions_text(which: &[usize]) -> String {
+    format!("{} {}", if which.len() == 1 { "action" } else { "actions" }, runs(which))
 }
 
 /// Runs the file over the observations in Python. Returns all actions, one after the other, or why the runner cannot

@@ -4,10 +4,12 @@ use actq::import::values::{Tensor, Values};
 use numpy::{Element, PyArrayDyn, PyArrayMethods as _, PyUntypedArray, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 
+use crate::error::of_python;
+
 /// Copies an array, or what numpy makes one of. Types that no recording has are passed on by their names only.
 pub(crate) fn tensor(object: &Bound<'_, PyAny>) -> PyResult<Tensor> {
     let asarray = object.py().import("numpy")?.getattr("asarray")?;
-    let array = asarray.call1((object,))?;
+    let array = asarray.call1((object,)).map_err(|error| of_python(object.py(), error))?;
     // In the machine's order of bytes.
     let own = array.getattr("dtype")?.call_method1("newbyteorder", ("=",))?;
     let array = asarray.call1((array, own))?.cast_into::<PyUntypedArray>()?;

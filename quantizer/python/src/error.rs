@@ -2,7 +2,8 @@
 
 use actq::text::printable;
 use pyo3::exceptions::PyValueError;
-use pyo3::{PyErr, PyResult, create_exception};
+use pyo3::prelude::*;
+use pyo3::{PyTypeInfo as _, create_exception};
 
 create_exception!(
     actq,
@@ -11,12 +12,29 @@ create_exception!(
     "A policy, recording, image, option or controller cannot be used as it is. The text is that of the command `actq`."
 );
 
+/// Returns the exception with a formatted text.
+macro_rules! error {
+    ($($text:tt)*) => {
+        $crate::error::Error::new_err(format!($($text)*))
+    };
+}
+
 /// Returns the exception with the text that the command prints.
 pub(crate) fn raise(error: impl Into<anyhow::Error>) -> PyErr {
     // A list of questions has several lines.
     let text = format!("{:#}", error.into());
     let lines: Vec<_> = text.split('\n').map(printable).collect();
     Error::new_err(lines.join("\n"))
+}
+
+/// Extracts an argument. What Python or numpy cannot convert is this package's error, too.
+pub(crate) fn given<'a, 'py, T: FromPyObject<'a, 'py>>(object: &'a Bound<'py, PyAny>) -> PyResult<T> {
+    object.extract::<T>().map_err(|error| of_python(object.py(), error.into()))
+}
+
+/// Returns an error of Python with its text as the exception.
+pub(crate) fn of_python(py: Python<'_>, error: PyErr) -> PyErr {
+    if error.is_instance(py, &Error::type_object(py)) { error } else { error!("{}", error.value(py)) }
 }
 
 /// Results whose errors become exceptions.
@@ -28,13 +46,6 @@ impl<T, E: Into<anyhow::Error>> OrRaise<T> for Result<T, E> {
     fn or_raise(self) -> PyResult<T> {
         self.map_err(raise)
     }
-}
-
-/// Returns the exception with a formatted text.
-macro_rules! error {
-    ($($text:tt)*) => {
-        $crate::error::Error::new_err(format!($($text)*))
-    };
 }
 
 pub(crate) use error;

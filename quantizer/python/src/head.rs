@@ -7,7 +7,7 @@ use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _};
 use numpy::{IntoPyArray as _, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 
-use crate::error::error;
+use crate::error::{error, given, of_python};
 use crate::image::Image;
 use crate::process::refuse_forked;
 
@@ -34,7 +34,8 @@ impl Head {
 
 /// Reads a mask of the states to reset: bool [heads].
 fn flags(mask: &Bound<'_, PyAny>, heads: usize) -> PyResult<Vec<bool>> {
-    let array = mask.py().import("numpy")?.call_method1("asarray", (mask,))?;
+    let array = mask.py().import("numpy")?.call_method1("asarray", (mask,));
+    let array = array.map_err(|error| of_python(mask.py(), error))?;
     let Ok(array) = array.cast::<PyArrayDyn<bool>>() else {
         return Err(error!("reset is of type {}; pass bool [{heads}]", array.getattr("dtype")?));
     };
@@ -58,7 +59,12 @@ fn raised(error: actq_batch::Error) -> PyErr {
 impl Head {
     #[new]
     #[pyo3(signature = (image, n = None, *, seed = 0))]
-    fn new(py: Python<'_>, image: Py<Image>, n: Option<usize>, seed: u32) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        #[pyo3(from_py_with = given)] image: Py<Image>,
+        #[pyo3(from_py_with = given)] n: Option<usize>,
+        #[pyo3(from_py_with = given)] seed: u32,
+    ) -> PyResult<Self> {
         let (obs_len, act_len) = (image.get().obs_len(), image.get().act_len());
         let head = Self { image: image.clone_ref(py), obs_len, act_len, seed, batch: Mutex::new(None) };
         if let Some(n) = n {
@@ -73,7 +79,7 @@ impl Head {
     fn __call__<'py>(
         &self,
         py: Python<'py>,
-        observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
+        #[pyo3(from_py_with = given)] observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
         reset: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         refuse_forked()?;
@@ -121,6 +127,11 @@ impl Head {
                 batch.reset();
             }
         });
+    }
+
+    /// Refuses copies: `copy` and `pickle` call it.
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(error!("a head cannot be copied or pickled; make another by actq.Head(head.image, n)"))
     }
 
     /// The image.

@@ -15,9 +15,10 @@ use anyhow::Context as _;
 use numpy::{IntoPyArray as _, PyArrayMethods as _};
 use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 
-use crate::error::{OrRaise as _, error};
+use crate::error::{OrRaise as _, error, given};
 
 /// A port: kind, name, names of its values, and their number.
 type Port = (&'static str, String, Vec<String>, usize);
@@ -67,18 +68,18 @@ impl Image {
 #[pymethods]
 impl Image {
     #[new]
-    fn new(bytes: &[u8]) -> PyResult<Self> {
-        Self::of(ImageBuffer::new(bytes), Path::new("image"))
+    fn new(#[pyo3(from_py_with = given)] bytes: PyBackedBytes) -> PyResult<Self> {
+        Self::of(ImageBuffer::new(&bytes), Path::new("image"))
     }
 
     /// Reads and checks the file of an image.
     #[staticmethod]
-    fn load(path: PathBuf) -> PyResult<Self> {
+    fn load(#[pyo3(from_py_with = given)] path: PathBuf) -> PyResult<Self> {
         Self::of(ImageBuffer::read(&path).or_raise()?, &path)
     }
 
     /// Writes the file, whole or not at all. Replaces only an image, or an empty file.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    fn save(&self, py: Python<'_>, #[pyo3(from_py_with = given)] path: PathBuf) -> PyResult<()> {
         py.detach(|| refuse_foreign(&path).and_then(|()| write(&path, self.buffer.bytes()))).or_raise()
     }
 
@@ -155,14 +156,19 @@ impl Image {
 
     /// Returns the report of `actq inspect`.
     #[pyo3(signature = (*, clock = CLOCK))]
-    fn inspect(&self, clock: f64) -> PyResult<String> {
+    fn inspect(&self, #[pyo3(from_py_with = given)] clock: f64) -> PyResult<String> {
         let image = self.image()?;
         Ok(format!("{}\n{}", inspect::report(&image), time::report(&StepTime::new(&image, positive("clock", clock)?))))
     }
 
     /// Predicts the cost of a step on a board, as a dict.
-    #[pyo3(signature = (board = "stm32f405", *, clock = CLOCK))]
-    fn cost<'py>(&self, py: Python<'py>, board: &str, clock: f64) -> PyResult<Bound<'py, PyDict>> {
+    #[pyo3(signature = (board = "stm32f405".to_owned(), *, clock = CLOCK))]
+    fn cost<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = given)] board: String,
+        #[pyo3(from_py_with = given)] clock: f64,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let image = self.image()?;
         let known = Target::ALL.into_iter().filter(|target| target.has_assembler());
         let Some(target) = known.clone().find(|target| target.board().name == board) else {
@@ -185,14 +191,14 @@ impl Image {
     }
 
     /// Writes the image as source code of C into `folder`, as `actq export-c` does; returns the paths.
-    #[pyo3(signature = (folder, *, name = "policy", golden = None, steps = 100))]
+    #[pyo3(signature = (folder, *, name = "policy".to_owned(), golden = None, steps = 100))]
     fn export_c(
         &self,
         py: Python<'_>,
-        folder: PathBuf,
-        name: &str,
-        golden: Option<PathBuf>,
-        steps: usize,
+        #[pyo3(from_py_with = given)] folder: PathBuf,
+        #[pyo3(from_py_with = given)] name: String,
+        #[pyo3(from_py_with = given)] golden: Option<PathBuf>,
+        #[pyo3(from_py_with = given)] steps: usize,
     ) -> PyResult<Vec<PathBuf>> {
         if steps == 0 {
             return Err(error!("steps is 0; use a whole number from 1 on"));
@@ -203,7 +209,7 @@ impl Image {
                 image,
                 self.buffer.bytes(),
                 &folder,
-                name,
+                &name,
                 golden.as_deref().map(|file| (file, steps)),
                 None,
             )
@@ -213,7 +219,7 @@ impl Image {
 
     /// Writes the image's network as an ONNX file in f32, whole or not at all. Replaces only a file whose name ends in
     /// .onnx.
-    fn to_onnx(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    fn to_onnx(&self, py: Python<'_>, #[pyo3(from_py_with = given)] path: PathBuf) -> PyResult<()> {
         let image = self.image()?;
         if path.is_file() && path.extension().is_none_or(|ending| ending != "onnx") {
             return Err(error!("{}: exists and is no .onnx file; choose another name, or remove it", path.display()));

@@ -13,7 +13,7 @@ use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArrayLike1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use crate::error::OrRaise as _;
+use crate::error::{OrRaise as _, error, given};
 use crate::image::{Image, positive};
 use crate::work;
 
@@ -50,8 +50,12 @@ impl Link {
 impl Link {
     #[new]
     #[pyo3(signature = (port, *, timeout = 2.0))]
-    fn new(py: Python<'_>, port: &str, timeout: f64) -> PyResult<Self> {
-        let address = Address::from_str(port).map_err(|error| error.context(port.to_owned())).or_raise()?;
+    fn new(
+        py: Python<'_>,
+        #[pyo3(from_py_with = given)] port: String,
+        #[pyo3(from_py_with = given)] timeout: f64,
+    ) -> PyResult<Self> {
+        let address = Address::from_str(&port).map_err(|error| error.context(port.clone())).or_raise()?;
         let timeout = Duration::try_from_secs_f64(positive("timeout", timeout)?).or_raise()?;
         let client = work::run(py, None, move |_| {
             let name = address.to_string();
@@ -59,7 +63,7 @@ impl Link {
             client.status().map_err(|error| error.context(name))?;
             Ok(client)
         })?;
-        Ok(Self { port: port.to_owned(), client: Arc::new(Mutex::new(Some(client))), timeout })
+        Ok(Self { port, client: Arc::new(Mutex::new(Some(client))), timeout })
     }
 
     /// Returns the controller's status as a dict.
@@ -107,8 +111,8 @@ impl Link {
     fn step<'py>(
         &self,
         py: Python<'py>,
-        observation: PyArrayLike1<'py, f32, AllowTypeChange>,
-        timeout: Option<f64>,
+        #[pyo3(from_py_with = given)] observation: PyArrayLike1<'py, f32, AllowTypeChange>,
+        #[pyo3(from_py_with = given)] timeout: Option<f64>,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
         let observation = observation.as_array().to_vec();
         let timeout = match timeout {
@@ -139,9 +143,9 @@ impl Link {
     fn push(
         &self,
         py: Python<'_>,
-        image: &Image,
-        version: u32,
-        signature: Option<[u8; 64]>,
+        #[pyo3(from_py_with = given)] image: PyRef<'_, Image>,
+        #[pyo3(from_py_with = given)] version: u32,
+        #[pyo3(from_py_with = given)] signature: Option<[u8; 64]>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let (bytes, client) = (image.buffer().bytes().to_vec(), self.client.clone());
@@ -150,6 +154,11 @@ impl Link {
             let sent = |taken: usize| worker.report("sending", taken as f64 / bytes.len() as f64);
             push(locked(&client).as_mut().ok_or_else(closed)?, &package, sent)
         })
+    }
+
+    /// Refuses copies: `copy` and `pickle` call it.
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(error!("a link cannot be copied or pickled; open another by actq.Link(port)"))
     }
 
     /// Closes the port.

@@ -5,17 +5,21 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use actq::import::Importer as _;
+use actq::measure::actions::actions;
 use actq::measure::size::hex;
 use actq_cli::commands::bundle::{Gathered, refuse_open_questions};
 use actq_cli::importers::load;
 use actq_cli::outputs::unfinished::Scratch;
+use actq_cli::probes::probes;
 use actq_cli::report::deployment;
 use actq_deploy::{Answers, Bundle, DESCRIPTION, DeployFolder, read};
 use actq_onnx::{Choice, Onnx, import, import_bytes};
 use anyhow::anyhow;
+use numpy::{IntoPyArray as _, PyArrayMethods as _};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-use crate::error::{OrRaise as _, error, raise};
+use crate::error::{OrRaise as _, error, given, raise};
 
 /// A policy in f32, as it was trained.
 ///
@@ -94,6 +98,20 @@ impl Policy {
         hex(&self.policy.digest)
     }
 
+    /// Returns the policy itself, because it never changes.
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+
+    /// Refuses what `pickle` asks for.
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(error!("a policy cannot be pickled; import it in each process by actq.import_policy"))
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "Policy({:?}, {} observations -> {} actions, {} parameters)",
@@ -110,11 +128,11 @@ impl Policy {
 #[pyo3(signature = (path, *, output, states, accept_profile, answers))]
 pub(crate) fn import_path(
     py: Python<'_>,
-    path: PathBuf,
-    output: Option<String>,
-    states: Vec<(String, String)>,
-    accept_profile: bool,
-    answers: &str,
+    #[pyo3(from_py_with = given)] path: PathBuf,
+    #[pyo3(from_py_with = given)] output: Option<String>,
+    #[pyo3(from_py_with = given)] states: Vec<(String, String)>,
+    #[pyo3(from_py_with = given)] accept_profile: bool,
+    #[pyo3(from_py_with = given)] answers: String,
 ) -> PyResult<Policy> {
     py.detach(|| {
         let choice = Choice { output, states, is_fed: false };
@@ -135,7 +153,7 @@ pub(crate) fn import_path(
         let is_policy = DeployFolder.accepts(&path) || path.join(actq::import::FILES[0]).is_file();
         let is_bundle = path.is_dir() || path.extension().is_some_and(|ending| ending == "kinfer");
         if is_bundle && !is_policy {
-            return import_bundle(&path, accept_profile, answers);
+            return import_bundle(&path, accept_profile, &answers);
         }
         if is_answered {
             return Err(refuse_answers());
@@ -160,22 +178,40 @@ fn import_bundle(path: &Path, accept_profile: bool, answers: &str) -> PyResult<P
     Ok(Policy { policy: Arc::new(policy), _folder: Some(folder) })
 }
 
-/// Reads the bytes of an ONNX file.
+/// Largest magnitudes of the observations that a module is compared on, and the number of them for each: so different
+/// that the branches of a module are met.
+const MAGNITUDES: [f32; 7] = [2.0, 0.002, 0.02, 0.2, 20.0, 200.0, 2000.0];
+const FRAMES: usize = 32;
+
+/// Reads the bytes of an ONNX file. Returns the policy, and how to compare its source with it: observed inputs, pairs of
+/// states, the output, drawn observations [block, frame, value], and the policy's actions on them.
 #[pyfunction]
 #[pyo3(signature = (bytes, *, name, output, states))]
-pub(crate) fn import_onnx(
-    py: Python<'_>,
+pub(crate) fn import_onnx<'py>(
+    py: Python<'py>,
     bytes: Vec<u8>,
-    name: &str,
-    output: Option<String>,
-    states: Vec<(String, String)>,
-) -> PyResult<Policy> {
-    py.detach(|| {
+    #[pyo3(from_py_with = given)] name: String,
+    #[pyo3(from_py_with = given)] output: Option<String>,
+    #[pyo3(from_py_with = given)] states: Vec<(String, String)>,
+) -> PyResult<(Policy, Bound<'py, PyDict>)> {
+    let (imported, policy, probes, actions) = py.detach(|| {
         let choice = Choice { output, states, is_fed: false };
-        let imported = import_bytes(bytes, Path::new(""), name, &choice).map_err(|error| error.context(name));
+        let imported = import_bytes(bytes, Path::new(""), &name, &choice).map_err(|error| error.context(name.clone()));
         let imported = imported.map_err(raise)?;
-        let names = [Path::new(name); 2];
-        let policy = actq::policy::Policy::of_files(Path::new(""), names, &imported.json, &imported.weights);
-        Ok(Policy::new(policy.or_raise()?))
-    })
+        let names = [Path::new(&name); 2];
+        let policy =
+            actq::policy::Policy::of_files(Path::new(""), names, &imported.json, &imported.weights).or_raise()?;
+        let probes = probes(&imported, &policy, &MAGNITUDES, FRAMES);
+        let actions = actions(&policy, &probes);
+        PyResult::Ok((imported, policy, probes, actions))
+    })?;
+    let plan = PyDict::new(py);
+    plan.set_item("inputs", imported.inputs)?;
+    plan.set_item("states", imported.states.into_iter().map(|(from, to, _)| (from, to)).collect::<Vec<_>>())?;
+    plan.set_item("output", imported.output.0)?;
+    for (key, rows) in [("probes", probes), ("actions", actions)] {
+        let shape = [rows.len() / FRAMES, FRAMES, rows.first().map_or(0, Vec::len)];
+        plan.set_item(key, rows.concat().into_pyarray(py).reshape(shape)?)?;
+    }
+    Ok((Policy::new(policy), plan))
 }

@@ -16,7 +16,7 @@ use anyhow::bail;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::error::{OrRaise as _, error};
+use crate::error::{OrRaise as _, error, given};
 use crate::image::{Image, positive};
 use crate::policy::Policy;
 use crate::recordings::{Passed, passed};
@@ -118,10 +118,10 @@ fn width(name: &str, bits: u32) -> PyResult<Width> {
 #[pyo3(signature = (policy, recordings, heldout, request, progress))]
 pub(crate) fn quantize(
     py: Python<'_>,
-    policy: &Policy,
+    #[pyo3(from_py_with = given)] policy: PyRef<'_, Policy>,
     recordings: Option<&Bound<'_, PyAny>>,
     heldout: Option<&Bound<'_, PyAny>>,
-    request: Request,
+    #[pyo3(from_py_with = given)] request: Request,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Image, Vec<String>, Vec<String>)> {
     let (calib, heldout) = (passed(recordings, "recordings")?, passed(heldout, "heldout")?);
@@ -199,9 +199,9 @@ fn read(
 #[pyo3(signature = (image, recordings, policy, progress))]
 pub(crate) fn evaluate<'py>(
     py: Python<'py>,
-    image: &Bound<'py, Image>,
+    #[pyo3(from_py_with = given)] image: Py<Image>,
     recordings: &Bound<'py, PyAny>,
-    policy: Option<&Policy>,
+    #[pyo3(from_py_with = given)] policy: Option<PyRef<'_, Policy>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Bound<'py, PyDict>, Option<String>)> {
     let passed = passed(Some(recordings), "recordings")?;

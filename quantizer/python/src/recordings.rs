@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyList, PyMapping, PyString, PyTuple};
 
 use crate::arrays::tensor;
-use crate::error::{OrRaise as _, error};
+use crate::error::{OrRaise as _, error, given};
 
 /// A recording that was passed, before its sizes are known.
 #[derive(Clone, Debug)]
@@ -56,7 +56,7 @@ fn append(object: &Bound<'_, PyAny>, name: &Path, to: &mut Vec<Passed>) -> PyRes
     } else if let Ok(mapping) = object.cast::<PyMapping>() {
         let mut arrays = BTreeMap::new();
         for item in mapping.items()?.iter() {
-            let (key, array): (String, Bound<'_, PyAny>) = item.extract()?;
+            let (key, array): (String, Bound<'_, PyAny>) = given(&item)?;
             arrays.insert(key, tensor(&array)?);
         }
         to.push(Passed::Arrays(name.to_owned(), arrays));

@@ -15,7 +15,7 @@ use actq_cli::report::tuned;
 use actq_kernels::Width;
 use pyo3::prelude::*;
 
-use crate::error::{OrRaise as _, error};
+use crate::error::{OrRaise as _, error, given};
 use crate::image::Image;
 use crate::policy::Policy;
 use crate::quantize::Request;
@@ -24,13 +24,14 @@ use crate::work;
 
 /// Makes an image for the rollouts of the f32 policy: 8 bits, int16 activations, which need no recording.
 #[pyfunction]
-pub(crate) fn stand_in(py: Python<'_>, policy: &Policy) -> PyResult<Image> {
+pub(crate) fn stand_in(py: Python<'_>, #[pyo3(from_py_with = given)] policy: PyRef<'_, Policy>) -> PyResult<Image> {
     let options = Options {
         group: Method::Rtn.default_group(),
         activations: Activations::Int16,
         ..Options::new(Method::Rtn, Budget::Width(Width::W8))
     };
-    let made = py.detach(|| pipeline::quantize(&policy.policy, &Recordings::default(), &options, ())).or_raise()?;
+    let policy = Arc::clone(&policy.policy);
+    let made = py.detach(|| pipeline::quantize(&policy, &Recordings::default(), &options, ())).or_raise()?;
     Image::of(made.buffer(), Path::new("image"))
 }
 
@@ -44,11 +45,11 @@ type Outcome = (Image, Vec<Image>, String, String, Option<usize>, Vec<String>);
 #[expect(clippy::too_many_arguments, reason = "only the package's own Python calls it")]
 pub(crate) fn tune(
     py: Python<'_>,
-    policy: &Policy,
+    #[pyo3(from_py_with = given)] policy: PyRef<'_, Policy>,
     recordings: &Bound<'_, PyAny>,
     heldout: Option<&Bound<'_, PyAny>>,
-    request: Request,
-    rounds: usize,
+    #[pyo3(from_py_with = given)] request: Request,
+    #[pyo3(from_py_with = given)] rounds: usize,
     rollout: Py<PyAny>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Outcome> {

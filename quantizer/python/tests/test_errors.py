@@ -1,6 +1,8 @@
 """Errors have the text of the command; Ctrl-C ends the work at once."""
 
+import copy
 import os
+import pickle
 import re
 import signal
 import subprocess
@@ -87,6 +89,41 @@ def test_arguments_are_named(mlp, observations):
         actq.quantize(policy, progress=False)
     with pytest.raises(actq.Error, match="image: not an actq image"):
         actq.Image(b"no image")
+
+
+def test_wrong_types_are_errors_of_actq(mlp, observations):
+    policy = actq.import_policy(mlp)
+    image = actq.quantize(policy, observations, method="rtn", progress=False)
+    head, ragged = actq.Head(image), [[1.0], [1.0, 2.0]]
+    calls = {
+        "quantize": lambda: actq.quantize(object(), observations, progress=False),
+        "evaluate": lambda: actq.evaluate(object(), observations),
+        "evaluate's policy": lambda: actq.evaluate(image, observations, object()),
+        "head of no image": lambda: actq.Head(policy),
+        "number of heads": lambda: actq.Head(image, -1),
+        "seed": lambda: actq.Head(image, 1, seed=2**32),
+        "text as observations": lambda: head("x"),
+        "ragged observations": lambda: head(ragged),
+        "ragged mask": lambda: head(observations, ragged),
+        "ragged recording": lambda: actq.quantize(policy, {"obs": ragged}, progress=False),
+        "keys": lambda: actq.quantize(policy, {3: observations}, progress=False),
+        "image": lambda: actq.Image("x"),
+        "load": lambda: actq.Image.load(3),
+        "save": lambda: image.save(None),
+        "inspect": lambda: image.inspect(clock="fast"),
+        "board": lambda: image.cost(3),
+        "export": lambda: image.export_c("c", name=3),
+        "port": lambda: actq.Link(3),
+        "output": lambda: actq.import_policy(mlp, output=3),
+        "states": lambda: actq.import_policy(mlp, states={"h": 3}),
+        "copy of a head": lambda: copy.deepcopy(head),
+        "pickle of a policy": lambda: pickle.dumps(policy),
+    }
+    for name, call in calls.items():
+        with pytest.raises(Exception) as raised:
+            call()
+        assert isinstance(raised.value, actq.Error), f"{name}: {raised.value!r}"
+    assert copy.deepcopy(policy) is policy
 
 
 def test_sources_of_policies_are_checked(mlp, tmp_path):

@@ -141,6 +141,20 @@ def test_a_module_can_be_trained(mlp, observations):
         module(obs[:, :3])
 
 
+def test_only_weights_are_trained(tmp_path):
+    torch = pytest.importorskip("torch", reason="torch is not installed (requirements-optional.txt)")
+    module = actq.FakeQuant(quantized(recurrent(tmp_path)))
+    buffers = dict(module.named_buffers())
+    assert {name.split("_")[0] for name, _ in module.named_parameters()} == {"weight", "bias", "norm"}
+    assert {name.split("_")[0] for name in buffers} == {"mean", "factor"}
+    limited = actq.FakeQuant(quantized(UR3))
+    assert {"low", "high"} <= set(dict(limited.named_buffers())), "an optimizer must not move limits"
+    with pytest.raises(actq.Error, match="the image is of type str; pass an actq.Image"):
+        actq.FakeQuant("image.actq")
+    with pytest.raises(actq.Error, match="obs is of type ndarray; pass a tensor"):
+        limited(np.zeros((1, limited.inputs[0][1]), np.float32))
+
+
 def test_a_flow_module_has_the_chunk_of_the_file(flow, tmp_path):
     torch = pytest.importorskip("torch", reason="torch is not installed (requirements-optional.txt)")
     row = np.random.default_rng(5).normal(size=(2, flow.obs_len)).astype(np.float32)

@@ -106,5 +106,212 @@ def test_what_cannot_be_imported_is_named():
         actq.import_policy(Sorted(), torch.zeros(1, 12))
     with pytest.raises(actq.Error, match=r"Linear: pass an example of the module's input, as torch.zeros\(1, n_obs\)"):
         actq.import_policy(nn.Linear(12, 4))
-    with pytest.raises(actq.Error, match="Linear: torch cannot export the module"):
+    with pytest.raises(actq.Error) as raised:
         actq.import_policy(nn.Linear(12, 4), torch.zeros(1, 5))
+    assert str(raised.value) == "Linear: the example has 5 values; the module takes 12"
+    for example, found in ((np.zeros((1, 12), np.float32), "ndarray"), ({"obs": torch.zeros(1, 12)}, "dict"), ((), "empty")):
+        with pytest.raises(actq.Error, match=f"the example is of type .*{found}.*; pass a tensor"):
+            actq.import_policy(nn.Linear(12, 4), example)
+    with pytest.raises(actq.Error, match="Module: the module fails on the example"):
+        actq.import_policy(nn.Module(), torch.zeros(1, 12))
+
+
+class Net(nn.Module):
+    """A network from 6 values and what a module adds to 3 actions, with buffers of zeros."""
+
+    def __init__(self, more=0, **buffers):
+        super().__init__()
+        torch.manual_seed(1)
+        self.net = nn.Sequential(nn.Linear(6 + more, 16), nn.ELU(), nn.Linear(16, 3))
+        for name, shape in buffers.items():
+            self.register_buffer(name, torch.zeros(shape))
+
+
+class History(Net):
+    def __init__(self):
+        super().__init__(6, frames=(1, 2, 6))
+
+    def forward(self, x):
+        self.frames = torch.cat([self.frames[:, 1:], x[:, None]], 1)
+        return self.net(self.frames.flatten(1))
+
+
+class Filter(Net):
+    def __init__(self):
+        super().__init__(low_pass=(1, 3))
+
+    def forward(self, x):
+        self.low_pass.mul_(0.8).add_(0.2 * self.net(x))
+        return self.low_pass.clone()
+
+
+class LastAction(Net):
+    """Keeps a tensor that is no buffer, and does not exist at first."""
+
+    def __init__(self):
+        super().__init__(3)
+        self.last = None
+
+    def forward(self, x):
+        last = torch.zeros(1, 3) if self.last is None else self.last
+        self.last = self.net(torch.cat([x, last], 1))
+        return self.last
+
+
+class Late(Net):
+    """Acts otherwise after more steps than are compared."""
+
+    def __init__(self):
+        super().__init__()
+        self.steps = 0
+
+    def forward(self, x):
+        self.steps += 1
+        return self.net(x) * (0.0 if self.steps > 900 else 1.0)
+
+
+class Cell(Net):
+    def __init__(self):
+        super().__init__(h=(1, 6))
+        self.cell = nn.GRUCell(6, 6)
+
+    def forward(self, x):
+        self.h[:] = self.cell(x, self.h)
+        return self.net(self.h)
+
+
+@pytest.mark.parametrize(
+    ("make", "kept"), [(History, "frames"), (Filter, "low_pass"), (LastAction, "last"), (Late, "steps"), (Cell, "h")]
+)
+def test_memory_of_a_module_is_refused(make, kept):
+    with pytest.raises(actq.Error, match=f"{make.__name__}: the action depends on values that .* from step to step: {kept};"):
+        actq.import_policy(make(), torch.zeros(1, 6))
+
+
+def test_memory_of_a_torchscript_file_is_refused(tmp_path):
+    torch.jit.script(Filter()).save(tmp_path / "filter.pt")
+    with pytest.raises(actq.Error, match="from step to step: low_pass;"):
+        actq.import_policy(tmp_path / "filter.pt", torch.zeros(1, 6))
+
+
+def test_values_that_nothing_reads_are_no_memory():
+    class Recorded(Net):
+        def forward(self, x):
+            self.last, self.calls = self.net(x), getattr(self, "calls", 0) + 1
+            return self.last
+
+    assert actq.import_policy(Recorded(), torch.zeros(1, 6)).act_len == 3
+
+
+class Mirror(Net):
+    def forward(self, x):
+        return -self.net(-x) if x[0, 0] < 0 else self.net(x)
+
+
+class Small(Net):
+    def forward(self, x):
+        return self.net(x) if x.abs().max() > 0.05 else self.net(0 * x)
+
+
+class Far(Net):
+    def forward(self, x):
+        return self.net(x) if x.norm() < 100 else 0.5 * self.net(x)
+
+
+class Item(Net):
+    def forward(self, x):
+        return self.net(x) * x.abs().max().item()
+
+
+class Numpy(Net):
+    def forward(self, x):
+        return self.net(x) + torch.from_numpy(np.sin(x.numpy()[:, :3]))
+
+
+class Loop(Net):
+    def forward(self, x):
+        y = self.net(x)
+        for _ in range(int(3 * x[0, 0].abs())):
+            y = 0.5 * y
+        return y
+
+
+@pytest.mark.parametrize("make", [Mirror, Small, Far, Item, Numpy, Loop])
+def test_a_result_that_depends_on_values_is_refused(make):
+    with pytest.raises(actq.Error, match=r"the result depends on values, .* at .*test_torch.py:\d+ \(Converting a tensor"):
+        actq.import_policy(make(), torch.full((1, 6), 0.5))
+
+
+def test_a_branch_without_a_difference_is_logged(caplog):
+    class Checked(Net):
+        def forward(self, x):
+            assert not torch.isnan(x).any()
+            return self.net(x)
+
+    assert actq.import_policy(Checked(), torch.zeros(1, 6)).act_len == 3
+    assert "no drawn observation shows a difference" in caplog.text
+
+
+def test_random_numbers_are_refused():
+    class Drawn(Net):
+        def forward(self, x):
+            return self.net(x) + float(np.random.default_rng().normal())
+
+    with pytest.raises(actq.Error, match="two runs of the module on the same observations differ"):
+        actq.import_policy(Drawn(), torch.zeros(1, 6))
+
+
+def test_an_import_changes_nothing_of_the_module():
+    module = nn.Sequential(nn.Linear(6, 6), nn.BatchNorm1d(6), History()).train()
+    module[1].eval()
+    module(torch.randn(1, 6)).sum().backward()
+    # With a history of gradients, which torch's own copy refuses.
+    assert not module[2].frames.is_leaf
+    values = {name: value.clone() for name, value in module.state_dict().items()}
+    grads = [parameter.grad.clone() for parameter in module.parameters()]
+    modes, random = [part.training for part in module.modules()], torch.get_rng_state()
+    with pytest.raises(actq.Error, match="from step to step: 2.frames;"):
+        actq.import_policy(module, torch.zeros(1, 6))
+    assert actq.import_policy(module[:2], torch.zeros(1, 6)).act_len == 6
+    assert modes == [part.training for part in module.modules()] and not module[1].training
+    assert all(torch.equal(value, values[name]) for name, value in module.state_dict().items())
+    assert all(torch.equal(parameter.grad, grad) for parameter, grad in zip(module.parameters(), grads))
+    assert torch.equal(random, torch.get_rng_state())
+
+
+def test_observations_are_drawn_around_a_modules_means():
+    class Physical(Filter):
+        def forward(self, x):
+            return super().forward(((x - 1e5) / 50).clamp(-5, 5))
+
+    with pytest.raises(actq.Error, match="from step to step: low_pass;"):
+        actq.import_policy(Physical(), torch.zeros(1, 6))
+
+
+class Critic(Net):
+    """Returns the critic's value and the mean action in one of several forms."""
+
+    def __init__(self, form):
+        super().__init__()
+        self.critic, self.form = nn.Linear(6, 1), form
+
+    def forward(self, x):
+        return self.form(self.critic(x), self.net(x))
+
+
+def test_the_action_of_several_outputs_is_asked_for():
+    def sampled(value, mean):
+        action = mean + torch.randn_like(mean)
+        return action, value, (action - mean).square().sum(-1)
+
+    for form, outputs in [
+        (lambda value, mean: (value, mean), r"output_0 \(1 values\), output_1 \(3 values\)"),
+        (lambda value, mean: {"mu": mean, "value": value}, r"mu \(3 values\), value \(1 values\)"),
+        (sampled, r"output_1 \(1 values\)"),
+    ]:
+        with pytest.raises(actq.Error, match=f"choose one by .*--output NAME.*{outputs}|{outputs}; choose one by"):
+            actq.import_policy(Critic(form), torch.zeros(1, 6))
+    named = Critic(lambda value, mean: {"value": value, "action": mean})
+    assert actq.import_policy(named, torch.zeros(1, 6)).act_len == 3
+    pair = Critic(lambda value, mean: (value, mean))
+    assert actq.import_policy(pair, torch.zeros(1, 6), output="output_1").act_len == 3

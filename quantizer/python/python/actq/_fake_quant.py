@@ -8,9 +8,12 @@ import torch
 from torch import nn
 from torch.nn import functional as F
 
-from ._actq import Image
+from ._actq import Error, Image
 
 Tensors = Union[torch.Tensor, Tuple[torch.Tensor, ...]]
+
+#: How the names of trained tensors begin. The others normalize observations, or belong to the action contract.
+TRAINED = ("weight_", "bias_", "norm_weight_", "norm_bias_", "table_")
 
 
 class FakeQuant(nn.Module):
@@ -24,12 +27,15 @@ class FakeQuant(nn.Module):
     [batch, state_len], zeros at first, and returns (action, next_state). A flow or diffusion policy takes `noise=`
     [batch, noise_len].
 
-    Weights are parameters, and gradients pass through the rounding: the module can be trained on. Its results differ from
-    `Head` by float32's rounding of sums, and by what the contract does from step to step.
+    Weights, biases and those of norms are parameters, and gradients pass through the rounding: the module can be trained
+    on. The normalization of observations and the action's scale, offset and limits are buffers: they stay. Its results
+    differ from `Head` by float32's rounding of sums, and by what the contract does from step to step.
     """
 
     def __init__(self, image: Image, *, activations: bool = True) -> None:
         super().__init__()
+        if not isinstance(image, Image):
+            raise Error(f"the image is of type {type(image).__name__}; pass an actq.Image")
         network = image.network()
         self.activations = activations
         self.inputs: List[Tuple[str, int]] = network["inputs"]
@@ -41,21 +47,25 @@ class FakeQuant(nn.Module):
                 self.constants[name] = array.tolist()
             elif name.startswith("number_"):
                 self.constants[name] = float(array)
-            else:
+            elif name.startswith(TRAINED):
                 self.register_parameter(name, nn.Parameter(torch.from_numpy(array)))
+            else:
+                self.register_buffer(name, torch.from_numpy(array))
 
     def forward(
         self, obs: torch.Tensor, state: Optional[torch.Tensor] = None, *, noise: Optional[torch.Tensor] = None
     ) -> Tensors:
-        values: Dict[str, Any] = {**self.constants, **dict(self.named_parameters())}
+        values: Dict[str, Any] = {**self.constants, **dict(self.named_parameters()), **dict(self.named_buffers())}
         given = {"obs": obs, "state": state, "noise": noise}
         for name, length in self.inputs:
             value = given[name]
             if value is None and name == "state":
                 value = obs.new_zeros(obs.shape[0], length)
+            if value is not None and not isinstance(value, torch.Tensor):
+                raise Error(f"{name} is of type {type(value).__name__}; pass a tensor")
             if value is None or value.shape != (obs.shape[0], length):
                 found = None if value is None else tuple(value.shape)
-                raise ValueError(f"{name} is {found}; ({obs.shape[0]}, {length}) is needed")
+                raise Error(f"{name} is {found}; ({obs.shape[0]}, {length}) is needed")
             values[name] = value
         for op, inputs, output, attributes, x_max in self.nodes:
             x = [values[name] for name in inputs]

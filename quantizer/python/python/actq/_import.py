@@ -36,15 +36,19 @@ def import_policy(
     """Reads a policy.
 
     source: the path of an ONNX file, of a policy folder (docs/POLICY.md), of a deploy bundle (docs/DEPLOY.md) or of a
-        TorchScript file; or a torch.nn.Module.
+        TorchScript file; or a torch.nn.Module. Of a policy of Stable-Baselines3, its `predict(deterministic=True)` is read.
     example: of a module or TorchScript file, its input: a tensor [1, n_obs], or a tuple of the observation and the
         recurrent states, each with a batch of 1.
-    output: of ONNX, the output that is the action. The default is the one named "action", or the only candidate.
+    output: of ONNX or a module, the output that is the action. The default is the one named "action", or the only
+        candidate.
     states: of ONNX or a module, the inputs that hold recurrent state, each with the output of its next value.
-    input_names, output_names: of a module, names of its inputs and outputs, for `output` and `states`.
+    input_names, output_names: of a module, names of its inputs and outputs, for `output` and `states`. The default are
+        the keys of a mapping or named tuple, else input_0 .. and output_0 .. .
     name: of a module, the policy's name; the default is its class.
     accept_profile, answers: of a bundle, the answers to what its files do not say, as `actq import` takes them: a path
         of a TOML file, or a mapping.
+
+    Copies of a module run on drawn observations, and the policy must give their actions. The module does not change.
 
     Raises `actq.Error` with the node, tensor, file or key that cannot be imported.
     """
@@ -55,6 +59,8 @@ def import_policy(
         if not os.fspath(source):
             raise _actq.Error("the path of the policy is empty")
         path = Path(source)
+        if path.suffix == ".zip":
+            raise _actq.Error(f"{path}: is an archive; load it with Stable-Baselines3, and pass model.policy")
         if path.suffix not in TORCHSCRIPT:
             given = {"example": example, "input_names": input_names, "output_names": output_names, "name": name}
             for key, value in given.items():
@@ -68,20 +74,24 @@ def import_policy(
         name = name or path.stem
         try:
             source = _torch_module().jit.load(str(path), map_location="cpu")
-        except RuntimeError as error:
-            raise _actq.Error(f"{path}: torch cannot read it as TorchScript: {error}") from error
+        except Exception as error:
+            text = str(error).strip().split("\n")[0]
+            raise _actq.Error(f"{path}: torch cannot read it as TorchScript: {text}; pass a module instead") from error
     elif not callable(getattr(source, "forward", None)):
-        raise _actq.Error(f"the policy is of type {type(source).__name__}; pass a path, or a torch.nn.Module")
+        # An algorithm of Stable-Baselines3.
+        remedy = "model.policy" if hasattr(source, "policy") else "a path, or a torch.nn.Module"
+        raise _actq.Error(f"the policy is of type {type(source).__name__}; pass {remedy}")
     if accept_profile or answers is not None:
         raise _actq.Error("only a deploy bundle takes accept_profile and answers")
     _torch_module()
-    from ._torch import onnx_bytes
+    from ._torch import import_module
 
     name = name or type(source).__name__
     if example is None:
         raise _actq.Error(f"{name}: pass an example of the module's input, as torch.zeros(1, n_obs)")
-    content = onnx_bytes(source, example, name, input_names, output_names)
-    return _actq.import_onnx(content, name=name, output=output, states=pairs)
+    return import_module(
+        source, example, name, output=output, states=pairs, input_names=input_names, output_names=output_names
+    )  # fmt: skip
 
 
 def _torch_module() -> Any:

@@ -1,60 +1,287 @@
-"""Modules of torch as ONNX files."""
+"""Modules of torch: exported by torch, imported, and compared with the policy."""
 
 from __future__ import annotations
 
+import contextlib
+import copy
 import io
+import logging
 import warnings
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, Dict, Optional, Sequence, Tuple
+from typing import TYPE_CHECKING, Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
+from unittest import mock
 
+import numpy as np
 import torch
 
-from ._actq import Error
+from . import _actq, _sb3
+from ._actq import Error, Policy
+from ._memory import changed_values, depends_on
+from ._typing import Array
 
 if TYPE_CHECKING:
     from ._import import Example
 
+Tensors = Tuple[torch.Tensor, ...]
+
+log = logging.getLogger("actq")
+
 #: The operator set of the tracing exporter.
 OPSET = 17
+#: Largest error of a correct policy, as a share of the largest action.
+TOLERANCE = 1e-5
+#: Largest error of a correct policy, as a multiple of what roundings of the weights change.
+ROUNDINGS = 8.0
+#: Longest observation that is tried to find the one that a module takes.
+LONGEST = 2048
 
 
-def onnx_bytes(
+def import_module(
     module: Any,
     example: Example,
     name: str,
+    *,
+    output: Optional[str],
+    states: Sequence[Tuple[str, str]],
     input_names: Optional[Sequence[str]],
     output_names: Optional[Sequence[str]],
-) -> bytes:
-    """Exports one step of a module, in evaluation mode, by torch's own exporters."""
-    inputs = (example,) if isinstance(example, torch.Tensor) else tuple(example)
-    device = next((parameter.device for parameter in module.parameters()), torch.device("cpu"))
+) -> Policy:
+    """Imports one step of a module in evaluation mode. Only copies of the module run.
+
+    Raises `actq.Error` if it cannot be imported, or if policy and module differ on drawn observations.
+    """
+    inputs = _inputs(example, name)
+    tensors = [*module.parameters(), *module.buffers()]
+    device = tensors[0].device if tensors else torch.device("cpu")
     inputs = tuple(tensor.to(device) for tensor in inputs)
-    names = {
-        "input_names": list(input_names) if input_names else None,
-        "output_names": list(output_names) if output_names else None,
-    }
-    training = module.training
-    module.eval()
-    try:
-        with torch.no_grad(), warnings.catch_warnings():
-            # The tracing exporter warns of its age, and that the batch is fixed.
-            warnings.simplefilter("ignore")
-            return _export(module, inputs, names)
-    except (RuntimeError, torch.onnx.OnnxExporterError) as error:
-        raise Error(f"{name}: torch cannot export the module: {error}") from error
-    finally:
-        module.train(training)
+    with torch.random.fork_rng([device] if device.type == "cuda" else []), torch.no_grad():
+        source = Source(module, inputs, name, input_names, output_names)
+        with warnings.catch_warnings(record=True) as caught, contextlib.redirect_stdout(io.StringIO()):
+            # A filter of the caller must not turn them into exceptions.
+            warnings.simplefilter("always")
+            content = source.onnx_bytes()
+        branches = [warning for warning in caught if issubclass(warning.category, torch.jit.TracerWarning)]
+        policy, plan = _actq.import_onnx(content, name=name, output=output, states=list(states))
+        source.compare(plan, branches)
+    return policy
 
 
-def _export(module: Any, inputs: Tuple[torch.Tensor, ...], names: Dict[str, Any]) -> bytes:
-    """Tries the tracing exporter, which needs only torch, then that of torch.export, which knows more operators."""
-    file = io.BytesIO()
-    try:
-        torch.onnx.export(module, inputs, file, opset_version=OPSET, dynamo=False, **names)  # type: ignore[arg-type]
-    except RuntimeError:
-        if isinstance(module, torch.jit.ScriptModule) or find_spec("onnxscript") is None:
-            raise
-        program = torch.onnx.export(module, inputs, dynamo=True, verbose=False, **names)
-        assert program is not None, "without a file torch returns the program"
-        return bytes(program.model_proto.SerializeToString())
-    return file.getvalue()
+class Source:
+    """A module, the example of its inputs, and the names of inputs and outputs."""
+
+    def __init__(
+        self,
+        module: Any,
+        inputs: Tensors,
+        name: str,
+        input_names: Optional[Sequence[str]],
+        output_names: Optional[Sequence[str]],
+    ) -> None:
+        self.module, self.inputs, self.name = module, inputs, name
+        try:
+            outputs = self.copied()(*inputs)
+        except Exception as error:
+            raise Error(f"{name}: {self._expected() or f'the module fails on the example: {reason(error)}'}") from error
+        found = dict(tensors(outputs, "output", name))
+        # A single one keeps the exporter's name.
+        self.input_names = list(input_names or [f"input_{i}" for i in range(len(inputs))] * (len(inputs) > 1))
+        self.output_names = list(output_names or list(found) * (len(found) > 1))
+        if self.output_names and len(self.output_names) != len(found):
+            raise Error(f"{name}: output_names has {len(self.output_names)} names for {len(found)} outputs")
+
+    def copied(self) -> Any:
+        """Returns a copy in evaluation mode; of a policy of Stable-Baselines3, its deterministic action."""
+        try:
+            with mock.patch.object(torch.Tensor, "__deepcopy__", copied_tensor):
+                module = copy.deepcopy(self.module).eval()
+        except Exception as error:
+            raise Error(f"{self.name}: copy.deepcopy cannot copy the module: {reason(error)}") from error
+        return _sb3.Deterministic(module, self.name) if _sb3.is_policy(module) else module
+
+    def _expected(self) -> Optional[str]:
+        """Says which length of the observation runs, if the example's does not."""
+        if len(self.inputs) > 1 or self.inputs[0].dim() == 0:
+            return None
+        *first, given = self.inputs[0].shape
+        module = self.copied()
+        # One value is broadcast to any length.
+        for length in [*range(2, LONGEST), 1]:
+            with contextlib.suppress(Exception):
+                module(self.inputs[0].new_zeros(*first, length))
+                return f"the example has {given} values; the module takes {length}" if length != given else None
+        return None
+
+    def onnx_bytes(self) -> bytes:
+        """Exports by the tracing exporter, which needs only torch, else by that of torch.export, which knows more
+        operators."""
+        module: Any = self.copied()
+        is_script = isinstance(module, torch.jit.ScriptModule)
+        module = module if len(self.output_names) < 2 else Flat(module, self.name)
+        names: Dict[str, Any] = {"input_names": self.input_names or None, "output_names": self.output_names or None}
+        file = io.BytesIO()
+        try:
+            torch.onnx.export(module, self.inputs, file, opset_version=OPSET, dynamo=False, **names)  # type: ignore[arg-type]
+            return file.getvalue()
+        except Exception as error:
+            if not is_script and find_spec("onnxscript") is not None:
+                with contextlib.suppress(Exception):
+                    program = torch.onnx.export(module, self.inputs, dynamo=True, verbose=False, **names)
+                    assert program is not None, "without a file torch returns the program"
+                    return bytes(program.model_proto.SerializeToString())
+            raise Error(f"{self.name}: torch cannot export the module: {reason(error)}") from error
+
+    def run(self, module: Any, plan: Dict[str, Any], probes: Array) -> Array:
+        """Runs a copy over observations [block, frame, value], with its states carried on; returns outputs [block, frame,
+        value]. Those of a step that raises are not a number."""
+        positions = {name: i for i, name in enumerate(self.input_names)}
+        observed = [(positions.get(name, 0), length) for name, length in plan["inputs"]]
+        which = self.output_names.index(plan["output"]) if self.output_names else 0
+        carried = [(positions[of], self.output_names.index(to)) for of, to in plan["states"]]
+        held = list(self.inputs)
+        for i, _ in carried:
+            held[i] = torch.zeros_like(held[i])
+        rows: List[Array] = []
+        failure: Optional[Exception] = None
+        for row in probes.reshape(-1, probes.shape[-1]):
+            at = 0
+            for i, length in observed:
+                held[i] = torch.from_numpy(row[at : at + length].copy()).reshape(held[i].shape).to(held[i])
+                at += length
+            try:
+                outputs = [tensor for _, tensor in tensors(module(*held), "output", self.name)]
+                rows.append(outputs[which].reshape(-1).double().cpu().numpy())
+                for i, k in carried:
+                    held[i] = outputs[k].reshape(held[i].shape)
+            except Exception as error:
+                failure = error
+                rows.append(np.full(plan["actions"].shape[-1], np.nan))
+        if failure is not None and np.isnan(rows).all():
+            raise Error(f"{self.name}: the module fails on drawn observations: {reason(failure)}") from failure
+        if any(len(row) != len(rows[0]) for row in rows):
+            raise Error(f"{self.name}: the length of the module's action depends on its observation")
+        return np.stack(rows).reshape(*probes.shape[:2], -1)
+
+    def compare(self, plan: Dict[str, Any], branches: Sequence[warnings.WarningMessage]) -> None:
+        """Refuses a policy that differs from the module, with the cause."""
+        probes, actions = plan["probes"], plan["actions"]
+        used = self.copied()
+        found = self.run(used, plan, probes)
+        _sb3.refuse_other_actions(used, probes, self.name)
+        changed = changed_values(self.copied(), used)
+        error = share(actions - found, found)
+        traced = [warning for warning in branches if f"{torch.__path__[0]}/" not in warning.filename]
+        if error > TOLERANCE and not self._is_rounding(plan, found):
+            raise Error(f"{self.name}: {self._cause(plan, found, error, changed, traced)}")
+        if changed and depends_on(used, changed, lambda: self.run(used, plan, probes[:1]), found[:1], share):
+            raise Error(f"{self.name}: {memory(changed)}")
+        for text in dict.fromkeys(map(branch, traced)):
+            log.warning("%s: %s; no drawn observation shows a difference", self.name, text)
+        still = [i for i in range(found.shape[-1]) if np.ptp(found[..., i]) == 0]
+        if still:
+            log.warning("%s: actions %s are constant over all drawn observations; nothing is known of them", self.name, still)
+
+    def _is_rounding(self, plan: Dict[str, Any], found: Array) -> bool:
+        """Returns `True` if the policy differs as the module itself does when its weights change by a rounding: what
+        float32 loses is no more than that."""
+        module, random = self.copied(), torch.Generator().manual_seed(1)
+        for weight in [*module.parameters(), *module.buffers()]:
+            if weight.is_floating_point():
+                sign = torch.randint(2, weight.shape, generator=random).to(weight.device) * 2 - 1
+                weight.mul_(1 + torch.finfo(torch.float32).eps * sign.to(weight.dtype))
+        own, policy = (np.abs(of - found).max(axis=1) for of in (self.run(module, plan, plan["probes"]), plan["actions"]))
+        if share(self.run(self.copied(), plan, plan["probes"]) - found, found) > 0:
+            return False
+        return bool((policy <= np.maximum(TOLERANCE * scale(found)[:, 0], ROUNDINGS * own)).all())
+
+    def _cause(
+        self, plan: Dict[str, Any], found: Array, error: float, changed: Sequence[str], traced: Sequence[warnings.WarningMessage]
+    ) -> str:
+        if changed:
+            return memory(changed)
+        if share(self.run(self.copied(), plan, plan["probes"]) - found, found) > 0:
+            return (
+                "two runs of the module on the same observations differ, so it draws random numbers, or keeps values outside "
+                "of itself; pass a module with the deterministic action"
+            )
+        off = f"the policy is off by {error:.1e} of the largest action on drawn observations"
+        if traced:
+            return f"{off}: {branch(traced[0])}; choose by torch.where, or pass a module of one branch"
+        return f"{off}; forward computes outside of torch, or reads values from elsewhere, which an import makes constants"
+
+
+def memory(changed: Sequence[str]) -> str:
+    """Says where a module keeps values from step to step."""
+    return (
+        f"the action depends on values that forward keeps from step to step: {', '.join(changed)}; take them as inputs. States of "
+        "LSTM and GRU layers, returned as outputs, are kept with states="
+    )
+
+
+def branch(warning: warnings.WarningMessage) -> str:
+    """Says where the result depends on values, in torch's words."""
+    text = str(warning.message).split(". ")[0]
+    return f"the result depends on values, as by a branch at {warning.filename}:{warning.lineno} ({text})"
+
+
+def scale(actions: Array) -> Array:
+    """Returns the largest value of each block and dimension [block, 1, value]. Of a small one, it is a share of the block's,
+    or of the first block's, whose observations have usual magnitudes: float32 rounds values around 1 within the network."""
+    largest = np.abs(np.where(np.isfinite(actions), actions, 0.0)).max(axis=1, keepdims=True)
+    least = np.maximum(1e-3 * largest.max(axis=2, keepdims=True), 1e-2 * largest[0].max())
+    return np.maximum(np.maximum(largest, least), 1e-30)
+
+
+def share(difference: Array, actions: Array) -> float:
+    """Returns the largest difference as a share of the largest action of its block and dimension. Steps that the module
+    refuses do not count, nor values that are infinite for both."""
+    difference = np.where(np.isfinite(actions), np.abs(difference), 0.0)
+    return float((np.where(np.isnan(difference), np.inf, difference) / scale(actions)).max())
+
+
+COPIED_LEAF = torch.Tensor.__deepcopy__
+
+
+def copied_tensor(tensor: torch.Tensor, memo: Dict[int, Any]) -> Any:
+    """Copies a tensor. Those that forward has computed have a history of gradients, which torch's own method refuses."""
+    return COPIED_LEAF(tensor, memo) if tensor.is_leaf else tensor.detach().clone()
+
+
+class Flat(torch.nn.Module):
+    """A module whose outputs are one tuple."""
+
+    def __init__(self, module: Any, name: str) -> None:
+        super().__init__()
+        self.module, self.name = module, name
+
+    def forward(self, *inputs: torch.Tensor) -> Tensors:
+        return tuple(tensor for _, tensor in tensors(self.module(*inputs), "output", self.name))
+
+
+def tensors(value: Any, at: str, name: str) -> Iterator[Tuple[str, torch.Tensor]]:
+    """Yields the tensors of a module's result, named by the keys of mappings and named tuples, or by place."""
+    if isinstance(value, torch.Tensor):
+        yield at, value
+    elif isinstance(value, (Mapping, tuple, list)):
+        keys = value if isinstance(value, Mapping) else getattr(value, "_fields", None)
+        items = value.values() if isinstance(value, Mapping) else value
+        for key, item in zip(keys or (f"{at}_{i}" for i in range(len(value))), items):
+            yield from tensors(item, str(key), name)
+    elif value is not None:
+        raise Error(f"{name}: forward returns a {type(value).__name__}; pass a module that returns the action as a tensor")
+
+
+def reason(error: BaseException) -> str:
+    """Returns the first line of the first cause."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[0][:300] if lines else type(error).__name__
+
+
+def _inputs(example: Any, name: str) -> Tensors:
+    inputs = tuple(example) if isinstance(example, (tuple, list)) else (example,)
+    wrong = [type(value).__name__ for value in inputs if not isinstance(value, torch.Tensor)]
+    if wrong or not inputs:
+        found = wrong[0] if wrong else "an empty tuple"
+        raise Error(f"{name}: the example is of type {found}; pass a tensor [1, n_obs], or a tuple of tensors")
+    return tuple(value.detach() for value in inputs)
