@@ -8,7 +8,7 @@ use actq_c::{ActqImage, CPort, Code, Text, actq_image_open, actq_image_port, act
 use actq_kernels::PortKind;
 use anyhow::Result;
 
-use crate::deployed::{Made, four_bits};
+use crate::deployed::Made;
 
 /// Returns a text of the interface.
 ///
@@ -22,7 +22,7 @@ unsafe fn text<'a>(text: Text) -> &'a [u8] {
 
 #[test]
 fn inputs_and_ports_follow_the_image() -> Result<()> {
-    let bytes = four_bits(&Made::deployment()?.1.policy)?;
+    let bytes = Made::deployment()?.1.four_bits()?;
     let buffer = ImageBuffer::new(&bytes);
     let expected = buffer.image("made".as_ref())?;
     let aligned: Vec<u32> = bytes.chunks_exact(4).map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]])).collect();

@@ -4,24 +4,19 @@
 
 use std::path::{Path, PathBuf};
 
-use actq::budget::Budget;
-use actq::data::Recordings;
 use actq::error::Error;
 use actq::graph::ops::Linear;
 use actq::graph::{Graph, WeightMatrix};
-use actq::methods::{Method, Options};
-use actq::pipeline::quantize;
 use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::bits;
+use actq_bench::descriptions::{Compared, compare};
 use actq_deploy::description::{Description, Network};
 use actq_deploy::{
     Answers, Array, Bundle, Compute, DESCRIPTION, Deployment, Part, Plan, Reference, Runner, Sources, read,
 };
-use actq_kernels::image::OpKind;
-use actq_kernels::ops::run_whole;
-use actq_kernels::{Image, PortKind, StepError, Width};
+use actq_kernels::{PortKind, StepError};
 use anyhow::{Context as _, Result, ensure};
 
 use crate::slices::{in_polls, whole};
@@ -35,51 +30,6 @@ pub(crate) const PUBLISHED: [(&str, &str); 5] = [
     ("falcon_g1", "action_scale = 0.25\nrate_hz = 50"),
     ("holosoma_t1_fastsac", include_str!("../../../quantizer/deploy/tests/all/holosoma.toml")),
 ];
-
-/// An image whose matrices are those of the policy.
-struct Exact<'a> {
-    image: Image<'a>,
-    /// Matrix of each linear operation, in order.
-    matrices: Vec<&'a WeightMatrix>,
-    arena: Vec<u32>,
-}
-
-impl Exact<'_> {
-    fn step(&mut self, raw: &[f32]) -> Result<Vec<f32>> {
-        let arena = &mut self.arena;
-        arena[self.image.observation().range()].copy_from_slice(&raw.iter().map(|x| x.to_bits()).collect::<Vec<_>>());
-        let mut matrices = self.matrices.iter();
-        for op in self.image.ops() {
-            let (OpKind::Linear { accumulate: false }, Some(packed)) = (op.kind, op.matrix()) else {
-                run_whole(&op, 0, arena)?;
-                continue;
-            };
-            let matrix = matrices.next().context("a linear operation without its matrix")?;
-            let x: Vec<f32> = arena[op.src().range()].iter().map(|word| f32::from_bits(*word)).collect();
-            for (row, weights) in matrix.data.chunks_exact(matrix.cols).enumerate() {
-                let sum: f32 = weights.iter().zip(&x).map(|(w, x)| w * x).sum();
-                arena[op.dst().offset + row] = (sum + packed.bias(row)).to_bits();
-            }
-        }
-        let output = arena[self.image.output().range()].iter().map(|word| f32::from_bits(*word)).enumerate();
-        let limited = |(i, x): (usize, f32)| self.image.limits(i).map_or(x, |[low, high]| x.clamp(low, high));
-        Ok(output.map(limited).collect())
-    }
-}
-
-impl<'a> Exact<'a> {
-    fn new(image: Image<'a>, graph: &'a Graph) -> Self {
-        let products = graph.nodes.iter().flat_map(|node| node.kind.products());
-        let matrices = products.map(|product| &graph.matrices[product.matrix]).collect();
-        Self { image, matrices, arena: vec![0; image.scratch_words()] }
-    }
-}
-
-/// Returns the image of a policy with what is around it, at 4 bits.
-pub(crate) fn four_bits(policy: &Policy) -> Result<Vec<u8>> {
-    let options = Options::new(Method::Rtn, Budget::Width(Width::W4));
-    Ok(quantize(policy, &Recordings::default(), &options, ())?.whole_image()?)
-}
 
 /// A published bundle: its plan, its compiled form and its reference. `None` without the shared folder.
 pub(crate) fn published(name: &str, answers: &str) -> Result<Option<(Plan, Deployment, Reference)>> {
@@ -98,20 +48,13 @@ pub(crate) fn published(name: &str, answers: &str) -> Result<Option<(Plan, Deplo
 
 /// Requires that an image gives targets to 1e-5 of the largest.
 fn gives(deployment: &Deployment, raw: &[Vec<Vec<f64>>], targets: &[f64]) -> Result<()> {
-    let policy = &deployment.policy;
-    let bytes = four_bits(policy)?;
-    let buffer = ImageBuffer::new(&bytes);
-    let mut exact = Exact::new(buffer.image(Path::new("new"))?, &policy.graph);
+    let bytes = deployment.four_bits()?;
+    let found = deployment.in_f32(&bytes, raw)?.concat();
     let largest = targets.iter().fold(0f64, |most, x| most.max(x.abs()));
-    let mut worst = 0f64;
-    let rows = targets.chunks(exact.image.act_len());
-    ensure!(rows.len() == raw.len() && deployment.columns.len() == policy.graph.obs_len);
-    for (raw, expected) in raw.iter().zip(rows) {
-        let raw: Vec<f32> = raw.iter().flatten().map(|x| *x as f32).collect();
-        for (found, expected) in exact.step(&raw)?.iter().zip(expected) {
-            worst = worst.max((f64::from(*found) - expected).abs() / largest);
-        }
-    }
+    ensure!(found.len() == targets.len() && deployment.columns.len() == deployment.policy.graph.obs_len);
+    let differences = found.iter().zip(targets).map(|(found, expected)| (f64::from(*found) - expected).abs());
+    let worst = differences.fold(0f64, f64::max) / largest;
+    let policy = &deployment.policy;
     println!("{}: {} bytes, largest difference {worst:.1e} of the largest target", policy.name, bytes.len());
     ensure!(worst < 1e-5, "{}: {worst}", policy.name);
     Ok(())
@@ -168,7 +111,7 @@ impl Compute for Networks {
     }
 
     fn part(&self, output: usize) -> Option<Part<'_>> {
-        self.outputs.get(output).map(|(policy, reads)| Part { policy, reads })
+        self.outputs.get(output).map(|(policy, reads)| Part { policy, inner: &policy.graph, reads })
     }
 
     fn reset(&mut self) {}
@@ -259,7 +202,7 @@ fn quaternions_far_from_unit_give_no_action() -> Result<()> {
     for order in ["xyzw", "wxyz"] {
         let description = MADE.replace("gravity = \"xyzw\"", &format!("gravity = \"{order}\""));
         let (plan, deployment) = Made::deployment_of(&description)?;
-        let bytes = four_bits(&deployment.policy)?;
+        let bytes = deployment.four_bits()?;
         let buffer = ImageBuffer::new(&bytes);
         let raw = Made::raw(10);
         let mut runner = Runner::new(plan);
@@ -316,15 +259,27 @@ fn self_tests_have_orientations_within_ranges() -> Result<()> {
             .replace(input, &format!("{input}\nrange = {range}"))
             .replace("{ gravity = \"xyzw\" }", &format!("{read}, {{ scale = {scale} }}, {{ gravity = \"xyzw\" }}"));
         ensure!(description.contains(range) && description.contains(read), "the fixture has changed");
-        let bytes = four_bits(&Made::deployment_of(&description)?.1.policy)?;
+        let bytes = Made::deployment_of(&description)?.1.four_bits()?;
         with_head(ImageBuffer::new(&bytes).image(Path::new("new"))?, |head| Ok::<_, anyhow::Error>(head.self_test()?))?;
     }
     Ok(())
 }
 
+/// `cargo xtask descriptions` compares 10,000 others.
+#[test]
+fn random_descriptions_agree_in_all_executions() -> Result<()> {
+    const SEEDS: std::ops::Range<u64> = 1_000_000..1_000_300;
+    let mut same = 0;
+    for seed in SEEDS {
+        same += usize::from(matches!(compare(seed)?, Compared::Same(..)));
+    }
+    ensure!(same >= 270, "{same} of {} have an image", SEEDS.count());
+    Ok(())
+}
+
 #[test]
 fn images_name_inputs_targets_and_joints() -> Result<()> {
-    let bytes = four_bits(&Made::deployment()?.1.policy)?;
+    let bytes = Made::deployment()?.1.four_bits()?;
     let buffer = ImageBuffer::new(&bytes);
     let found: Vec<_> = buffer.image(Path::new("new"))?.ports().map(|p| (p.kind, p.name, p.len, p.names)).collect();
     let expected = [
@@ -366,7 +321,7 @@ fn description_and_image_balance_the_robot() -> Result<()> {
         let inputs = runner.plan().split(raw);
         Ok(runner.step(&inputs)?.targets[0].1.iter().map(|x| *x as f32).collect())
     })?;
-    let bytes = four_bits(&Deployment::load(folder)?.policy)?;
+    let bytes = Deployment::load(folder)?.four_bits()?;
     let buffer = ImageBuffer::new(&bytes);
     let of_image = with_head(buffer.image(folder)?, |head| {
         balanced(EPISODES, |raw| {
@@ -383,7 +338,7 @@ fn description_and_image_balance_the_robot() -> Result<()> {
 
 #[test]
 fn sliced_and_restored_descriptions_have_the_same_bits() -> Result<()> {
-    let bytes = four_bits(&Made::deployment()?.1.policy)?;
+    let bytes = Made::deployment()?.1.four_bits()?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(Path::new("new"))?;
     let raw: Vec<Vec<f32>> = Made::raw(60).iter().map(|raw| raw.concat().iter().map(|x| *x as f32).collect()).collect();

@@ -6,10 +6,11 @@ use core::ops::Range;
 use crate::arena::{part, regions};
 use crate::error::Fault;
 use crate::image::{Around, Op, Region};
-use crate::math::{ORIENTATION, clamp};
+use crate::math::ORIENTATION;
 use crate::ops::elementwise::{copy, copy_le};
 
-/// Clips a value, all as bits. A value or a limit that is not finite gives NaN, so that an overflow stays visible.
+/// Raises a value to `low`, then lowers it to `high`, all as bits. A value or a limit that is not finite gives NaN, so
+/// that an overflow stays visible.
 #[inline(always)]
 fn clip(x: u32, low: u32, high: u32) -> u32 {
     const EXPONENT: u32 = 0x7f80_0000;
@@ -17,7 +18,8 @@ fn clip(x: u32, low: u32, high: u32) -> u32 {
     if is_overflow(x) || is_overflow(low) || is_overflow(high) {
         return f32::NAN.to_bits();
     }
-    clamp(f32::from_bits(x), f32::from_bits(low), f32::from_bits(high)).to_bits()
+    let raised = if f32::from_bits(x) < f32::from_bits(low) { low } else { x };
+    if f32::from_bits(raised) > f32::from_bits(high) { high } else { raised }
 }
 
 /// Returns `true` if a quaternion's length is near 1. Its squares are added from left to right. NaN is not near.

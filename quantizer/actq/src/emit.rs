@@ -5,4 +5,5 @@ mod raw_values;
 mod writer;
 
 pub use lower::{Program, lower};
+pub use raw_values::raw_values;
 pub use writer::{bytes_beside_blocks, image, image_around};

@@ -47,7 +47,8 @@ impl Deployment {
     ///
     /// # Errors
     ///
-    /// If a file is missing or damaged, or an image has no operations for a part of the description.
+    /// If a file is missing or damaged, if an image has no operations for a part of the description, or if an image
+    /// differs from it.
     pub fn load(path: &Path) -> Result<Self> {
         let shown = path.join(DESCRIPTION);
         let shown = || shown.display().to_string();
@@ -70,6 +71,7 @@ impl Deployment {
         }
         found.policy.digest = digest.finalize().into();
         found.policy.dir = path.to_owned();
+        found.verify_on_draws(plan).with_context(shown)?;
         Ok(found)
     }
 }

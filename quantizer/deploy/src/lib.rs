@@ -24,6 +24,7 @@ mod report;
 mod run;
 mod sources;
 mod text;
+mod verify;
 mod yaml;
 
 pub use bundle::Bundle;
@@ -37,5 +38,6 @@ pub use plan::Plan;
 pub use reading::{DESCRIPTION, Reading, read};
 pub use reference::{Comparison, Difference, Raw, Reference, TOLERANCE, explain};
 pub use report::Row;
-pub use run::{Runner, Tick};
+pub use run::{Noise, Runner, Tick};
 pub use sources::{Array, Compute, Part, Sources};
+pub use verify::ROUNDING;

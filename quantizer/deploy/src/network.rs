@@ -25,6 +25,8 @@ pub(crate) struct OnnxNetwork {
 #[derive(Clone, Debug)]
 struct Output {
     policy: Rc<Policy>,
+    /// The same with the contract in its graph.
+    inner: Rc<Policy>,
     weights: Rc<Weights>,
     state: State,
     /// Numbers of the file's inputs, in the order of its observation.
@@ -39,9 +41,15 @@ impl OnnxNetwork {
         let mut lens = vec![None; signature.inputs.len()];
         let (mut opened, mut kept) = (Vec::new(), Vec::new());
         for name in outputs {
-            let choice = Choice { output: Some(name.clone()), states: Vec::new(), is_fed: true };
-            let imported = import(path, &choice)?;
-            let policy = Policy::of_files(path, [path, path], &imported.json, &imported.weights)?;
+            let read = |is_inner| -> Result<_> {
+                let choice = Choice { output: Some(name.clone()), is_fed: true, is_inner, ..Choice::default() };
+                let imported = import(path, &choice)?;
+                let policy = Policy::of_files(path, [path, path], &imported.json, &imported.weights)?;
+                Ok((imported, Rc::new(policy)))
+            };
+            let (imported, policy) = read(false)?;
+            let has_contract = policy.contract.arrays().iter().any(|(_, array)| array.is_some());
+            let inner = if has_contract { read(true)?.1 } else { policy.clone() };
             let mut reads = Vec::new();
             for (input, len) in &imported.inputs {
                 let at = signature.inputs.iter().position(|(name, _)| name == input);
@@ -51,7 +59,7 @@ impl OnnxNetwork {
             }
             kept.extend(imported.states.into_iter().map(|(input, output, _)| (input, output)));
             let (weights, state) = (Weights::of(&policy.graph), zero_state(&policy.graph, 1));
-            opened.push(Output { policy: Rc::new(policy), weights: Rc::new(weights), state, reads });
+            opened.push(Output { policy, inner, weights: Rc::new(weights), state, reads });
         }
         // Inputs that no output depends on are left out, and the others move up.
         let used: Vec<usize> = (0..lens.len()).filter(|i| lens[*i].is_some()).collect();
@@ -81,7 +89,7 @@ impl Compute for OnnxNetwork {
 
     fn part(&self, output: usize) -> Option<Part<'_>> {
         let output = self.outputs.get(output)?;
-        Some(Part { policy: &output.policy, reads: &output.reads })
+        Some(Part { policy: &output.policy, inner: &output.inner.graph, reads: &output.reads })
     }
 
     fn reset(&mut self) {

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use actq::error::{Context as _, Result, bail, ensure};
+use actq::random::Random;
 use actq_kernels::math::ORIENTATION;
 
 use crate::clock::Phases;
@@ -31,6 +32,30 @@ pub struct Runner {
     clocks: Vec<Option<Phases>>,
     histories: Vec<Vec<Option<Frames>>>,
     tick: usize,
+    noise: Option<Noise>,
+    /// Largest value of each network's outputs, also in runs before a reset.
+    largest: Vec<Vec<f32>>,
+}
+
+/// Random errors of a run, to see what they grow to.
+#[derive(Clone, Debug)]
+pub struct Noise {
+    /// The generator of the errors.
+    pub random: Random,
+    /// Largest error of a value, as a share of it.
+    pub of_values: f64,
+    /// Largest error of a network's output, as a share of its largest value in all ticks so far.
+    pub of_outputs: f64,
+}
+
+impl Noise {
+    fn on_values(&mut self, values: &mut [f64]) {
+        values.iter_mut().for_each(|x| *x += *x * self.of_values * f64::from(self.random.unit()));
+    }
+
+    fn on_output(&mut self, output: &mut [f32], largest: f32) {
+        output.iter_mut().for_each(|x| *x += largest * self.of_outputs as f32 * self.random.unit());
+    }
 }
 
 impl Runner {
@@ -51,6 +76,8 @@ impl Runner {
             states: Vec::new(),
             outputs: Vec::new(),
             tick: 0,
+            noise: None,
+            largest: plan.networks.iter().map(|network| vec![0.0; network.compute.outputs().len()]).collect(),
             plan,
         };
         runner.reset();
@@ -60,6 +87,12 @@ impl Runner {
     /// Returns its plan.
     pub fn plan(&self) -> &Plan {
         &self.plan
+    }
+
+    /// Returns to the state of the start, and runs with these errors from there on.
+    pub fn reset_with(&mut self, noise: Option<Noise>) {
+        self.noise = noise;
+        self.reset();
     }
 
     /// Returns to the state of the start.
@@ -109,6 +142,9 @@ impl Runner {
             match self.plan.order[i] {
                 TickStep::Value(index) => {
                     self.values[index] = self.make(index, raw)?;
+                    if let Some(noise) = &mut self.noise {
+                        noise.on_values(&mut self.values[index]);
+                    }
                     if index == self.plan.action {
                         action.clone_from(&self.values[index]);
                         if let Some(recorded) = recorded {
@@ -175,6 +211,12 @@ impl Runner {
         };
         let inputs: Vec<Vec<f32>> = network.feeds.iter().map(of).collect();
         self.outputs[index] = network.compute.step(&inputs);
+        for (output, largest) in self.outputs[index].iter_mut().zip(&mut self.largest[index]) {
+            *largest = output.iter().fold(*largest, |most, x| most.max(x.abs()));
+            if let Some(noise) = &mut self.noise {
+                noise.on_output(output, *largest);
+            }
+        }
         inputs.into_iter().flatten().map(f64::from).collect()
     }
 }
@@ -206,8 +248,8 @@ fn apply(step: &ValueOp, mut value: Vec<f64>, values: &[Vec<f64>]) -> Result<Vec
         ValueOp::Scale(arg) => with(arg, |x, y| x * y),
         ValueOp::Divide(arg) => with(arg, |x, y| x / y),
         ValueOp::Clip([low, high]) => {
-            with(high, |x, y| if x > y { y } else { x });
             with(low, |x, y| if x < y { y } else { x });
+            with(high, |x, y| if x > y { y } else { x });
         }
         ValueOp::Wrap => value.iter_mut().for_each(|x| *x = (*x + PI).rem_euclid(2.0 * PI) - PI),
         ValueOp::Sin => value.iter_mut().for_each(|x| *x = x.sin()),

@@ -1,6 +1,7 @@
 //! The files of a description: networks and arrays.
 
 use actq::error::{Context as _, Result};
+use actq::graph::Graph;
 use actq::import::values::Tensor;
 use actq::policy::Policy;
 
@@ -37,6 +38,8 @@ pub trait Compute {
 pub struct Part<'a> {
     /// Its graph, and a contract of scales, offsets and limits after it.
     pub policy: &'a Policy,
+    /// The graph with that contract as its last operations, for another network that reads the output.
+    pub inner: &'a Graph,
     /// Numbers of the inputs that make its observation, one after the other.
     pub reads: &'a [usize],
 }

@@ -133,9 +133,10 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
         refuse_batch(model, &observed, &output.value.shape)?;
         actions(&output.value.shape, values)?
     };
-    let (root, contract) = action::contract(&exprs, root, act_len);
+    let (root, contract) = if choice.is_inner { (root, None) } else { action::contract(&exprs, root, act_len) };
     let last = contract.iter().flat_map(keys).collect();
-    let (contract, bounded) = action::bounded(&exprs, root, contract, act_len);
+    let (contract, bounded) =
+        if choice.is_inner { (None, 0) } else { action::bounded(&exprs, root, contract, act_len) };
     let root = simplify(&mut exprs, root, &cells.instead);
     let lowered = lower(&exprs, root, &observation.offsets, observation.len)
         .map_err(|(id, error)| at_node(model, &exprs, id, error))?;

@@ -135,7 +135,7 @@ pub(crate) fn import_path(
     #[pyo3(from_py_with = given)] answers: String,
 ) -> PyResult<Policy> {
     py.detach(|| {
-        let choice = Choice { output, states, is_fed: false };
+        let choice = Choice { output, states, ..Choice::default() };
         let is_answered = accept_profile || !answers.is_empty();
         let refuse_answers = || error!("{}: only a deploy bundle takes accept_profile and answers", path.display());
         if Onnx.accepts(&path) {
@@ -195,7 +195,7 @@ pub(crate) fn import_onnx<'py>(
     #[pyo3(from_py_with = given)] states: Vec<(String, String)>,
 ) -> PyResult<(Policy, Bound<'py, PyDict>)> {
     let (imported, policy, probes, actions) = py.detach(|| {
-        let choice = Choice { output, states, is_fed: false };
+        let choice = Choice { output, states, ..Choice::default() };
         let imported = import_bytes(bytes, Path::new(""), &name, &choice).map_err(|error| error.context(name.clone()));
         let imported = imported.map_err(raise)?;
         let names = [Path::new(&name); 2];

@@ -70,7 +70,7 @@ pub(crate) struct DeployArgs {
     /// policy learns from RAW.npz
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) recordings: Vec<PathBuf>,
-    /// Fail if a target's NMSE over the reference is above this number
+    /// Fail if a target's NMSE over the reference is above this number, 0.1 if it is not given
     #[arg(long, value_name = "NMSE", value_parser = positive, requires = "reference")]
     pub(crate) max_nmse: Option<f64>,
     #[command(flatten)]
@@ -88,7 +88,7 @@ pub(crate) struct CheckArgs {
     /// The raw inputs, and what the deploy code makes of them
     #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]
     pub(crate) reference: (PathBuf, PathBuf),
-    /// Fail if a target's NMSE is above this number
+    /// Fail if a target's NMSE is above this number, 0.1 if it is not given
     #[arg(long, value_name = "NMSE", value_parser = positive)]
     pub(crate) max_nmse: Option<f64>,
 }

@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 use actq::data::NpzWriter;
 use actq::text::count;
 use actq_deploy::description::Description;
-use actq_deploy::{Answers, Bundle, DESCRIPTION, Deployment, Plan, Raw, Reading, Reference, explain, orders, read};
+use actq_deploy::{
+    Answers, Bundle, DESCRIPTION, Deployment, Plan, Raw, Reading, Reference, Runner, explain, orders, read,
+};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::import::refuse_existing;
@@ -125,7 +127,7 @@ pub fn refuse_open_questions(reading: &Reading) -> Result<()> {
     )
 }
 
-/// Compares with the reference; an error names the first difference, and the conventions that explain it.
+/// Compares the description, and an image of it, with the reference; an error names the first difference, and the conventions that explain it.
 fn compare(description: &Description, plan: Plan, bundle: &Bundle, reference: &Reference) -> Result<String> {
     let unused: Vec<String> = reference.raw().unused(&plan).map(str::to_owned).collect();
     let comparison = reference.compare(description, bundle)?;
@@ -137,6 +139,14 @@ fn compare(description: &Description, plan: Plan, bundle: &Bundle, reference: &R
         };
         let reasons = if reasons.is_empty() { "no single known convention explains it".to_owned() } else { reasons };
         bail!("the reference differs at {first}; {reasons}. Nothing was written");
+    }
+    let plan = Plan::new(description, bundle).context(DESCRIPTION)?;
+    match Deployment::new(&description.name, description.rate_hz as f32, &plan) {
+        Ok(deployment) => {
+            let raw = reference.raw().frames(plan.inputs())?;
+            deployment.verify(&mut Runner::new(plan), &raw).context(DESCRIPTION)?;
+        }
+        Err(error) => note([format!("no image can be made of the description: {error:#}")]),
     }
     if !unused.is_empty() {
         note([format!("no input has the name of these raw arrays of the reference: {}", unused.join(", "))]);

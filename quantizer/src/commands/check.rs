@@ -5,11 +5,11 @@ use actq::runtime::{ImageBuffer, with_head};
 use actq::text::count;
 use actq_deploy::{Array, Reference};
 use actq_kernels::{Image, Port, PortKind};
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::args::CheckArgs;
 use crate::report::deployment::{Target, targets};
-use crate::report::notes::useless;
+use crate::report::notes::{USELESS, useless};
 use crate::terminal::{note, print};
 
 /// Runs an image on the raw inputs of a reference, and compares its targets with the expected ones.
@@ -60,10 +60,14 @@ pub(crate) fn run(args: &CheckArgs) -> Result<()> {
         .collect();
     print(&targets(&found, frames.len()))?;
     let worst = found.iter().map(|target| target.nmse).fold(0.0, f64::max);
-    note(useless(worst));
-    if let Some(limit) = args.max_nmse {
-        ensure!(worst <= limit, "{shown}: the targets' NMSE is {worst:.3e}, above {limit:e}; quantize at more bits");
+    let limit = args.max_nmse.unwrap_or(USELESS);
+    let warning = useless(worst);
+    if found.iter().any(|target| target.nmse.is_nan() || target.nmse > limit) {
+        let hint = ", or compare the description by actq import --reference: ";
+        let warning = warning.map_or(String::new(), |warning| format!("{hint}{warning}"));
+        bail!("{shown}: the targets' NMSE is {worst:.3e}, above {limit:e}; quantize at more bits{warning}");
     }
+    note(warning);
     Ok(())
 }
 

@@ -16,7 +16,7 @@ use crate::terminal::{note, print, reserve};
 
 /// Converts an ONNX file to a policy folder and prints a summary.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
-    let choice = Choice { output: args.output.clone(), states: args.state.clone(), is_fed: false };
+    let choice = Choice { output: args.output.clone(), states: args.state.clone(), ..Choice::default() };
     let imported = import(&args.model, &choice)?;
     let [json, weights] = FILES.map(|name| args.out.join(name));
     let policy = Policy::of_files(&args.out, [&args.model, &args.model], &imported.json, &imported.weights)?;

@@ -20,8 +20,8 @@ const OVERFIT_DIFFERENCE: f64 = 0.002;
 /// Frames of a recording of which some can be held out, in quarters of the fewest to learn from.
 const HELD_OUT_FROM: usize = 5;
 
-/// Error (NMSE) above which there is a warning not to use the image.
-const USELESS: f64 = 0.1;
+/// Error (NMSE) above which an image is not to be used.
+pub(crate) const USELESS: f64 = 0.1;
 
 /// Formats the share of the error that comes from rounding the activations, and the activations' types.
 pub fn activation_share(of: &ActivationShare) -> String {

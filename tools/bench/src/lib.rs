@@ -1,5 +1,5 @@
 //! Code shared by tests and measuring commands: building firmware and running it under QEMU, counted instructions and
-//! modelled cycles, the maximum stack of the application, golden kernel cases, random networks, the command `actq`,
+//! modelled cycles, the maximum stack of the application, golden kernel cases, random networks and descriptions, the command `actq`,
 //! closed loops.
 #![forbid(unsafe_code)]
 
@@ -8,6 +8,7 @@ pub mod closed_loop;
 pub mod command;
 pub mod controller;
 pub mod cycles;
+pub mod descriptions;
 pub mod evaluation;
 pub mod firmware;
 pub mod golden;

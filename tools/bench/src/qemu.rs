@@ -5,12 +5,14 @@ use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio};
 
+use actq::runtime::{ImageBuffer, with_head};
 use actq_boards::{Target, target_dir, version};
 use actq_link::{RESET, STEP};
 use anyhow::{Context, Result, bail, ensure};
 use tempfile::NamedTempFile;
 
-use crate::firmware::{cargo_build, symbol};
+use crate::bits;
+use crate::firmware::{cargo_build, harness, symbol};
 
 /// Returns QEMU's command for `elf`, an image in the slot if one is given, and arguments of the firmware.
 pub fn command(elf: &Path, slot: Option<&Path>, arguments: &str) -> Result<Command> {
@@ -114,6 +116,30 @@ impl Server {
         ensure!(status.success(), "the firmware failed: {status}");
         Ok(())
     }
+}
+
+/// Runs an image from the slot on observations, in QEMU and on the host, with a reset in the middle; every action must
+/// have the same bits.
+pub fn same_bits(target: Target, bytes: &[u8], observations: &[Vec<f32>]) -> Result<()> {
+    let elf = harness(target)?;
+    let slot = slot(bytes)?;
+    let buffer = ImageBuffer::new(bytes);
+    let image = buffer.image(slot.path())?;
+    let mut server = Server::start(command_on(target, &elf, Some(slot.path()), "serve")?, image.act_len())?;
+    with_head(image, |head| {
+        for (step, observation) in observations.iter().enumerate() {
+            if step == observations.len() / 2 {
+                head.reset();
+                server.reset()?;
+            }
+            let expected = head.step(observation)?;
+            let action = server.step(observation)?;
+            let same = bits(&action) == bits(expected);
+            ensure!(same, "{}, step {step}: {action:?} in QEMU, {expected:?} on the host", image.name());
+        }
+        Ok(())
+    })?;
+    server.finish()
 }
 
 /// The profile of the plugin (see `Cargo.toml`).

@@ -4,6 +4,7 @@
 
 mod line;
 mod nor;
+pub mod onnx;
 mod power;
 mod random;
 #[cfg(feature = "tensors")]

@@ -29,6 +29,8 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   bench    Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
   budgets  Measure instructions, code, scratch and stack, and compare them with budgets.json
   compare  Compare the quantizer's methods: held-out error, true bits, closed-loop success
+  descriptions
+           Compare the executions of random descriptions: in f64, as images in f32 and at 8 bits, in QEMU
   firmware Build the motor controller for a board: --board NAME [--image F.actq] --out FILE.elf; --list shows the boards
   faults   Drive an arm through the serial port of the controller in QEMU, with faults on the line
   stack    Compute the maximum stack of the controller from the calls in its ELF file: --board NAME, or --elf FILE
@@ -38,7 +40,7 @@ Commands of the actq workspace. Usage: cargo xtask COMMAND
   python   Build and test the Python package in a virtual environment; --optional with torch
   doctor   Check and install the other commands' requirements: Rust targets and QEMU
 
-demo, verify, bench, budgets, capi, compare, faults, fit, firmware, python and stack show their options with --help.";
+demo, verify, bench, budgets, capi, compare, descriptions, faults, fit, firmware, python and stack show their options with --help.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -52,7 +54,7 @@ fn main() -> ExitCode {
         ["compare", ..] => Ok(measuring("actq-research", &words)),
         ["capi", ..] => Ok(measure_for(Target::ALL.iter().copied(), &words)),
         ["stack", ..] => Ok(measure_for(firmware::boards().map(|(target, _)| target), &words)),
-        ["demo" | "bench" | "faults" | "fit", ..] => Ok(measure(&words, &[Target::Fpu])),
+        ["demo" | "bench" | "descriptions" | "faults" | "fit", ..] => Ok(measure(&words, &[Target::Fpu])),
         ["budgets", ..] => Ok(measure(&words, &[Target::Fpu, Target::M33])),
         ["help" | "-h" | "--help"] => {
             println!("{USAGE}");

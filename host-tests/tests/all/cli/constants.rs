@@ -9,7 +9,7 @@ use anyhow::{Result, ensure};
 use tempfile::TempDir;
 
 use super::fixture::text;
-use crate::deployed::{Made, four_bits};
+use crate::deployed::Made;
 
 /// Gains of a description whose network is never opened.
 const GAINS: &str = r#"
@@ -36,7 +36,7 @@ fn compiled_constants_index_inputs_targets_and_joints() -> Result<()> {
     let dir = TempDir::new()?;
     let path = |name: &str| dir.path().join(name);
     let written = |name: &str| text(&path(name));
-    fs::write(path("made.actq"), four_bits(&Made::deployment()?.1.policy)?)?;
+    fs::write(path("made.actq"), Made::deployment()?.1.four_bits()?)?;
     fs::write(path("deploy.toml"), GAINS)?;
     for name in ["walker 2.h", "made.rs"] {
         let (image, out, gains) = (written("made.actq"), written(name), written("deploy.toml"));
@@ -95,7 +95,7 @@ pub(super) fn has_compiler(file: &Path, standard: &str) -> Result<bool> {
 fn constants_need_a_language_and_gains() -> Result<()> {
     let dir = TempDir::new()?;
     let path = |name: &str| text(&dir.path().join(name));
-    fs::write(dir.path().join("made.actq"), four_bits(&Made::deployment()?.1.policy)?)?;
+    fs::write(dir.path().join("made.actq"), Made::deployment()?.1.four_bits()?)?;
     fs::write(dir.path().join("deploy.toml"), GAINS.replace("gains = {", "constants = {} # {"))?;
     for (out, gains, message) in [
         ("made.py", None, "ends in .rs for Rust, or in .h"),

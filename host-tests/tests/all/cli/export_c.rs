@@ -13,7 +13,7 @@ use tempfile::TempDir;
 
 use super::constants::{STRICT, compiles, has_compiler};
 use super::fixture::text;
-use crate::deployed::{Made, four_bits};
+use crate::deployed::Made;
 use crate::folder::write_observations;
 
 /// Uses all that the files declare.
@@ -34,7 +34,7 @@ fn numbers(source: &str, array: &str) -> Vec<u32> {
 fn exported_sources_have_the_hosts_image_and_actions() -> Result<()> {
     let dir = TempDir::new()?;
     let at = |name: &str| dir.path().join(name);
-    let bytes = four_bits(&Made::deployment()?.1.policy)?;
+    let bytes = Made::deployment()?.1.four_bits()?;
     fs::write(at("made.actq"), &bytes)?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(&at("made.actq"))?;
@@ -87,7 +87,7 @@ fn exported_sources_have_the_hosts_image_and_actions() -> Result<()> {
 fn invalid_names_and_images_are_refused() -> Result<()> {
     let dir = TempDir::new()?;
     let at = |name: &str| text(&dir.path().join(name));
-    fs::write(dir.path().join("made.actq"), four_bits(&Made::deployment()?.1.policy)?)?;
+    fs::write(dir.path().join("made.actq"), Made::deployment()?.1.four_bits()?)?;
     fs::write(dir.path().join("text.actq"), "no image")?;
     let [image, none, out] = ["made.actq", "text.actq", "out"].map(at);
     for (image, name, message) in [

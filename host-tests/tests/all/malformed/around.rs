@@ -5,7 +5,7 @@ use actq_kernels::image::{header as h, op};
 use anyhow::Result;
 
 use super::draft::{Case, NAN, refused_of};
-use crate::deployed::{Made, four_bits};
+use crate::deployed::Made;
 use crate::draft::Draft;
 
 /// Returns the position of the ports: after the self-test.
@@ -86,6 +86,6 @@ fn impossible_operations_around_a_network_are_refused() -> Result<()> {
             d.set(text, u32::from_le_bytes(*b"a\n\x07\n"));
         }),
     ];
-    refused_of(&Draft::of(&four_bits(&Made::deployment()?.1.policy)?), cases);
+    refused_of(&Draft::of(&Made::deployment()?.1.four_bits()?), cases);
     Ok(())
 }

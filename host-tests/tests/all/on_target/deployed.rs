@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use actq::runtime::ImageBuffer;
-use actq_bench::qemu::Counter;
+use actq_bench::descriptions::{Compared, compare};
+use actq_bench::qemu::{Counter, same_bits};
 use actq_bench::{Target, firmware, profile};
 use anyhow::{Context as _, Result, ensure};
 
-use super::qemu::same_bits;
-use crate::deployed::{Made, PUBLISHED, four_bits, published};
+use crate::deployed::{Made, PUBLISHED, published};
 
 /// Ticks on the host and in QEMU.
 const TICKS: usize = 1000;
@@ -20,7 +20,7 @@ fn single(raw: &[Vec<Vec<f64>>]) -> Vec<Vec<f32>> {
 
 #[test]
 fn every_operation_has_the_bits_of_the_host() -> Result<()> {
-    let image = four_bits(&Made::deployment()?.1.policy)?;
+    let image = Made::deployment()?.1.four_bits()?;
     let raw = single(&Made::raw(TICKS));
     [Target::Fpu, Target::NoFpu, Target::M33, Target::M7]
         .into_iter()
@@ -28,11 +28,21 @@ fn every_operation_has_the_bits_of_the_host() -> Result<()> {
 }
 
 #[test]
+fn random_descriptions_have_the_bits_of_the_host() -> Result<()> {
+    for seed in 2_000_000..2_000_012 {
+        if let Compared::Same(image, raw) = compare(seed)? {
+            same_bits(Target::Fpu, &image, &raw).with_context(|| format!("seed {seed}"))?;
+        }
+    }
+    Ok(())
+}
+
+#[test]
 fn published_bundles_have_the_bits_of_the_host() -> Result<()> {
     for (name, answers) in PUBLISHED {
         let Some((plan, deployment, reference)) = published(name, answers)? else { return Ok(()) };
         let raw = single(&reference.raw().frames(plan.inputs())?);
-        same_bits(Target::Fpu, &four_bits(&deployment.policy)?, &raw)?;
+        same_bits(Target::Fpu, &deployment.four_bits()?, &raw)?;
         println!("{name}: {TICKS} ticks at 4 bits have the host's bits");
     }
     Ok(())
@@ -41,7 +51,7 @@ fn published_bundles_have_the_bits_of_the_host() -> Result<()> {
 /// The cost model knows the operations around a network: whole steps, and polls of the least budget.
 #[test]
 fn steps_and_polls_match_the_prediction() -> Result<()> {
-    let bytes = four_bits(&Made::deployment()?.1.policy)?;
+    let bytes = Made::deployment()?.1.four_bits()?;
     let raw = &single(&Made::raw(24))[..24];
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(Path::new("made"))?;

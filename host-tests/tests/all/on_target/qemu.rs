@@ -7,11 +7,12 @@ use std::process::Output;
 use actq::data::{Recording, Sizes};
 use actq::methods::Activations;
 use actq::policy::Policy;
-use actq::runtime::{ImageBuffer, with_head};
+use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
 use actq_bench::firmware::{self, built_in};
-use actq_bench::qemu::{self, Server};
-use actq_bench::{Target, bits, golden, rtn, shared_policies, ur3};
+use actq_bench::qemu;
+pub(crate) use actq_bench::qemu::same_bits;
+use actq_bench::{Target, golden, rtn, shared_policies, ur3};
 use actq_kernels::Width;
 use actq_kernels::image::{op, worst_case};
 use anyhow::{Context, Result, ensure};
@@ -150,30 +151,6 @@ pub(crate) fn recorded(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
     let observations: Vec<Vec<f32>> = (0..dataset.length.len()).flat_map(|e| dataset.episode(e)).take(STEPS).collect();
     ensure!(observations.len() == STEPS, "too few recorded observations");
     Ok(observations)
-}
-
-/// Runs an image from the slot on observations, in QEMU and on the host, with a reset in the middle; every action must
-/// have the same bits.
-pub(crate) fn same_bits(target: Target, bytes: &[u8], observations: &[Vec<f32>]) -> Result<()> {
-    let elf = firmware::harness(target)?;
-    let slot = qemu::slot(bytes)?;
-    let buffer = ImageBuffer::new(bytes);
-    let image = buffer.image(slot.path())?;
-    let mut server = Server::start(qemu::command_on(target, &elf, Some(slot.path()), "serve")?, image.act_len())?;
-    with_head(image, |head| {
-        for (step, observation) in observations.iter().enumerate() {
-            if step == observations.len() / 2 {
-                head.reset();
-                server.reset()?;
-            }
-            let expected = head.step(observation)?;
-            let action = server.step(observation)?;
-            let same = bits(&action) == bits(expected);
-            ensure!(same, "{}, step {step}: {action:?} in QEMU, {expected:?} on the host", image.name());
-        }
-        Ok(())
-    })?;
-    server.finish()
 }
 
 /// All widths with int8 and int16 activations; the build without FPU, which is slower, and the other cores run one

@@ -65,7 +65,6 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
             return Arena { lowering, kept_len, work_len }.assign(OBSERVATION, 0, action, act_len);
         }
         let output = lowering.private(graph.output());
-        lowering.buffers[output].lifetime = Lifetime::Output;
         let output = lowering.whole(output);
         return Arena { lowering, kept_len, work_len }.assign(OBSERVATION, 0, output, act_len);
     };
@@ -127,14 +126,16 @@ struct Placement {
 }
 
 impl Arena {
-    /// Assigns every buffer its offset.
+    /// Assigns every buffer its offset. What is in `output` is read after the last operation, and by later steps of a
+    /// chunk.
     fn assign(
-        self,
+        mut self,
         observation: BufferId,
         first_denoising_op: usize,
         output: Slice,
         act_len: usize,
     ) -> Result<Program> {
+        self.lowering.buffers[output.buffer].lifetime = Lifetime::Output;
         let Lowering { steps, buffers, .. } = &self.lowering;
         let Placement { offsets, state_len, end } = self.place();
         let action = Region { offset: end, len: act_len };

@@ -18,15 +18,18 @@ struct Read {
     offset: f32,
 }
 
-/// Draws the raw values of some steps, from a fixed generator: from -1 to 1, or as near as their range allows.
-pub(super) fn raw_values(around: &Around, steps: usize) -> Vec<Vec<f32>> {
+/// Draws the raw values of some steps: from -1 to 1, or as near as their range allows. From the tenth on, all but
+/// quaternions are 0 in every fifth step if `has_zeros`, or the nearest in their range.
+pub fn raw_values(around: &Around, random: &mut Random, steps: usize, has_zeros: bool) -> Vec<Vec<f32>> {
     let inputs = around.ports.iter().filter(|port| port.kind == PortKind::Input);
     let mut ranges: Vec<[f32; 2]> = inputs.flat_map(|port| vec![port.range; port.len]).collect();
     ranges.resize(around.raw_len(), [f32::NEG_INFINITY, f32::INFINITY]);
     let quaternions = quaternions(around);
-    let mut random = Random::new(0);
-    let draw = |_| {
+    let draw = |step: usize| {
         let mut values: Vec<f32> = ranges.iter().map(|range| within(*range, random.unit())).collect();
+        if has_zeros && step >= 10 && step.is_multiple_of(5) {
+            values.iter_mut().zip(&ranges).for_each(|(value, [low, high])| *value = 0f32.max(*low).min(*high));
+        }
         for quaternion in &quaternions {
             for _ in 0..ATTEMPTS {
                 let q = [0; 4].map(|_| random.unit());

@@ -170,7 +170,7 @@ impl Writer {
         let name = self.push_bytes(policy.name.as_bytes());
         let steps = self_test_steps(policy, program.state.len, obs_len);
         let observations = match around {
-            Some(around) => raw_values(around, steps),
+            Some(around) => raw_values(around, &mut Random::new(0), steps, false),
             None => self_test_observations(&policy.graph, steps),
         };
         let self_test = self.words.len() as u32;

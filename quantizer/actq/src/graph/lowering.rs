@@ -60,13 +60,20 @@ pub struct Slice {
     pub len: usize,
 }
 
+impl Slice {
+    /// Returns `true` if both have a value in common.
+    pub fn overlaps(self, other: Self) -> bool {
+        self.buffer == other.buffer && self.offset < other.offset + other.len && other.offset < self.offset + self.len
+    }
+}
+
 /// Lifetime of a buffer's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lifetime {
     /// From the first to the last operation that names it.
     Step,
-    /// From the first operation that names it on: the output, a chunk of which plays over several steps, and values
-    /// that every denoising step reads.
+    /// From the first operation that names it to the end of the step, and on: the output, a chunk of which plays over
+    /// several steps, and values that every denoising step reads.
     Output,
     /// At an offset of its own; written before the first operation.
     Observation,

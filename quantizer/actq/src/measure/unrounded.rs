@@ -5,7 +5,8 @@ use actq_kernels::image::{Matrix, Op, OpKind};
 use actq_kernels::ops::run_whole;
 use ndarray::{Array2, ArrayView1};
 
-use crate::error::Result;
+use crate::error::{Context as _, Result};
+use crate::graph::Graph;
 
 /// Executor of an image with linear operations in f32.
 pub struct Unrounded<'a> {
@@ -22,6 +23,26 @@ impl<'a> Unrounded<'a> {
         let ops: Vec<Op<'a>> = image.ops().collect();
         let weights = ops.iter().map(|op| op.matrix().map_or(Array2::default((0, 0)), |matrix| dequantized(&matrix)));
         Self { image, weights: weights.collect(), ops, arena: vec![0; image.scratch_words()] }
+    }
+
+    /// Takes the weights of the graph that the image was made of, as they were before they were quantized.
+    ///
+    /// # Errors
+    ///
+    /// If the image has other matrices.
+    pub fn with_weights(image: Image<'a>, graph: &Graph) -> Result<Self> {
+        let mut unrounded = Self::new(image);
+        let mut products = graph.nodes.iter().flat_map(|node| node.kind.products());
+        for (op, weights) in unrounded.ops.iter().zip(&mut unrounded.weights) {
+            if op.matrix().is_none() {
+                continue;
+            }
+            let matrix = products.next().map(|product| &graph.matrices[product.matrix]);
+            let matrix = matrix.filter(|matrix| weights.dim() == (matrix.rows, matrix.cols));
+            let matrix = matrix.context("an operation has the matrix of another graph")?;
+            weights.iter_mut().zip(&matrix.data).for_each(|(to, weight)| *to = *weight);
+        }
+        Ok(unrounded)
     }
 
     /// Returns the recurrent state.
@@ -87,7 +108,7 @@ mod tests {
     use crate::budget::{Budget, Rate};
     use crate::emit;
     use crate::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Normalize, Pointwise, RmsNorm, Span};
-    use crate::graph::{Evaluator, Graph, NodeKind, WeightMatrix};
+    use crate::graph::{Evaluator, NodeKind, WeightMatrix};
     use crate::methods::{Activations, Method, Options, Outcome, quantize};
     use crate::policy::Policy;
     use crate::random::Random;

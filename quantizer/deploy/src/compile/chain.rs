@@ -169,7 +169,9 @@ impl Chain {
     /// Subtracts numbers.
     fn shift(&mut self, to: &mut Operations, numbers: &[f64]) {
         let numbers = each(numbers, self.len());
-        if self.affine.as_ref().is_some_and(|affine| affine.scale.contains(&0.0)) {
+        // A mean beyond f32, as that of a scale of 0, is no mean.
+        let is_mean = |(scale, number): (&f64, &f64)| (number / scale).abs() < 1e30;
+        if self.affine.as_ref().is_some_and(|affine| !affine.scale.iter().zip(&numbers).all(is_mean)) {
             self.flush(to);
         }
         let Affine { mean, scale } = self.affine();
@@ -197,6 +199,8 @@ impl Chain {
             Arg::Numbers(numbers) => to.constant(&single(&each(numbers, len))),
             Arg::Value(_) => operands.next().unwrap_or(self.value),
         });
+        // An operation takes no two operands of the same memory.
+        let high = if low.overlaps(high) { to.writable_copy(high) } else { high };
         let value = self.make_writable(to);
         to.emit(OpKind::Clip, value, Some(low), Some(high), StepData::None);
     }

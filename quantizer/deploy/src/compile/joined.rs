@@ -5,7 +5,7 @@ use actq::graph::ops::{Concat, Span};
 use actq::graph::{Graph, ValueId};
 use actq_kernels::Kind;
 
-use crate::plan::{Feed, Plan, TickStep, ValueIndex, ValueOp, ValueSource};
+use crate::plan::{Feed, Plan, Planned, TickStep, ValueIndex, ValueOp, ValueSource};
 use crate::sources::Part;
 
 /// An output: its network, and its number there.
@@ -43,10 +43,14 @@ pub(super) struct Joined {
 
 /// Returns the part that computes an output.
 pub(super) fn part(plan: &Plan, (network, output): Output) -> Result<Part<'_>> {
-    let part = plan.networks[network].compute.part(output).context("a network of this kind cannot become an image")?;
+    let is_own = |value: &Planned| matches!(value.source, ValueSource::Output(n, o) if (n, o) == (network, output));
+    let name = || plan.values.iter().position(is_own).map_or("", |index| &plan.names[index]);
+    let part = plan.networks[network].compute.part(output);
+    let part = part.with_context(|| format!("value {:?}: a network of this kind cannot become an image", name()))?;
     ensure!(
         part.policy.kind == Kind::Step,
-        "a network that gives an action chunk cannot have operations around it yet"
+        "value {:?}: a network that gives an action chunk cannot have operations around it yet",
+        name()
     );
     Ok(part)
 }
@@ -89,7 +93,7 @@ impl Joined {
         let mut graph = Graph::new(len);
         let mut ids = Vec::new();
         for output in &outputs {
-            ids.push(builder.append(&mut graph, *output)?);
+            ids.push(builder.append(&mut graph, *output, false)?);
         }
         let (mut spans, mut parts, mut from) = (Vec::new(), Vec::<(ValueId, Span)>::new(), 0);
         for (output, id) in outputs.iter().zip(ids) {
@@ -139,7 +143,8 @@ struct Builder<'a> {
     plan: &'a Plan,
     depends: Vec<bool>,
     observation: Vec<Source>,
-    values: Vec<(Output, ValueId)>,
+    /// Values of outputs, `true` with their contracts.
+    values: Vec<((Output, bool), ValueId)>,
 }
 
 impl Builder<'_> {
@@ -201,8 +206,8 @@ impl Builder<'_> {
                 Ok(parts.concat())
             }
             _ => bail!(
-                "{:?} lies between two networks; an image can only put outputs and values one after the other there",
-                self.plan.values[index].labels.first().map_or_else(String::new, |label| label.to_string())
+                "value {:?} lies between two networks; an image can only put outputs and values one after the other there",
+                self.plan.names[index]
             ),
         }
     }
@@ -250,9 +255,10 @@ impl Builder<'_> {
         (0, Span { from: before.map(|other| other.len(self.plan)).sum(), len: source.len(self.plan) })
     }
 
-    /// Appends the network of an output, after those that it reads; returns the output's value.
-    fn append(&mut self, graph: &mut Graph, output: Output) -> Result<ValueId> {
-        if let Some((_, value)) = self.values.iter().find(|(known, _)| *known == output) {
+    /// Appends the network of an output, after those that it reads; returns the output's value, with its contract if
+    /// another network reads it.
+    fn append(&mut self, graph: &mut Graph, output: Output, is_inner: bool) -> Result<ValueId> {
+        if let Some((_, value)) = self.values.iter().find(|(known, _)| *known == (output, is_inner)) {
             return Ok(*value);
         }
         let mut parts = Vec::new();
@@ -260,22 +266,15 @@ impl Builder<'_> {
             parts.push(match self.inner(source) {
                 None => self.span(source),
                 Some(inner) => {
-                    let contract = &part(self.plan, inner)?.policy.contract;
-                    ensure!(
-                        contract.arrays().iter().all(|(_, array)| array.is_none()),
-                        "output {} of network {} ends with a scale or a limit before another network; \
-                         this is not supported",
-                        inner.1,
-                        inner.0
-                    );
-                    let value = self.append(graph, inner)?;
+                    let value = self.append(graph, inner, true)?;
                     (value, Span { from: 0, len: graph.len_of(value) })
                 }
             });
         }
         let input = graph.join(merged(parts))?;
-        let value = graph.append(&part(self.plan, output)?.policy.graph, input)?;
-        self.values.push((output, value));
+        let part = part(self.plan, output)?;
+        let value = graph.append(if is_inner { part.inner } else { &part.policy.graph }, input)?;
+        self.values.push(((output, is_inner), value));
         Ok(value)
     }
 }

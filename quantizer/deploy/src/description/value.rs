@@ -65,7 +65,7 @@ pub enum Op {
     Scale(Operand),
     /// Divides.
     Divide(Operand),
-    /// Limits to the first and the second operand.
+    /// Raises to the first operand, then lowers to the second, as `numpy.clip`.
     Clip([Operand; 2]),
     /// Wraps angles in rad to the interval from -pi to below pi.
     Wrap,

@@ -156,8 +156,9 @@ impl Builder<'_> {
         let joints = order.map_or(Ok(Vec::new()), |order| self.joints(order, &key).map(<[_]>::to_vec))?;
         let limits = target.limits.as_ref().map(|limits| -> Result<[Vec<f64>; 2]> {
             let [low, high] = [numbers::each(&limits[0], len)?, numbers::each(&limits[1], len)?];
-            let bad = low.iter().zip(&high).position(|(low, high)| low > high);
-            ensure!(bad.is_none(), "value {}: give the lowest number first", bad.unwrap_or(0));
+            if let Some((i, (low, high))) = low.iter().zip(&high).enumerate().find(|(_, (low, high))| low > high) {
+                bail!("value {i}: [{low}, {high}]; give the lowest number first");
+            }
             Ok([low, high])
         });
         let limits = limits.transpose().with_context(|| format!("{key}: limits"))?;
@@ -261,7 +262,7 @@ impl Builder<'_> {
         let key = format!("clock {:?}", clock.name);
         ensure!(!clock.start.is_empty(), "{key}: start is empty");
         numbers::finite(&clock.start).with_context(|| format!("{key}: start"))?;
-        ensure!(clock.advance.is_finite(), "{key}: advance = {}", clock.advance);
+        numbers::finite(&[clock.advance]).with_context(|| format!("{key}: advance"))?;
         if let Some([low, high]) = clock.wrap {
             ensure!(
                 low < high && high - low < f64::INFINITY,
@@ -277,6 +278,7 @@ impl Builder<'_> {
                 clock.start.len()
             );
             numbers::finite(&standing.at).with_context(|| format!("{key}: standing.at"))?;
+            ensure!(!standing.of.is_empty(), "{key}: standing.of is empty; name the values whose norms decide");
             for name in &standing.of {
                 of.push(self.value(name, &format!("{key}: standing.of"))?);
             }

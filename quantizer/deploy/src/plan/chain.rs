@@ -87,7 +87,7 @@ impl Builder<'_> {
                 if let [Arg::Numbers(low), Arg::Numbers(high)] = &both {
                     let at = |list: &[f64], i: usize| list[if list.len() == 1 { 0 } else { i }];
                     if let Some(i) = (0..len).find(|&i| at(low, i) > at(high, i)) {
-                        bail!("{key}: it clips to {} and {}; give the lower number first", at(low, i), at(high, i));
+                        bail!("{key}: clip = [{}, {}]; give the lowest number first", at(low, i), at(high, i));
                     }
                 }
                 ValueOp::Clip(both)

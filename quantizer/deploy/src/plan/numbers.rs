@@ -4,10 +4,10 @@ use actq::error::{Result, bail, ensure};
 
 use crate::description::Numbers;
 
-/// Refuses numbers that are not finite.
+/// Refuses numbers that are not finite in f32.
 pub(super) fn finite(numbers: &[f64]) -> Result<()> {
-    match numbers.iter().position(|number| !number.is_finite()) {
-        Some(i) => bail!("number {i} is {}; give finite numbers", numbers[i]),
+    match numbers.iter().position(|number| !(*number as f32).is_finite()) {
+        Some(i) => bail!("number {i} is {}; give numbers from -3.4e38 to 3.4e38", numbers[i]),
         None => Ok(()),
     }
 }

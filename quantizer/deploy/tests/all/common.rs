@@ -4,4 +4,4 @@ pub(crate) mod isaaclab;
 pub(crate) mod leapp;
 pub(crate) mod lerobot;
 pub(crate) mod made;
-pub(crate) mod onnx;
+pub(crate) use actq_testkit::onnx;

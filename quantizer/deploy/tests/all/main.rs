@@ -4,6 +4,7 @@ mod bundles;
 mod common;
 mod holosoma;
 mod humanoidverse;
+mod images;
 mod isaaclab;
 mod kinfer;
 mod leapp;

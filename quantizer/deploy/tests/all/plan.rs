@@ -186,7 +186,11 @@ fn mistakes_are_refused_by_their_keys() {
         ("array = \"rows\"", "array = \"other\"", "there is no array \"other\""),
         ("{ add = \"phase\" }", "{ add = \"target\" }, { add = \"sum\" }", "\"sum\" depends on itself"),
         ("{ add = \"phase\" }", "{ divide = 0.0 }", "it divides by 0"),
-        ("{ add = \"phase\" }", "{ clip = [1.0, -1.0] }", "give the lower number first"),
+        (
+            "{ add = \"phase\" }",
+            "{ clip = [[-1.0, 1.0], 0.5] }",
+            "value \"sum\": do[1]: clip = [1, 0.5]; give the lowest number first",
+        ),
         ("{ add = \"phase\" }", "{ select = [0, 2] }", "place 2 (from 0) is not in 2 values"),
         ("{ add = \"phase\" }", "{ place = [1, 1] }", "not a permutation"),
         ("{ add = \"phase\" }", "{ gravity = \"wxyz\" }", "an orientation has 4 values; this value has 2"),

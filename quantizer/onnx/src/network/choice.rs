@@ -18,6 +18,8 @@ pub struct Choice {
     /// `true` if the caller gives each input its value in each step, and takes the values of the output one after the
     /// other. An input may then hold a state without a cell, and the output's axes mean nothing.
     pub is_fed: bool,
+    /// `true` if factors and limits at the end stay operations of the network: another network reads its output.
+    pub is_inner: bool,
 }
 
 impl Choice {

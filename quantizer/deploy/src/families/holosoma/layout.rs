@@ -59,8 +59,7 @@ fn entry(metadata: &Document, path: &str) -> Result<Entry> {
     let at = metadata.location(path);
     let get = |key: &str| metadata.node(&format!("{path}.{key}"));
     let text = |key: &str| {
-        let text =
-            get(key).and_then(Node::text).filter(|text| !text.is_empty() && printable(text) == **text);
+        let text = get(key).and_then(Node::text).filter(|text| !text.is_empty() && printable(text) == **text);
         text.map(str::to_owned).ok_or_else(|| Error::input(format!("{at}.{key} must be a name")))
     };
     let whole = |key: &str| {

@@ -1,4 +1,4 @@
-//! The measuring commands: `cargo demo`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask fit`, `cargo xtask
+//! The measuring commands: `cargo demo`, `cargo xtask bench`, `cargo xtask budgets`, `cargo xtask descriptions`, `cargo xtask fit`, `cargo xtask
 //! faults`, `cargo xtask stack`. xtask installs their requirements, builds this binary and runs it.
 #![forbid(unsafe_code)]
 
@@ -7,6 +7,7 @@ mod bench;
 mod boards;
 mod budgets;
 mod demo;
+mod descriptions;
 mod faults;
 mod fit;
 mod heads;
@@ -54,6 +55,18 @@ enum Command {
         /// Show the functions in which the heads spend their instructions
         #[arg(long)]
         by_function: bool,
+    },
+    /// Compare the executions of random descriptions: in f64, and as images in f32 and at 8 bits, also in QEMU
+    Descriptions {
+        /// Descriptions
+        #[arg(long, default_value_t = 10_000)]
+        count: u64,
+        /// Seed of the first
+        #[arg(long, default_value_t = 0)]
+        first: u64,
+        /// Descriptions whose images run in QEMU, too
+        #[arg(long, default_value_t = 200)]
+        qemu: u64,
     },
     /// Drive the UR3 arm through the serial port of the controller in QEMU, with faults on the line
     ///
@@ -112,6 +125,7 @@ fn capi(core: &str, out: &Path, image: Option<&Path>, compact: bool) -> Result<(
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Demo { episodes, qemu_episodes } => demo::run(episodes, qemu_episodes),
+        Command::Descriptions { count, first, qemu } => descriptions::run(first, count, qemu),
         Command::Faults => faults::all(),
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),

@@ -1,7 +1,7 @@
 //! Small ONNX files for tests.
 
 /// Returns a file whose output "action" is a linear function of its input "actor_obs".
-pub(crate) fn linear(inputs: usize, outputs: usize, metadata: &[(&str, &str)]) -> Vec<u8> {
+pub fn linear(inputs: usize, outputs: usize, metadata: &[(&str, &str)]) -> Vec<u8> {
     let nodes = [("Gemm", &["actor_obs", "weight", "bias"][..], "action")];
     let tensors =
         [("weight", &[inputs, outputs][..], weights(inputs, outputs)), ("bias", &[outputs], vec![0.5; outputs])];
@@ -9,7 +9,7 @@ pub(crate) fn linear(inputs: usize, outputs: usize, metadata: &[(&str, &str)]) -
 }
 
 /// Returns the weights of [`linear`], those of an input one after the other.
-pub(crate) fn weights(inputs: usize, outputs: usize) -> Vec<f32> {
+pub fn weights(inputs: usize, outputs: usize) -> Vec<f32> {
     (0..inputs * outputs).map(|i| 0.01 * (1 + i % 7) as f32).collect()
 }
 
@@ -50,11 +50,11 @@ impl Lstm {
 }
 
 /// A node: operator, inputs, outputs, and attributes that are integers.
-pub(crate) type Node<'a> = (&'a str, &'a [&'a str], &'a [&'a str], &'a [(&'a str, usize)]);
+pub type Node<'a> = (&'a str, &'a [&'a str], &'a [&'a str], &'a [(&'a str, usize)]);
 
 /// Returns a file with nodes (operator, inputs, output), tensors (name, shape, values), and inputs and outputs with
 /// their lengths, whose shapes are `[1, length]`.
-pub(crate) fn graph(
+pub fn graph(
     nodes: &[(&str, &[&str], &str)],
     tensors: &[(&str, &[usize], Vec<f32>)],
     inputs: &[(&str, usize)],
@@ -75,7 +75,7 @@ pub(crate) fn graph(
 }
 
 /// Returns a file whose ports have any shapes.
-pub(crate) fn shaped(
+pub fn shaped(
     nodes: &[Node<'_>],
     tensors: &[(&str, &[usize], Vec<f32>)],
     inputs: &[(&str, &[usize])],
@@ -100,7 +100,7 @@ pub(crate) fn shaped(
 }
 
 /// Appends metadata to a file.
-pub(crate) fn with_metadata(mut model: Vec<u8>, metadata: &[(&str, &str)]) -> Vec<u8> {
+pub fn with_metadata(mut model: Vec<u8>, metadata: &[(&str, &str)]) -> Vec<u8> {
     for (key, value) in metadata {
         model.extend(field(14, &[field(1, key.as_bytes()), field(2, value.as_bytes())].concat()));
     }
