@@ -9,6 +9,7 @@ mod builder;
 mod denoising;
 mod evaluate;
 pub mod hoist;
+mod ignored;
 pub mod lowering;
 mod matrix;
 pub mod narrow;
@@ -25,6 +26,7 @@ mod weights;
 
 pub use denoising::Denoising;
 pub use evaluate::Evaluator;
+pub use ignored::without_ignored;
 pub use matrix::{Factors, Matrix, MatrixStrip, STRIP};
 pub use nodes::{Graph, Node};
 pub use ops::NodeKind;

@@ -41,7 +41,8 @@ pub fn narrowed(graph: &Graph, ties: &Ties, kept: &[Vec<usize>]) -> Narrowed {
     Narrowed { graph, rows, columns }
 }
 
-fn part(matrix: &WeightMatrix, rows: &[usize], columns: &[usize]) -> WeightMatrix {
+/// Returns these rows and columns of a matrix.
+pub(super) fn part(matrix: &WeightMatrix, rows: &[usize], columns: &[usize]) -> WeightMatrix {
     let data = rows.iter().flat_map(|r| columns.iter().map(move |c| matrix.data[r * matrix.cols + c])).collect();
     WeightMatrix { name: matrix.name.clone(), rows: rows.len(), cols: columns.len(), data }
 }

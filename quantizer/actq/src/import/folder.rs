@@ -11,7 +11,7 @@ use super::json::PolicyJson;
 use super::ops::{Builder, Weights};
 use super::tensors::TensorFile;
 use crate::error::{Context, Result, bail, ensure};
-use crate::graph::hoist;
+use crate::graph::{hoist, without_ignored};
 use crate::numbers::positive;
 use crate::policy::{DEFAULT_RATE_HZ, Policy};
 
@@ -124,7 +124,7 @@ fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) 
         contract: json.contract(kind)?,
         weights,
         parameters,
-        graph,
+        graph: without_ignored(&graph),
         around: None,
         digest,
     };
