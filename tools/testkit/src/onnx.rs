@@ -14,19 +14,20 @@ pub fn weights(inputs: usize, outputs: usize) -> Vec<f32> {
 }
 
 /// An LSTM with the weights and biases 0.1 that tests write, in f64.
-pub(crate) struct Lstm {
+pub struct Lstm {
     inputs: usize,
     h: Vec<f64>,
     c: Vec<f64>,
 }
 
 impl Lstm {
-    pub(crate) fn new(inputs: usize, hidden: usize) -> Self {
+    /// Starts with a state of zeros.
+    pub fn new(inputs: usize, hidden: usize) -> Self {
         Self { inputs, h: vec![0.0; hidden], c: vec![0.0; hidden] }
     }
 
     /// Returns the hidden values of the next step.
-    pub(crate) fn step(&mut self, q: &[f64]) -> Vec<f64> {
+    pub fn step(&mut self, q: &[f64]) -> Vec<f64> {
         let hidden = self.h.len();
         let (w, r) = (weights(4 * hidden, self.inputs), weights(4 * hidden, hidden));
         let (h, c) = (&self.h, &self.c);

@@ -45,7 +45,8 @@ fn runner(folder: &TempDir) -> Result<Runner> {
 fn both(folder: &TempDir, raw: &[[f64; 2]]) -> Result<[Vec<f64>; 2]> {
     let raw: Vec<Vec<Vec<f64>>> = raw.iter().map(|raw| vec![raw.to_vec()]).collect();
     let mut runner = runner(folder)?;
-    let described = raw.iter().flat_map(|raw| runner.step(raw).targets).flat_map(|(_, target)| target);
+    let described = raw.iter().map(|raw| Ok(runner.step(raw)?.targets)).collect::<Result<Vec<_>>>()?;
+    let described = described.into_iter().flatten().flat_map(|(_, target)| target);
     let deployment = Deployment::load(folder.path())?;
     let image = deployment.in_f32(&deployment.four_bits()?, &raw)?.concat();
     Ok([described.collect(), image.into_iter().map(f64::from).collect()])

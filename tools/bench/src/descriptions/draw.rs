@@ -43,6 +43,7 @@ impl Draw {
             action: String::new(),
             joints: BTreeMap::new(),
             constants: BTreeMap::new(),
+            rounding: BTreeMap::new(),
             inputs: Vec::new(),
             states: Vec::new(),
             clocks: Vec::new(),
