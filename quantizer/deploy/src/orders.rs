@@ -10,14 +10,16 @@ use crate::sources::Sources;
 
 /// Largest rest of a column that another one explains, as a share of its deviation.
 const REST: f64 = 1e-4;
+/// Least offset that is another one, in the unit of the value.
+const OFFSET: f64 = 1e-4;
 /// Ticks that tell columns from each other.
 const FEWEST_TICKS: usize = 8;
 /// Most values of an order that are listed.
 const MOST_LISTED: usize = 8;
 
 /// Finds values that the reference has in another order than the description: each column of a term or target of the
-/// reference is, but for a factor and an offset, another column of it in the description. Returns a sentence for each
-/// term or target.
+/// reference is, but for a factor and an offset, another column of it in the description. Finds other offsets, too, which
+/// are those of joints whose names are in another order. Returns a sentence for each term or target.
 ///
 /// # Errors
 ///
@@ -42,7 +44,9 @@ pub fn orders(description: &Description, sources: &dyn Sources, reference: &Refe
             // Values of one term and one tick.
             let is_same = |label: &&Label| label.value == labels[start].value && label.age == labels[start].age;
             let end = start + labels[start..].iter().take_while(is_same).count();
-            found.extend(order(&labels[start..end], &own[start..end], &given[start..end]));
+            let sentence = order(&labels[start..end], &own[start..end], &given[start..end]);
+            // The frames of a history have one order.
+            found.extend(sentence.filter(|sentence| !found.contains(sentence)));
             start = end;
         }
     }
@@ -50,9 +54,8 @@ pub fn orders(description: &Description, sources: &dyn Sources, reference: &Refe
 }
 
 fn target_labels(plan: &Plan, target: &PlannedTarget) -> Vec<Label> {
-    let name = format!("target {}", plan.names[target.value]);
     let len = plan.values[target.value].labels.len();
-    labels(&name, len, (!target.joints.is_empty()).then_some(&target.joints[..]))
+    labels(&plan.names[target.value], len, (!target.joints.is_empty()).then_some(&target.joints[..]))
 }
 
 /// Describes the order of one term's columns in the reference, if it is another.
@@ -71,22 +74,37 @@ fn order(labels: &[Label], own: &[Column], given: &[Column]) -> Option<String> {
         }
         moved.push((place, from));
     }
-    if moved.is_empty() {
-        return None;
-    }
+    let of = &labels.first()?.value;
     let name = |place: usize| &labels[place].element;
-    let listed = moved.iter().take(MOST_LISTED).map(|(place, from)| format!("{} is {}", name(*place), name(*from)));
-    let more =
-        if moved.len() > MOST_LISTED { format!(", and {} more", moved.len() - MOST_LISTED) } else { String::new() };
-    let of = labels.first().map_or("", |label| label.value.as_str());
-    Some(format!(
-        "the reference has {of} in another order: what the description calls {}{more}",
-        listed.collect::<Vec<_>>().join(", ")
-    ))
+    if moved.is_empty() {
+        let offset = |place: &usize| (given[*place].mean - own[*place].mean, name(*place));
+        let same = |place: &usize| given[*place].factor(&own[*place]).is_some_and(|factor| (factor - 1.0).abs() < REST);
+        let offsets: Vec<_> = (0..own.len()).filter(same).map(|place| offset(&place)).collect();
+        let offsets = offsets.into_iter().filter(|(offset, _)| offset.abs() > OFFSET);
+        let listed = list(offsets.map(|(offset, name)| format!("{name} {offset:+.4}")).collect())?;
+        return Some(format!(
+            "the reference has {of} with other offsets: {listed}; names of joints in another order move their default pose so"
+        ));
+    }
+    let listed = list(
+        moved
+            .iter()
+            .map(|(place, from)| format!("its {} is the description's {}", name(*place), name(*from)))
+            .collect(),
+    )?;
+    Some(format!("the reference has {of} in another order: {listed}"))
+}
+
+/// Lists the first texts; nothing if there are none.
+fn list(texts: Vec<String>) -> Option<String> {
+    let more = texts.len().saturating_sub(MOST_LISTED);
+    let more = if more > 0 { format!(", and {more} more") } else { String::new() };
+    (!texts.is_empty()).then(|| format!("{}{more}", texts[..texts.len().min(MOST_LISTED)].join(", ")))
 }
 
 /// A value over all ticks, without its mean.
 struct Column {
+    mean: f64,
     values: Vec<f64>,
     energy: f64,
 }
@@ -100,16 +118,19 @@ impl Column {
         let energy: f64 = values.iter().map(|value| value * value).sum();
         // What is only rounding does not vary.
         let varies = energy > (1e-6 * largest).powi(2) * values.len() as f64;
-        Self { values, energy: if varies { energy } else { 0.0 } }
+        Self { mean, values, energy: if varies { energy } else { 0.0 } }
+    }
+
+    /// Returns the factor of another column that explains it best; nothing if one of them does not vary.
+    fn factor(&self, other: &Self) -> Option<f64> {
+        let product = self.values.iter().zip(&other.values).map(|(a, b)| a * b).sum::<f64>();
+        (self.energy > 0.0 && other.energy > 0.0).then(|| product / other.energy)
     }
 
     /// Returns the deviation that is left of it if another column times the best factor explains it, as a share of its
     /// own; nothing if one of them does not vary.
     fn rest(&self, other: &Self) -> Option<f64> {
-        if self.energy == 0.0 || other.energy == 0.0 {
-            return None;
-        }
-        let factor = self.values.iter().zip(&other.values).map(|(a, b)| a * b).sum::<f64>() / other.energy;
+        let factor = self.factor(other)?;
         let left = self.values.iter().zip(&other.values).map(|(a, b)| (a - factor * b).powi(2)).sum::<f64>();
         Some((left / self.energy).sqrt())
     }

@@ -129,9 +129,21 @@ fn joints_in_another_order_are_named() -> Result<()> {
     let case = Case::new([1, 2, 0], 0.5, 0.0)?;
     ensure!(case.compare()?.first.is_some(), "no difference");
     let found = case.orders()?;
-    let expected = "the reference has position in another order: what the description calls hip is knee, knee is ankle, ankle is hip";
+    let expected = "the reference has position in another order: its hip is the description's knee, its knee is the \
+                    description's ankle, its ankle is the description's hip";
     ensure!(found == [expected], "{found:?}");
-    ensure!(Case::new([0, 1, 2], 0.5, 0.0)?.orders()?.is_empty(), "the same order");
+    let mut same = Case::new([0, 1, 2], 0.5, 0.0)?;
+    ensure!(same.orders()?.is_empty(), "the same order");
+    // Names in another order move the default pose only.
+    same.description.constants.insert("default".to_owned(), vec![0.3, 0.2, 0.1]);
+    let found = same.orders()?;
+    let [position, target] =
+        ["position", "target"].map(|of| format!("the reference has {of} with other offsets: hip "));
+    let offsets = found[0].contains("hip +0.2000, ankle -0.2000") && found[1].contains("hip -0.2000, ankle +0.2000");
+    ensure!(
+        found.len() == 2 && found[0].starts_with(&position) && found[1].starts_with(&target) && offsets,
+        "{found:?}"
+    );
     Ok(())
 }
 
