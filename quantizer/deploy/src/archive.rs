@@ -37,18 +37,18 @@ impl Archive {
         }
         let unpacked = GzDecoder::new(File::open(path)?).take(MOST_BYTES);
         let (mut archive, folder) = (tar::Archive::new(unpacked), TempDir::new()?);
-        let (mut names, mut bytes) = (Vec::new(), 0);
+        let (mut names, mut bytes) = (Vec::new(), 0u64);
         let damaged = "it is gzipped, and no tar archive, or damaged";
         for entry in archive.entries().context(damaged)? {
             let mut entry = entry.context(damaged)?;
             let name = entry.path().context(damaged)?.to_string_lossy().into_owned();
-            let is_plain = !name.is_empty() && !name.starts_with('.') && !name.contains(['/', '\\']);
+            let is_plain = !name.is_empty() && !name.starts_with('.') && !name.contains(['/', '\\', ':']);
             ensure!(is_plain && entry.header().entry_type().is_file(), "its entry {name:?} is not a file by itself");
             ensure!(
                 !names.contains(&name) && names.len() < MOST_FILES,
                 "{name:?} occurs twice, or it has over {MOST_FILES} files"
             );
-            bytes += entry.size();
+            bytes = entry.size().saturating_add(bytes);
             ensure!(bytes <= MOST_BYTES, "it has over {MOST_BYTES} bytes, unpacked");
             let mut content = Vec::new();
             entry.read_to_end(&mut content).context(damaged)?;

@@ -9,6 +9,9 @@ use actq_deploy::{Array, Comparison, Question, Reading, TOLERANCE};
 
 use super::table::table;
 
+/// Most keys that a note lists.
+const MOST_KEYS: usize = 40;
+
 /// Formats the parts of a description, each with its source.
 pub fn summary(reading: &Reading) -> String {
     let mut parts = table(&["part", "name", "content", "source"]);
@@ -43,7 +46,10 @@ pub fn questions(questions: &[Question]) -> String {
 
 /// Formats the keys that nothing reads, as a note.
 pub fn unread(keys: &[String]) -> Option<String> {
-    (!keys.is_empty()).then(|| format!("nothing reads these keys of the bundle: {}", keys.join("; ")))
+    let more = keys.len().saturating_sub(MOST_KEYS);
+    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+    let listed = keys[..keys.len().min(MOST_KEYS)].join("; ");
+    (!keys.is_empty()).then(|| format!("nothing reads these keys of the bundle: {listed}{more}"))
 }
 
 /// Formats the targets without limits, as a note.

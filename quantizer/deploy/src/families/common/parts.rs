@@ -66,8 +66,11 @@ impl Parts {
         }
     }
 
-    /// Adds a raw input in the order of a list of joints.
+    /// Adds a raw input in the order of a list of joints, unless it is there.
     pub(crate) fn raw_joints(&mut self, name: &str, joints: &str, unit: &str) {
+        if self.description.inputs.iter().any(|input| input.name == name) {
+            return;
+        }
         let unit = (!unit.is_empty()).then(|| unit.to_owned());
         let joints = Some(joints.to_owned());
         self.description.inputs.push(Input { name: name.to_owned(), len: None, joints, unit, range: None });

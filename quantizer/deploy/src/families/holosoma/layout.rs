@@ -13,8 +13,8 @@ pub(super) const LAYOUT: &str = "observation_layout";
 pub(super) const CLIP: &str = "observation_clip";
 /// Module of the functions that are known.
 const MODULE: &str = "holosoma.managers.observation.terms.";
-/// Most terms, and most frames of one.
-const MOST: usize = 1000;
+/// Most terms, most values of one, and most frames.
+const MOST: usize = 10_000;
 
 /// A term.
 pub(super) struct Entry {
