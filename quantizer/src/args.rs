@@ -110,7 +110,8 @@ pub(crate) enum Command {
     /// Write an image as source code of C, to be linked into a firmware
     ///
     /// OUT gets NAME.c with the image as a constant array, NAME.h with its lengths, names, scratch memory and digests
-    /// as macros, and manifest.json with the SHA-256 of each file. docs/C.md documents how to build and run them.
+    /// as macros, and NAME.json with the SHA-256 of each file. It replaces only files of an earlier export. docs/C.md
+    /// documents how to build and run them.
     ///
     /// Example: actq export-c walker.actq --golden heldout.npz --out firmware/policy
     #[command(name = "export-c")]

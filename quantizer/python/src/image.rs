@@ -190,8 +190,9 @@ impl Image {
         Ok(cost)
     }
 
-    /// Writes the image as source code of C into `folder`, as `actq export-c` does; returns the paths.
-    #[pyo3(signature = (folder, *, name = "policy".to_owned(), golden = None, steps = 100))]
+    /// Writes the image as source code of C into `folder`, as `actq export-c` does; returns the paths. Files that were
+    /// not exported are replaced only with `force`.
+    #[pyo3(signature = (folder, *, name = "policy".to_owned(), golden = None, steps = 100, force = false))]
     fn export_c(
         &self,
         py: Python<'_>,
@@ -199,6 +200,7 @@ impl Image {
         #[pyo3(from_py_with = given)] name: String,
         #[pyo3(from_py_with = given)] golden: Option<PathBuf>,
         #[pyo3(from_py_with = given)] steps: usize,
+        #[pyo3(from_py_with = given)] force: bool,
     ) -> PyResult<Vec<PathBuf>> {
         if steps == 0 {
             return Err(error!("steps is 0; use a whole number from 1 on"));
@@ -212,6 +214,7 @@ impl Image {
                 &name,
                 golden.as_deref().map(|file| (file, steps)),
                 None,
+                force,
             )
         })
         .or_raise()

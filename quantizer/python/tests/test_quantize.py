@@ -114,3 +114,9 @@ def test_reports_are_those_of_the_command(command, image, tmp_path):
     assert len(paths) == 3
     for path in paths:
         assert path.read_bytes() == (tmp_path / "c" / path.name).read_bytes()
+    paths[0].write_text("by hand")
+    with pytest.raises(actq.Error, match="actq did not write it"):
+        image.export_c(tmp_path / "py")
+    assert paths[0].read_text() == "by hand"
+    assert image.export_c(tmp_path / "py", force=True) == paths
+    assert paths[0].read_bytes() == (tmp_path / "c" / paths[0].name).read_bytes()

@@ -70,6 +70,9 @@ pub(crate) struct ConstantsArgs {
     /// A deploy.toml, whose [gains] are added
     #[arg(long, value_name = "FILE")]
     pub(crate) gains: Option<PathBuf>,
+    /// Replace files that `actq` did not write
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
 #[derive(clap::Args)]
@@ -89,4 +92,7 @@ pub(crate) struct ExportCArgs {
     /// Observations of the golden run, at most
     #[arg(long, default_value = "100", value_name = "N", requires = "golden", value_parser = steps)]
     pub(crate) steps: NonZeroUsize,
+    /// Replace files that `actq` did not write
+    #[arg(long)]
+    pub(crate) force: bool,
 }

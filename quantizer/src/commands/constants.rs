@@ -9,6 +9,7 @@ use actq_deploy::description::Description;
 use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::args::ConstantsArgs;
+use crate::outputs::files::refuse_unlike;
 use crate::report::constants::{Language, source};
 use crate::terminal::{print, reserve};
 
@@ -34,7 +35,9 @@ pub(crate) fn run(args: &ConstantsArgs) -> Result<()> {
         let joints = gains.joints.as_ref().and_then(|order| description.joints.get(order));
         Some((gains, joints.map_or(&[][..], Vec::as_slice)))
     });
-    outputs.write(&[source(language, &image, prefix, gains)])?;
+    let source = source(language, &image, prefix, gains)?;
+    refuse_unlike(&args.out, &source, args.force)?;
+    outputs.write(&[source])?;
     print(&format!("{shown}: constants of {}\n", args.image.display()))
 }
 

@@ -58,7 +58,7 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
     let gains = has_gains(&description)?.then_some(description);
     for ending in CONSTANTS {
         let out = image.with_extension(ending);
-        constants::run(&ConstantsArgs { image: image.clone(), out, gains: gains.clone() })?;
+        constants::run(&ConstantsArgs { image: image.clone(), out, gains: gains.clone(), force: false })?;
     }
     if let Some(board) = &args.board {
         step(5, "firmware")?;

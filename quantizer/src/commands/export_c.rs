@@ -8,6 +8,7 @@ use actq_kernels::Image;
 use anyhow::{Result, ensure};
 
 use crate::args::ExportCArgs;
+use crate::outputs::files::refuse_unlike;
 use crate::outputs::unfinished::OutputFolder;
 use crate::report::export::{Golden, files};
 use crate::terminal::{print, reserve};
@@ -17,13 +18,14 @@ pub(crate) fn run(args: &ExportCArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let golden = args.golden.as_deref().map(|recording| (recording, args.steps.get()));
-    let paths = export(image, buffer.bytes(), &args.out, &args.name, golden, Some(&args.image))?;
+    let paths = export(image, buffer.bytes(), &args.out, &args.name, golden, Some(&args.image), args.force)?;
     let list: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     print(&format!("{}\n", list.join("\n")))
 }
 
 /// Writes an image of these `bytes` as source code of C into a folder, and returns the paths. `golden` is a recording,
-/// and the most steps of it to run. `file` is the image's own, which no output may replace.
+/// and the most steps of it to run. `file` is the image's own, which no output may replace. Files that were not
+/// exported are replaced only with `force`.
 pub fn export(
     image: Image<'_>,
     bytes: &[u8],
@@ -31,6 +33,7 @@ pub fn export(
     name: &str,
     golden: Option<(&Path, usize)>,
     file: Option<&Path>,
+    force: bool,
 ) -> Result<Vec<PathBuf>> {
     let is_identifier = name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
@@ -43,10 +46,13 @@ pub fn export(
         "{}: it is of an earlier export; remove it, or pass --golden",
         stale.display()
     );
-    let files = files(&image, bytes, name, run.as_ref());
+    let files = files(&image, bytes, name, run.as_ref())?;
 
     let _folder = OutputFolder::new(folder)?;
     let paths: Vec<PathBuf> = files.iter().map(|(name, _)| folder.join(name)).collect();
+    for (path, (_, text)) in paths.iter().zip(&files) {
+        refuse_unlike(path, text, force)?;
+    }
     let outputs = reserve(&paths, file.into_iter().chain(golden.map(|(recording, _)| recording)))?;
     outputs.write(&files.iter().map(|(_, text)| text).collect::<Vec<_>>())?;
     Ok(paths)

@@ -1,5 +1,6 @@
 //! Atomic writing of output files: each is complete or absent, all or none, and no output replaces an input.
 
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs::{self, File, Metadata, OpenOptions, Permissions};
 use std::io::{ErrorKind, Read as _, Write as _};
@@ -123,6 +124,41 @@ pub fn refuse_foreign(output: &Path) -> Result<()> {
         output.display()
     );
     Ok(())
+}
+
+/// Refuses an output that would replace a file that an earlier run did not write, unless `force`. Such a file begins
+/// with the first line of the new `content`, whatever name is quoted in it; a JSON file has the keys of the new one.
+pub fn refuse_unlike(output: &Path, content: &str, force: bool) -> Result<()> {
+    let is_file = fs::metadata(output).is_ok_and(|metadata| metadata.is_file());
+    if force || !is_file {
+        return Ok(());
+    }
+    let old = fs::read(output).with_context(|| format!("{}: cannot read the existing file", output.display()))?;
+    let old = String::from_utf8_lossy(&old);
+    let is_like = if content.starts_with('{') {
+        keys(&old).is_some_and(|found| Some(found) == keys(content))
+    } else {
+        unnamed(&old) == unnamed(content)
+    };
+    ensure!(
+        old.is_empty() || is_like,
+        "{}: exists, and actq did not write it; choose another name, or pass --force to replace it",
+        output.display()
+    );
+    Ok(())
+}
+
+/// Returns the keys of a JSON object.
+fn keys(text: &str) -> Option<BTreeSet<String>> {
+    let object: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text).ok()?;
+    Some(object.into_iter().map(|(key, _)| key).collect())
+}
+
+/// Splits the first line of a text at the name that is quoted in it.
+fn unnamed(text: &str) -> (&str, &str) {
+    let line = text.lines().next().unwrap_or_default();
+    let (Some(first), Some(last)) = (line.find('"'), line.rfind('"')) else { return (line, "") };
+    (&line[..first], &line[last..])
 }
 
 /// Refuses an output that is one of the inputs, under any name.

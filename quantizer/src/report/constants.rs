@@ -1,10 +1,11 @@
 //! An image's sizes, names and places as source code, for applications that run it.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use actq_deploy::description::Gains;
 use actq_kernels::{Image, Port, PortKind};
+use anyhow::{Result, bail};
 use serde_json::Value;
 
 /// Languages of the source code.
@@ -20,31 +21,36 @@ pub enum Language {
 pub type NamedGains<'a> = (&'a Gains, &'a [String]);
 
 /// Returns the source code. Names of C begin with `prefix`, in capitals.
-pub fn source(language: Language, image: &Image<'_>, prefix: &str, gains: Option<NamedGains<'_>>) -> String {
-    let mut code = Code { language, prefix: identifier(prefix), names: BTreeSet::new(), text: String::new() };
-    code.begin(image);
+///
+/// # Errors
+///
+/// If two constants would have the same name, because the names of inputs, targets or joints differ only in characters
+/// that an identifier cannot have, or in a suffix such as `_LEN`.
+pub fn source(language: Language, image: &Image<'_>, prefix: &str, gains: Option<NamedGains<'_>>) -> Result<String> {
+    let mut code = Code { language, prefix: identifier(prefix), names: BTreeMap::new(), text: String::new() };
+    code.begin(image)?;
     let mut offsets = [0; 2];
     for port in image.ports() {
         let offset = &mut offsets[usize::from(port.kind != PortKind::Input)];
-        code.port(&port, *offset);
+        code.port(&port, *offset)?;
         *offset += port.len;
     }
     if let Some((gains, joints)) = gains {
-        code.gains(gains, joints);
+        code.gains(gains, joints)?;
     }
-    code.end()
+    Ok(code.end())
 }
 
 struct Code {
     language: Language,
     prefix: String,
-    /// Names that are taken.
-    names: BTreeSet<String>,
+    /// The names, and what each is the name of.
+    names: BTreeMap<String, String>,
     text: String,
 }
 
 impl Code {
-    fn begin(&mut self, image: &Image<'_>) {
+    fn begin(&mut self, image: &Image<'_>) -> Result<()> {
         let about = format!("Constants of the image {}, made by actq. Do not edit.", quoted(image.name()));
         match self.language {
             Language::Rust => {
@@ -56,21 +62,24 @@ impl Code {
                 let _ = writeln!(self.text, "/* {about} */\n#ifndef ACTQ_{prefix}_H\n#define ACTQ_{prefix}_H\n");
             }
         }
-        self.value("IMAGE_BYTES", "Bytes of the image.", Type::Size, &image.bytes().to_string());
-        self.value(
-            "IMAGE_CRC",
-            "Checksum in the image's header (CRC-32).",
-            Type::Word,
-            &format!("{:#010x}", image.crc()),
-        );
-        self.value("RATE_HZ", "Control steps a second.", Type::Float, &float(f64::from(image.rate_hz())));
-        self.value("OBSERVATION_LEN", "Values of an observation.", Type::Size, &image.obs_len().to_string());
-        self.value("ACTION_LEN", "Values of an action.", Type::Size, &image.act_len().to_string());
-        self.value("SCRATCH_WORDS", "Words of scratch memory.", Type::Size, &image.scratch_words().to_string());
+        // In C a word names the head.
+        let scratch_words = image.scratch_words() + usize::from(self.language == Language::C);
+        let crc = format!("{:#010x}", image.crc());
+        for (name, about, of, value) in [
+            ("IMAGE_BYTES", "Bytes of the image.", Type::Size, image.bytes().to_string()),
+            ("IMAGE_CRC", "Checksum in the image's header (CRC-32).", Type::Word, crc),
+            ("RATE_HZ", "Control steps a second.", Type::Float, float(f64::from(image.rate_hz()))),
+            ("OBSERVATION_LEN", "Values of an observation.", Type::Size, image.obs_len().to_string()),
+            ("ACTION_LEN", "Values of an action.", Type::Size, image.act_len().to_string()),
+            ("SCRATCH_WORDS", "Words of scratch memory.", Type::Size, scratch_words.to_string()),
+        ] {
+            self.value(name, "the image", about, of, &value)?;
+        }
+        Ok(())
     }
 
     /// Adds a raw input, or a target, that begins at `offset` of the observation, or of the action.
-    fn port(&mut self, port: &Port<'_>, offset: usize) {
+    fn port(&mut self, port: &Port<'_>, offset: usize) -> Result<()> {
         let (what, vector) = match port.kind {
             PortKind::Input => ("Raw input", "observation"),
             PortKind::Position => ("Target positions", "action"),
@@ -78,39 +87,48 @@ impl Code {
             PortKind::Torque => ("Target torques", "action"),
             _ => ("Targets", "action"),
         };
-        let group =
-            format!("{}_{}", if port.kind == PortKind::Input { "INPUT" } else { "TARGET" }, identifier(port.name));
+        let (group, own) = match port.kind {
+            PortKind::Input => ("INPUT", format!("input {}", quoted(port.name))),
+            _ => ("TARGET", format!("target {}", quoted(port.name))),
+        };
+        let group = format!("{group}_{}", identifier(port.name));
         let about = format!("{what} {}: its place in the {vector}.", quoted(port.name));
-        self.value(&group, &about, Type::Size, &offset.to_string());
-        self.value(&format!("{group}_LEN"), "Its number of values.", Type::Size, &port.len.to_string());
+        self.value(&group, &own, &about, Type::Size, &offset.to_string())?;
+        let of = format!("the length of {own}");
+        self.value(&format!("{group}_LEN"), &of, "Its number of values.", Type::Size, &port.len.to_string())?;
         let [low, high] = port.range;
-        if low.is_finite() {
-            self.value(&format!("{group}_LOW"), "Its lowest value.", Type::Float, &float(f64::from(low)));
-        }
-        if high.is_finite() {
-            self.value(&format!("{group}_HIGH"), "Its highest value.", Type::Float, &float(f64::from(high)));
+        for (suffix, which, limit) in [("LOW", "lowest", low), ("HIGH", "highest", high)] {
+            if limit.is_finite() {
+                let (of, about) = (format!("the {which} value of {own}"), format!("Its {which} value."));
+                self.value(&format!("{group}_{suffix}"), &of, &about, Type::Float, &float(f64::from(limit)))?;
+            }
         }
         if port.names.is_empty() {
-            return;
+            return Ok(());
         }
         for (i, name) in port.names.split('\n').enumerate() {
-            let about = format!("Place of {} in the {vector}.", quoted(name));
-            self.value(&format!("{group}_{}", identifier(name)), &about, Type::Size, &(offset + i).to_string());
+            let (of, about) =
+                (format!("value {} of {own}", quoted(name)), format!("Place of {} in the {vector}.", quoted(name)));
+            let name = format!("{group}_{}", identifier(name));
+            self.value(&name, &of, &about, Type::Size, &(offset + i).to_string())?;
         }
+        Ok(())
     }
 
-    fn gains(&mut self, gains: &Gains, joints: &[String]) {
+    fn gains(&mut self, gains: &Gains, joints: &[String]) -> Result<()> {
         let order = if joints.is_empty() { String::new() } else { format!(", in this order: {}", joints.join(", ")) };
         for (name, about, values) in
             [("STIFFNESS", "Stiffness", &gains.stiffness), ("DAMPING", "Damping", &gains.damping)]
         {
             let values: Vec<String> = values.iter().map(|value| float(*value)).collect();
-            self.list(name, &format!("{about} of the joints{order}."), &values);
+            self.list(name, &format!("{about} of the joints{order}."), &values)?;
         }
+        Ok(())
     }
 
-    fn value(&mut self, name: &str, about: &str, of: Type, value: &str) {
-        let name = self.unique(name);
+    /// Adds a constant; `owner` is what it belongs to, for errors.
+    fn value(&mut self, name: &str, owner: &str, about: &str, of: Type, value: &str) -> Result<()> {
+        self.take(name, owner)?;
         let _ = match self.language {
             Language::Rust => {
                 let of = match of {
@@ -125,10 +143,11 @@ impl Code {
                 writeln!(self.text, "/* {} */\n#define {}_{name} {value}{ending}", comment(about), self.prefix)
             }
         };
+        Ok(())
     }
 
-    fn list(&mut self, name: &str, about: &str, values: &[String]) {
-        let name = self.unique(name);
+    fn list(&mut self, name: &str, about: &str, values: &[String]) -> Result<()> {
+        self.take(name, "the gains")?;
         let _ = match self.language {
             Language::Rust => {
                 let (len, values) = (values.len(), values.join(", "));
@@ -146,15 +165,15 @@ impl Code {
                 )
             }
         };
+        Ok(())
     }
 
-    /// Returns a name that nothing has: names that differ in other characters only may become equal.
-    fn unique(&mut self, name: &str) -> String {
-        let numbered = (2..).map(|i| format!("{name}_{i}"));
-        let mut names = std::iter::once(name.to_owned()).chain(numbered);
-        let name = names.find(|name| !self.names.contains(name)).unwrap_or_default();
-        self.names.insert(name.clone());
-        name
+    /// Takes a name; `of` is what it is the name of.
+    fn take(&mut self, name: &str, of: &str) -> Result<()> {
+        if let Some(other) = self.names.insert(name.to_owned(), of.to_owned()) {
+            bail!("the constant {name} would be the name of {other} and of {of}; rename one of them in deploy.toml");
+        }
+        Ok(())
     }
 
     fn end(mut self) -> String {

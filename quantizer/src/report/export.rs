@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use actq::measure::size::hex;
 use actq_kernels::Image;
+use anyhow::Result;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
@@ -24,18 +25,22 @@ pub struct Golden {
 pub type Files = Vec<(String, String)>;
 
 /// Returns the files for an image of these `bytes`; names in them begin with `name`, an identifier of C.
-pub fn files(image: &Image<'_>, bytes: &[u8], name: &str, golden: Option<&Golden>) -> Files {
+///
+/// # Errors
+///
+/// If two constants would have the same name.
+pub fn files(image: &Image<'_>, bytes: &[u8], name: &str, golden: Option<&Golden>) -> Result<Files> {
     let mut files = vec![
-        (format!("{name}.h"), header(image, bytes, name, golden)),
+        (format!("{name}.h"), header(image, bytes, name, golden)?),
         (format!("{name}.c"), words(image, bytes, name)),
     ];
     files.extend(golden.map(|golden| (format!("{name}_golden.c"), run(name, golden))));
     let manifest = manifest(image, bytes, &files);
-    files.push(("manifest.json".to_owned(), format!("{manifest:#}\n")));
-    files
+    files.push((format!("{name}.json"), format!("{manifest:#}\n")));
+    Ok(files)
 }
 
-fn header(image: &Image<'_>, bytes: &[u8], name: &str, golden: Option<&Golden>) -> String {
+fn header(image: &Image<'_>, bytes: &[u8], name: &str, golden: Option<&Golden>) -> Result<String> {
     let (capitals, words) = (name.to_uppercase(), bytes.len() / 4);
     let mut more = format!(
         "/* SHA-256 of the image, and of the policy it was made from. */\n#define {capitals}_SHA256 \"{}\"\n\
@@ -57,11 +62,11 @@ fn header(image: &Image<'_>, bytes: &[u8], name: &str, golden: Option<&Golden>) 
     }
     more += "\n#ifdef __cplusplus\n}\n#endif\n";
     // Before the end of the include guard.
-    let constants = source(Language::C, image, name, None);
-    match constants.rsplit_once("\n#endif") {
+    let constants = source(Language::C, image, name, None)?;
+    Ok(match constants.rsplit_once("\n#endif") {
         Some((before, after)) => format!("{before}{more}\n#endif{after}"),
         None => constants + &more,
-    }
+    })
 }
 
 fn words(image: &Image<'_>, bytes: &[u8], name: &str) -> String {
@@ -105,7 +110,7 @@ fn manifest(image: &Image<'_>, bytes: &[u8], files: &Files) -> Value {
             "crc32": image.crc(),
             "sha256": sha256(bytes),
             "source_sha256": hex(&image.digest()),
-            "scratch_bytes": 4 * image.scratch_words(),
+            "scratch_bytes": 4 * (image.scratch_words() + 1),
         },
         "sha256": digests,
         "not_measured": ["time, stack and power on a real board"],

@@ -9,7 +9,7 @@ use anyhow::{Result, ensure};
 use tempfile::TempDir;
 
 use super::fixture::text;
-use crate::deployed::Made;
+use crate::deployed::{MADE, Made};
 
 /// Gains of a description whose network is never opened.
 const GAINS: &str = r#"
@@ -89,6 +89,56 @@ pub(super) fn has_compiler(file: &Path, standard: &str) -> Result<bool> {
     fs::write(&empty, "")?;
     let output = Command::new("cc").arg(standard).arg("-fsyntax-only").arg(empty).output();
     Ok(output.is_ok_and(|output| output.status.success()))
+}
+
+/// Names that become one identifier are an error that names both; those of a language's words are none.
+#[test]
+fn names_of_two_constants_are_refused() -> Result<()> {
+    let dir = TempDir::new()?;
+    let path = |name: &str| text(&dir.path().join(name));
+    let cases = [
+        ("angles", "q_len", "INPUT_Q_LEN", "the length of input \"q\" and of input \"q_len\""),
+        ("angles", "Q", "INPUT_Q", "input \"q\" and of input \"Q\""),
+        ("angles", "q-a", "INPUT_Q_A", "value \"a\" of input \"q\" and of input \"q-a\""),
+        ("a", "len", "INPUT_Q_LEN", "the length of input \"q\" and of value \"len\" of input \"q\""),
+        ("a", "b.", "INPUT_Q_B_", ""),
+        ("a", "int", "", ""),
+        ("angles", "static", "", ""),
+    ];
+    for (old, new, constant, owners) in cases {
+        let description = MADE.replace(&format!("\"{old}\""), &format!("\"{new}\""));
+        ensure!(description != MADE, "the fixture has changed");
+        fs::write(dir.path().join("made.actq"), Made::deployment_of(&description)?.1.four_bits()?)?;
+        for arguments in [["constants", "made.h"], ["constants", "made.rs"], ["export-c", "sources"]] {
+            let (image, out) = (path("made.actq"), path(arguments[1]));
+            let output = run(actq(&[arguments[0], &image, "--out", &out, "--force"]), b"")?;
+            if owners.is_empty() {
+                succeeded(&output)?;
+            } else {
+                failed(&output, 1, &[constant, owners, "rename one of them"])?;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn constants_replace_only_constants() -> Result<()> {
+    let dir = TempDir::new()?;
+    let path = |name: &str| dir.path().join(name);
+    fs::write(path("made.actq"), Made::deployment()?.1.four_bits()?)?;
+    for name in ["made.rs", "made.h"] {
+        let write = |more: &[&str]| {
+            let (image, out) = (text(&path("made.actq")), text(&path(name)));
+            run(actq(&[&["constants", &image, "--out", &out][..], more].concat()), b"")
+        };
+        fs::write(path(name), "// mine\n")?;
+        failed(&write(&[])?, 1, &[&format!("{name}: exists, and actq did not write it"), "--force"])?;
+        ensure!(fs::read_to_string(path(name))? == "// mine\n", "{name} is replaced");
+        succeeded(&write(&["--force"])?)?;
+        succeeded(&write(&[])?)?;
+    }
+    Ok(())
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! `actq export-c`: sources that strict compilers accept, and the bits in them.
 
+use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 
 use actq::runtime::ImageBuffer;
@@ -56,7 +59,7 @@ fn exported_sources_have_the_hosts_image_and_actions() -> Result<()> {
         expected.extend(bits(head.step(&observation.to_vec())?));
     }
     assert_eq!(numbers(&read("walker_golden.c")?, "walker_golden_actions"), expected);
-    let manifest: serde_json::Value = serde_json::from_str(&read("manifest.json")?)?;
+    let manifest: serde_json::Value = serde_json::from_str(&read("walker.json")?)?;
     assert_eq!(manifest["image"]["crc32"], image.crc());
     assert_eq!(manifest["sha256"].as_object().map(serde_json::Map::len), Some(3));
 
@@ -81,6 +84,57 @@ fn exported_sources_have_the_hosts_image_and_actions() -> Result<()> {
     // The golden run of this export would stay beside the files of the next one.
     let again = run(actq(&["export-c", &from, "--out", &out, "--name", "walker"]), b"")?;
     failed(&again, 1, &["walker_golden.c: it is of an earlier export; remove it, or pass --golden"])
+}
+
+/// Returns the names and the contents of a folder's files.
+fn content(folder: &Path) -> Result<BTreeMap<OsString, Vec<u8>>> {
+    fs::read_dir(folder)?
+        .map(|entry| entry.and_then(|e| Ok((e.file_name(), fs::read(e.path())?))))
+        .map(|e| Ok(e?))
+        .collect()
+}
+
+/// A file that no export wrote stays, and no other file is written; --force replaces it.
+#[test]
+fn exports_replace_only_exported_files() -> Result<()> {
+    let dir = TempDir::new()?;
+    let at = |name: &str| dir.path().join(name);
+    fs::write(at("made.actq"), Made::deployment()?.1.four_bits()?)?;
+    let observations = Array3::from_elem((1, 2, 12), 0.5);
+    write_observations(&at("runs.npz"), &observations)?;
+    let [image, recording, out] = ["made.actq", "runs.npz", "out"].map(|name| text(&at(name)));
+    let export = |name: &str, more: &[&str]| {
+        let options = ["export-c", &image, "--out", &out, "--golden", &recording, "--name", name];
+        run(actq(&[&options[..], more].concat()), b"")
+    };
+    succeeded(&export("walk", &[])?)?;
+    let exported = content(&at("out"))?;
+    let own: Vec<String> = exported.keys().map(|name| name.to_string_lossy().into_owned()).collect();
+    ensure!(own == ["walk.c", "walk.h", "walk.json", "walk_golden.c"], "{own:?}");
+    for name in &own {
+        let line = fs::read_to_string(at("out").join(name))?.lines().next().unwrap_or_default().to_owned();
+        let near = line.replace("made by", "once made by");
+        for foreign in ["/* by hand */", "{\"mine\": 1}", "{}", &format!("\n{line}"), &near, "\u{0}"] {
+            if foreign == line {
+                continue;
+            }
+            fs::write(at("out").join(name), foreign)?;
+            let before = content(&at("out"))?;
+            failed(&export("walk", &[])?, 1, &[&format!("{name}: exists, and actq did not write it"), "--force"])?;
+            ensure!(content(&at("out"))? == before, "{name}: something was written");
+        }
+        succeeded(&export("walk", &["--force"])?)?;
+        ensure!(content(&at("out"))? == exported, "{name} is not replaced");
+        // An empty file, as mktemp makes it, and a file of an earlier export.
+        fs::write(at("out").join(name), "")?;
+        succeeded(&export("walk", &[])?)?;
+        succeeded(&export("walk", &[])?)?;
+    }
+    // Policies with other names share the folder, each with its manifest.
+    succeeded(&export("stand", &[])?)?;
+    let both = content(&at("out"))?;
+    ensure!(both.len() == 8 && exported.iter().all(|(name, bytes)| both.get(name) == Some(bytes)), "{:?}", both.keys());
+    failed(&export("walk_golden", &[])?, 1, &["walk_golden.c: exists, and actq did not write it"])
 }
 
 #[test]

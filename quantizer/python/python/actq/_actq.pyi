@@ -91,11 +91,18 @@ class Image:
         the kernels in assembler.
         """
     def export_c(
-        self, folder: _Path, *, name: str = "policy", golden: Optional[_Path] = None, steps: int = 100
+        self,
+        folder: _Path,
+        *,
+        name: str = "policy",
+        golden: Optional[_Path] = None,
+        steps: int = 100,
+        force: bool = False,
     ) -> List[pathlib.Path]:
         """Writes the image as source code of C into `folder`, as `actq export-c` does; returns the paths.
 
         golden: a recording; NAME_golden.c gets `steps` of its observations with the bits of this host's actions.
+        force: also replaces files that no export wrote; otherwise they raise `actq.Error`, and nothing is written.
         """
     def to_onnx(self, path: _Path) -> None:
         """Writes the image's network as an ONNX file in f32, with dequantized weights.
