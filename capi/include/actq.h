@@ -135,14 +135,16 @@ enum actq_code {
   /** the image has no raw input or target of this name or number */
   ACTQ_NO_SUCH_PORT = 134,
   /** the header and the library are of different versions */
-  ACTQ_ABI_DIFFERS = 135
+  ACTQ_ABI_DIFFERS = 135,
+  /** another head has taken the scratch memory; give each head its own */
+  ACTQ_SCRATCH_TAKEN = 136
 };
 
 
 /**
  * Number of this interface: it changes with every change of a structure or a function.
  */
-#define ACTQ_ABI 1
+#define ACTQ_ABI 2
 
 /**
  * Bytes of stack that a call takes at most on a Cortex-M with the assembler kernels, without interrupts. A test
@@ -290,7 +292,8 @@ uint32_t actq_abi(void);
 
 /**
  * Initializes a head of `image` in `scratch`, of at least `actq_sizes.scratch_words` words, and resets it. `scratch`
- * belongs to the head from now on.
+ * belongs to the head from now on. A head whose scratch memory another head has taken is no longer usable: its calls
+ * return `ACTQ_SCRATCH_TAKEN`.
  */
 actq_status actq_head_init(struct actq_head *head, const struct actq_image *image, uint32_t *scratch, size_t words);
 
@@ -309,7 +312,7 @@ actq_status actq_seed(struct actq_head *head, uint32_t seed);
  * Computes the action for an observation. With action chunks it is the chunk's next action, and most steps do not run
  * the network. The call counts as one control period.
  *
- * After an error of the observation's values or of the network (81 to 83, 89, 90) `action` is unchanged, the recurrent
+ * After an error of the observation's values or of the network (81 to 83, 89 to 91) `action` is unchanged, the recurrent
  * state and the chunk are reset, and the step limit holds from the last action.
  */
 actq_status actq_step(struct actq_head *head,

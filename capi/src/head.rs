@@ -6,7 +6,7 @@ use core::task::Poll;
 use actq_kernels::{Head, StepError};
 
 use crate::image::{ActqImage, opened};
-use crate::memory::{Buffer, all_apart, apart, seal};
+use crate::memory::{Buffer, addresses, all_apart, apart, seal};
 use crate::status::{ActqStatus, Code, Failure, status};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTH");
@@ -25,12 +25,20 @@ struct Running {
     seal: usize,
     /// Addresses of the scratch memory and of the image.
     memory: [Range<usize>; 2],
+    /// The first word of the scratch memory, which names its head ([`name`]). The head does not use it.
+    owner: *const u32,
     head: Head<'static, 'static>,
     /// `true` from the begin of a step until its action is ready.
     polling: bool,
 }
 
 const _: () = assert!(size_of::<Running>() <= size_of::<ActqHead>() && align_of::<Running>() <= align_of::<ActqHead>());
+
+/// Returns the word by which scratch memory names its head: two heads at the same time have different ones.
+fn name(head: *const Running) -> u32 {
+    let address = seal(head, MAGIC) as u64;
+    (address ^ address >> 32) as u32
+}
 
 impl Running {
     /// Checks the caller's buffer: it shares no byte with this head, its scratch memory and its image.
@@ -43,7 +51,7 @@ impl Running {
         Ok(buffer)
     }
 
-    /// Checks an action's buffer. It is borrowed only when the action is ready: it may be the observation's, too.
+    /// Checks an action's buffer.
     fn action(&self, action: *mut f32, len: usize) -> Result<Buffer<f32>, Failure> {
         if len != self.head.image().act_len() {
             return Err(Code::Length.into());
@@ -82,7 +90,7 @@ unsafe fn write(to: Buffer<f32>, action: &[f32]) {
 /// # Safety
 ///
 /// `head` is null, misaligned, or valid for reads and writes, and nothing else uses it meanwhile; if it was
-/// initialized, the image's bytes and the scratch memory are still its own.
+/// initialized, the image's bytes are as they were, and its scratch memory is still there.
 unsafe fn with(head: *mut ActqHead, run: impl FnOnce(&mut Running) -> Result<(), Failure>) -> ActqStatus {
     let place = head.cast::<Running>();
     status(Buffer::new(place.cast::<usize>(), 1).and_then(|found| {
@@ -90,13 +98,19 @@ unsafe fn with(head: *mut ActqHead, run: impl FnOnce(&mut Running) -> Result<(),
         if unsafe { found.read() } != [seal(place, MAGIC)] {
             return Err(Code::NotInitialized.into());
         }
-        // SAFETY: only `actq_head_init` writes this seal, with a head after it, at this address.
+        // SAFETY: only `actq_head_init` writes this seal, with a head after it, at this address; its scratch memory
+        // is still there.
+        if unsafe { (*place).owner.read() } != name(place) {
+            return Err(Code::ScratchTaken.into());
+        }
+        // SAFETY: as above, and no other head has taken the scratch memory.
         run(unsafe { &mut *place })
     }))
 }
 
 /// Initializes a head of `image` in `scratch`, of at least `actq_sizes.scratch_words` words, and resets it. `scratch`
-/// belongs to the head from now on.
+/// belongs to the head from now on. A head whose scratch memory another head has taken is no longer usable: its calls
+/// return `ACTQ_SCRATCH_TAKEN`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_head_init(
     head: *mut ActqHead,
@@ -119,11 +133,14 @@ pub unsafe extern "C" fn actq_head_init(
         // SAFETY: as the caller promises.
         unsafe { structure.write() }.fill(0);
         let (opened, scratch) = (opened?, scratch?);
-        // SAFETY: as the caller promises.
-        let new = Head::new(opened.image, unsafe { scratch.write() })?;
         let place = head.cast::<Running>();
+        let owner = scratch.pointer();
+        // SAFETY: as the caller promises.
+        let (first, rest) = unsafe { scratch.write() }.split_first_mut().ok_or(Code::ScratchTooSmall)?;
+        let new = Head::new(opened.image, rest)?;
+        *first = name(place);
         // SAFETY: valid as the words above.
-        unsafe { place.write(Running { seal: seal(place, MAGIC), memory, head: new, polling: false }) };
+        unsafe { place.write(Running { seal: seal(place, MAGIC), memory, owner, head: new, polling: false }) };
         Ok(())
     };
     status(init())
@@ -159,7 +176,7 @@ pub unsafe extern "C" fn actq_seed(head: *mut ActqHead, seed: u32) -> ActqStatus
 /// Computes the action for an observation. With action chunks it is the chunk's next action, and most steps do not run
 /// the network. The call counts as one control period.
 ///
-/// After an error of the observation's values or of the network (81 to 83, 89, 90) `action` is unchanged, the recurrent
+/// After an error of the observation's values or of the network (81 to 83, 89 to 91) `action` is unchanged, the recurrent
 /// state and the chunk are reset, and the step limit holds from the last action.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_step(
@@ -176,7 +193,9 @@ pub unsafe extern "C" fn actq_step(
                 return Err(Code::Polling.into());
             }
             let action = running.action(action, action_len)?;
-            write(action, running.head.step(running.observation(observation, observation_len)?)?);
+            let observation = running.observation(observation, observation_len)?;
+            apart(&action.addresses(), &addresses(observation))?;
+            write(action, running.head.step(observation)?);
             Ok(())
         })
     }

@@ -200,7 +200,8 @@ pub unsafe extern "C" fn actq_image_sizes(image: *const ActqImage, sizes: *mut S
     let get = |image: Image<'static>| {
         Ok(Sizes {
             image_bytes: image.bytes(),
-            scratch_words: image.scratch_words(),
+            // One word names the head.
+            scratch_words: image.scratch_words() + 1,
             observation_len: image.obs_len(),
             action_len: image.act_len(),
             chunk: image.chunk(),

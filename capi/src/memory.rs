@@ -25,6 +25,11 @@ impl<T> Buffer<T> {
         Self::new(pointer, len)
     }
 
+    /// Returns the address of the values.
+    pub(crate) fn pointer(&self) -> *const T {
+        self.pointer
+    }
+
     /// Returns the addresses of the values. An empty buffer has none.
     pub(crate) fn addresses(&self) -> Range<usize> {
         // The check has refused a length for which this would wrap.
@@ -78,6 +83,12 @@ fn check(address: usize, align: usize, size: usize, len: usize) -> Result<(), Fa
         Some(_) => Ok(()),
         None => Err(Code::Length.into()),
     }
+}
+
+/// Returns the addresses of values.
+pub(crate) fn addresses<T>(values: &[T]) -> Range<usize> {
+    let ends = values.as_ptr_range();
+    ends.start as usize..ends.end as usize
 }
 
 /// Requires that two ranges share no byte.

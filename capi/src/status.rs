@@ -150,6 +150,8 @@ codes! {
     NoSuchPort = 134, c"the image has no raw input or target of this name or number";
     /// The header is that of another library. (Only `actq.hpp` returns it.)
     AbiDiffers = 135, c"the header and the library are of different versions";
+    /// Another head has taken the scratch memory.
+    ScratchTaken = 136, c"another head has taken the scratch memory; give each head its own";
 }
 
 /// The status of a call that failed: a [`Code`], or the number of the kernels' error, which a code has, too.

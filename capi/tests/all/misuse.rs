@@ -4,8 +4,8 @@ use std::ptr::{null, null_mut};
 
 use actq_c::{
     ActqHead, ActqImage, CPort, Code, actq_begin, actq_head_init, actq_image_cost, actq_image_open,
-    actq_image_open_checksummed, actq_image_port, actq_image_sizes, actq_poll, actq_reset, actq_restore, actq_save,
-    actq_saved_bytes, actq_set_input, actq_step,
+    actq_image_open_checksummed, actq_image_port, actq_image_sizes, actq_least_budget, actq_pass, actq_play, actq_poll,
+    actq_reset, actq_restore, actq_save, actq_saved_bytes, actq_seed, actq_self_test, actq_set_input, actq_step,
 };
 
 use super::{Aligned, BYTES, OK, Program};
@@ -100,10 +100,10 @@ fn unopened_and_copied_structures_are_errors() {
 }
 
 #[test]
-fn only_action_and_observation_may_overlap() {
+fn overlapping_buffers_are_errors() {
     let mut program = Program::start();
     let (obs, act) = program.lengths();
-    let mut values = vec![0.5f32; obs.max(act)];
+    let mut values = vec![0.5f32; obs + act];
     let (image, head) = (program.image(), program.head());
     let scratch = program.scratch.as_mut_ptr();
     let words = program.scratch.len();
@@ -118,12 +118,59 @@ fn only_action_and_observation_may_overlap() {
         actq_saved_bytes(head, head.cast()) => Overlap;
         actq_step(head, v, obs, BYTES.0.as_ptr().cast::<f32>().cast_mut(), act) => Overlap;
         actq_image_sizes(image, image.cast()) => Overlap;
-        actq_step(head, v, obs, v, act) => Ok;
+        actq_step(head, v, obs, v, act) => Overlap;
+        actq_step(head, v, obs, v.wrapping_add(obs - 1), act) => Overlap;
+        actq_step(head, v.wrapping_add(act - 1), obs, v, act) => Overlap;
+        actq_step(head, v, obs, v.wrapping_add(obs), act) => Ok;
+        actq_step(head, v.wrapping_add(act), obs, v, act) => Ok;
         actq_head_init(head, image, image.cast(), 4) => Overlap;
         actq_head_init(head, image, BYTES.0.as_ptr().cast::<u32>().cast_mut(), 4) => Overlap;
         actq_head_init(head, image, scratch, words) => Ok;
         actq_image_open(image, image.cast(), 40) => Overlap;
         actq_image_open_checksummed(image, image.cast(), 40) => Overlap;
+    }
+}
+
+/// Every call on a head is an error once another one was initialized in its scratch memory, or in a part of it that it
+/// writes, until it is initialized in its own again.
+#[test]
+fn scratch_memory_belongs_to_the_last_head() {
+    let (mut first, mut second) = (Program::start(), Program::start());
+    let (obs, act) = first.lengths();
+    let (observation, mut action) = (vec![0.5f32; obs], vec![7.0f32; act]);
+    let (o, a) = (observation.as_ptr(), action.as_mut_ptr());
+    let words = first.scratch.len();
+    let mut shared = vec![0u32; 2 * words];
+    let shared = shared.as_mut_ptr();
+    let (image, one, other) = (first.image(), first.head(), second.head());
+    let mut number = 0;
+    gives! {
+        actq_head_init(one, image, shared, words - 1) => ScratchTooSmall;
+        actq_head_init(one, image, shared, words) => Ok;
+        actq_step(one, o, obs, a, act) => Ok;
+        actq_begin(one, o, obs) => Ok;
+        actq_head_init(other, image, shared, words) => Ok;
+        actq_poll(one, u32::MAX, a, act) => ScratchTaken;
+        actq_step(one, o, obs, a, act) => ScratchTaken;
+        actq_begin(one, o, obs) => ScratchTaken;
+        actq_play(one, a, act) => ScratchTaken;
+        actq_reset(one) => ScratchTaken;
+        actq_seed(one, 1) => ScratchTaken;
+        actq_pass(one, 1) => ScratchTaken;
+        actq_self_test(one) => ScratchTaken;
+        actq_least_budget(one, &mut number) => ScratchTaken;
+        actq_saved_bytes(one, null_mut()) => ScratchTaken;
+        actq_save(one, null_mut(), 0) => ScratchTaken;
+        actq_restore(one, null(), 0) => ScratchTaken;
+        actq_self_test(other) => Ok;
+        actq_head_init(one, image, shared.wrapping_add(words), words) => Ok;
+        actq_self_test(one) => Ok;
+        actq_self_test(other) => Ok;
+        // The end of one head's memory is the begin of the other's.
+        actq_head_init(other, image, shared.wrapping_add(words + 1), words - 1) => ScratchTooSmall;
+        actq_head_init(other, image, shared.wrapping_add(1), words) => Ok;
+        actq_step(one, o, obs, a, act) => ScratchTaken;
+        actq_self_test(other) => Ok;
     }
 }
 

@@ -148,7 +148,7 @@ fn structures_and_numbers_match_the_interface_version() {
         size_of::<CPort>(),
         size_of::<CCost>(),
     ];
-    assert_eq!((ACTQ_ABI, sizes), (1, [48, 320, 64, 16, 64, 24]));
+    assert_eq!((ACTQ_ABI, sizes), (2, [48, 320, 64, 16, 64, 24]));
     let own: Vec<_> = Code::ALL.iter().filter(|code| !(1..128).contains(&(**code as i32))).copied().collect();
     let numbers: Vec<i32> = own.iter().map(|code| *code as i32).collect();
     assert_eq!(
@@ -165,8 +165,9 @@ fn structures_and_numbers_match_the_interface_version() {
                 Code::Polling,
                 Code::NoSuchPort,
                 Code::AbiDiffers,
+                Code::ScratchTaken,
             ],
-            vec![0, -1, 128, 129, 130, 131, 132, 133, 134, 135],
+            vec![0, -1, 128, 129, 130, 131, 132, 133, 134, 135, 136],
         )
     );
 }
