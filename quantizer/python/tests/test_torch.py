@@ -194,6 +194,14 @@ def test_memory_of_a_torchscript_file_is_refused(tmp_path):
         actq.import_policy(tmp_path / "filter.pt", torch.zeros(1, 6))
 
 
+def test_a_failed_export_prints_no_graph(capfd, tmp_path):
+    torch.jit.script(Cell()).save(tmp_path / "cell.pt")
+    capfd.readouterr()
+    with pytest.raises(actq.Error, match="cell: torch cannot export the module: "):
+        actq.import_policy(tmp_path / "cell.pt", torch.zeros(1, 6))
+    assert "graph" not in "".join(capfd.readouterr())
+
+
 def test_values_that_nothing_reads_are_no_memory():
     class Recorded(Net):
         def forward(self, x):

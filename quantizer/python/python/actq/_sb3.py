@@ -20,6 +20,9 @@ def is_policy(module: Any) -> bool:
 class Deterministic(torch.nn.Module):
     """What `policy.predict(obs, deterministic=True)` returns. For Discrete, scores whose largest is that action."""
 
+    low: torch.Tensor
+    high: torch.Tensor
+
     def __init__(self, policy: Any, name: str) -> None:
         super().__init__()
         self.policy = policy

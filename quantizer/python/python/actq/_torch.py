@@ -56,12 +56,18 @@ def import_module(
     inputs = tuple(tensor.to(device) for tensor in inputs)
     with torch.random.fork_rng([device] if device.type == "cuda" else []), torch.no_grad():
         source = Source(module, inputs, name, input_names, output_names)
-        with warnings.catch_warnings(record=True) as caught, contextlib.redirect_stdout(io.StringIO()):
+        with warnings.catch_warnings(record=True) as caught, silenced():
             # A filter of the caller must not turn them into exceptions.
             warnings.simplefilter("always")
             content = source.onnx_bytes()
-        branches = [warning for warning in caught if issubclass(warning.category, torch.jit.TracerWarning)]
-        policy, plan = _actq.import_onnx(content, name=name, output=output, states=list(states))
+        # Torch exports the name without saying so.
+        tracer: Any = torch.jit
+        branches = [warning for warning in caught if issubclass(warning.category, tracer.TracerWarning)]
+        try:
+            policy, plan = _actq.import_onnx(content, name=name, output=output, states=list(states))
+        except Error as error:
+            changed = source.kept_values()
+            raise (Error(f"{name}: {memory(changed)}") if changed else error) from error.__cause__
         source.compare(plan, branches)
     return policy
 
@@ -180,6 +186,18 @@ class Source:
         if still:
             log.warning("%s: actions %s are constant over all drawn observations; nothing is known of them", self.name, still)
 
+    def kept_values(self) -> List[str]:
+        """Names the values that steps have changed, if outputs depend on earlier steps."""
+        used, random = self.copied(), torch.Generator().manual_seed(1)
+        with contextlib.suppress(Exception):
+            for _ in range(8):
+                given = [torch.randn(x.shape, generator=random).to(x) for x in self.inputs]
+                later = list(tensors(used(*given), "output", self.name))
+            first = tensors(self.copied()(*given), "output", self.name)
+            if not all(torch.equal(a, b) for (_, a), (_, b) in zip(first, later)):
+                return changed_values(self.copied(), used)
+        return []
+
     def _is_rounding(self, plan: Dict[str, Any], found: Array) -> bool:
         """Returns `True` if the policy differs as the module itself does when its weights change by a rounding: what
         float32 loses is no more than that."""
@@ -238,7 +256,18 @@ def share(difference: Array, actions: Array) -> float:
     return float((np.where(np.isnan(difference), np.inf, difference) / scale(actions)).max())
 
 
-COPIED_LEAF = torch.Tensor.__deepcopy__
+@contextlib.contextmanager
+def silenced() -> Iterator[None]:
+    """Keeps torch from printing whole graphs when an export fails; the error has the reason."""
+    switch = getattr(torch._C, "_jit_set_onnx_log_enabled", lambda on: None)
+    switch(False)
+    # The exporter itself switches its log on, also if it is not asked to.
+    off = mock.patch.object(torch._C, "_jit_set_onnx_log_enabled", lambda on: None, create=True)
+    with off, contextlib.redirect_stdout(io.StringIO()):
+        yield
+
+
+COPIED_LEAF: Any = torch.Tensor.__deepcopy__
 
 
 def copied_tensor(tensor: torch.Tensor, memo: Dict[int, Any]) -> Any:
