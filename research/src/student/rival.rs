@@ -151,6 +151,6 @@ impl<'a> Teacher<'a> {
         }
         let image = emit::image(&policy, &outcomes)?;
         let rate = Rate::Bytes(image.len());
-        Ok(QuantizedPolicy { policy, outcomes, image, rate, learning: None, search: None, time: None })
+        Ok(QuantizedPolicy { policy, outcomes, image, rate, learning: None, search: None, held_out: None, time: None })
     }
 }

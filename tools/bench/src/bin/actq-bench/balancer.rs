@@ -102,7 +102,7 @@ impl F32 {
         run_episode(seed, |raw| {
             see(raw);
             let inputs = self.0.plan().split(raw);
-            let tick = self.0.step(&inputs);
+            let tick = self.0.step(&inputs)?;
             let (_, torque) = tick.targets.first().context("the bundle has no target")?;
             torques(&torque.iter().map(|x| *x as f32).collect::<Vec<_>>())
         })
