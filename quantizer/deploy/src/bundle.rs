@@ -1,7 +1,7 @@
 //! The files of a bundle.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
@@ -103,6 +103,15 @@ impl Bundle {
     pub fn with_ending<'a>(&'a self, ending: &'a str) -> impl Iterator<Item = &'a str> + 'a {
         let ends = move |file: &&str| Path::new(file).extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
         self.files().filter(ends)
+    }
+
+    /// Returns what the nodes of the networks that were opened do with NaN and infinity, and the policy does not.
+    pub fn guards(&self) -> BTreeSet<String> {
+        let opened = self.opened.borrow();
+        let of_file = |((file, _), network): (&(String, Vec<String>), &OnnxNetwork)| {
+            network.guards.iter().map(|guard| format!("{file}: {guard}")).collect::<Vec<_>>()
+        };
+        opened.iter().flat_map(of_file).collect()
     }
 
     /// Returns the file whose path is, or ends in, `name`; `None` if there is none.

@@ -67,7 +67,9 @@ impl Deployment {
         digest.update(&text);
         for file in description.files() {
             let path = bundle.path(file)?;
-            digest.update(fs::read(&path).with_context(|| path.display().to_string())?);
+            for path in if Onnx.accepts(&path) { Onnx.files(&path) } else { vec![path] } {
+                digest.update(fs::read(&path).with_context(|| path.display().to_string())?);
+            }
         }
         found.policy.digest = digest.finalize().into();
         found.policy.dir = path.to_owned();

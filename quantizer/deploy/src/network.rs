@@ -1,5 +1,6 @@
 //! Networks of ONNX files, in f32.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -19,6 +20,8 @@ pub(crate) struct OnnxNetwork {
     kept: Vec<(String, String)>,
     lens: Vec<usize>,
     outputs: Vec<Output>,
+    /// What the file's nodes do with NaN and infinity, and the operations here do not.
+    pub(crate) guards: BTreeSet<String>,
 }
 
 /// An output and the inputs that it depends on.
@@ -39,7 +42,7 @@ impl OnnxNetwork {
         ensure!(!outputs.is_empty(), "nothing reads an output of it; remove it");
         let signature = Signature::read(path)?;
         let mut lens = vec![None; signature.inputs.len()];
-        let (mut opened, mut kept) = (Vec::new(), Vec::new());
+        let (mut opened, mut kept, mut guards) = (Vec::new(), Vec::new(), BTreeSet::new());
         for name in outputs {
             let read = |is_inner| -> Result<_> {
                 let choice = Choice { output: Some(name.clone()), is_fed: true, is_inner, ..Choice::default() };
@@ -50,6 +53,7 @@ impl OnnxNetwork {
             let (imported, policy) = read(false)?;
             let has_contract = policy.contract.arrays().iter().any(|(_, array)| array.is_some());
             let inner = if has_contract { read(true)?.1 } else { policy.clone() };
+            guards.extend(imported.guards);
             let mut reads = Vec::new();
             for (input, len) in &imported.inputs {
                 let at = signature.inputs.iter().position(|(name, _)| name == input);
@@ -70,7 +74,7 @@ impl OnnxNetwork {
         }
         let inputs = used.iter().filter_map(|&i| Some((signature.inputs[i].0.clone(), lens[i]?))).collect();
         let lens = opened.iter().map(|output| output.policy.chunk * output.policy.act_len).collect();
-        Ok(Self { inputs, kept, lens, outputs: opened })
+        Ok(Self { inputs, kept, lens, outputs: opened, guards })
     }
 }
 

@@ -1,4 +1,5 @@
 //! Parsing of ONNX files: protobuf messages, and the graph in them.
 
+pub(crate) mod kinds;
 pub(crate) mod model;
 pub mod proto;

@@ -177,7 +177,7 @@ impl Lowered {
                 };
                 bail!(
                     "{what} has a kernel only within a norm, an activation or a cell; compute it before the policy, as an input, or \
-                     after the policy"
+                     after the policy, with the value before it as the action by --output NAME"
                 )
             }
             Expr::Sum(_) | Expr::Input(_) | Expr::Integers(_) | Expr::Pick(_) | Expr::Spread(_) => {

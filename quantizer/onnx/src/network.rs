@@ -5,6 +5,7 @@ mod choice;
 mod files;
 mod observation;
 mod output;
+mod remarks;
 
 use std::path::{Path, PathBuf};
 
@@ -25,7 +26,7 @@ use crate::file::model::Model;
 use crate::lower::lower;
 use crate::nodes::follow::Follower;
 use crate::patterns::simplify::simplify;
-use crate::states::{Cells, Output};
+use crate::states::{Cells, Chosen, Output};
 use crate::values::elements::value;
 use crate::values::expr::{Exprs, Id};
 use crate::values::tensor::{Element, Tensor};
@@ -61,6 +62,10 @@ pub struct Imported {
     pub contract: Vec<&'static str>,
     /// Number of actions whose limits are the bounds of their last operation, such as tanh.
     pub bounded: usize,
+    /// Nodes before the action that replace or limit NaN and infinity, with what they do. The policy has no such nodes.
+    pub guards: Vec<String>,
+    /// Reasons why the file is invalid, although its network can be read.
+    pub faults: Vec<String>,
 }
 
 /// Imports an ONNX file. An error names the file, and the node if known.
@@ -90,6 +95,16 @@ pub fn import_bytes(bytes: Vec<u8>, folder: &Path, name: &str, choice: &Choice) 
     import_model(&Model::parse(Bytes::from(bytes), folder)?, name, choice)
 }
 
+/// Returns the files that hold weights of an ONNX file, by their paths from its folder. They need not exist.
+///
+/// # Errors
+///
+/// If the file cannot be read, or a path leaves its folder.
+pub fn data_files(path: &Path) -> Result<Vec<PathBuf>> {
+    let files = Model::read(path).and_then(|model| model.external_files());
+    Ok(files.with_context(|| path.display().to_string())?.into_iter().collect())
+}
+
 /// Importer of ONNX files, without choices.
 #[derive(Clone, Copy, Debug)]
 pub struct Onnx;
@@ -100,7 +115,7 @@ impl Importer for Onnx {
     }
 
     fn files(&self, path: &Path) -> Vec<PathBuf> {
-        let external = Model::read(path).map(|model| model.external_files()).unwrap_or_default();
+        let external = data_files(path).unwrap_or_default().into_iter().map(|file| path.with_file_name(file));
         [path.to_owned()].into_iter().chain(external).collect()
     }
 
@@ -122,7 +137,8 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
     let live = exprs.needed_instead(&[root], &cells.instead);
     refuse_integers(model, &exprs, &live)?;
     let pairs = cells.pairs(model, &exprs, &live, &outputs)?;
-    let observed = observed_inputs(model, &exprs, &live, (&pairs, &outputs), &output.name, choice)?;
+    let graph = Chosen { model, exprs: &exprs, cells: &cells, outputs: &outputs, action: &output.name };
+    let observed = observed_inputs(&graph, &live, &pairs, choice)?;
     let observation = Observation::of(model, &exprs, &live, &observed);
     let states = named_states(model, &pairs, &outputs);
 
@@ -153,6 +169,8 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
         ..PolicyJson::default()
     };
     let source = format!("ONNX by {}", model.producer);
+    let next = pairs.iter().map(|&(_, next)| outputs[next].name.clone());
+    let guards = remarks::guards(model, &exprs, &[output.name.clone()].into_iter().chain(next).collect::<Vec<_>>())?;
     let action = printable(&output.name).into_owned();
     Ok(Imported {
         json: text(json, &lowered, &observation.inputs, &states, &source)?,
@@ -169,6 +187,8 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
         nodes: model.graph.nodes.len(),
         contract: last,
         bounded,
+        guards,
+        faults: remarks::faults(model),
     })
 }
 

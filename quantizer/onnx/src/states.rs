@@ -6,6 +6,7 @@ use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 
 use crate::file::model::Model;
+use crate::values::elements::value;
 use crate::values::expr::{Expr, Exprs, Id, Run};
 use crate::values::tensor::{Element, Tensor};
 
@@ -157,41 +158,123 @@ fn stem(name: &str) -> String {
     joined
 }
 
-/// Refuses inputs that look like a state but belong to no cell: the policy would read them as constant observations.
-pub(crate) fn refuse_lost_states(
-    model: &Model,
-    live_inputs: &[usize],
-    pairs: &Pairs,
-    outputs: &[Output],
-    action: &str,
-    named: &[(String, String)],
-) -> Result<()> {
-    let help = "only states of LSTM and GRU cells (in torch's forms) are carried from step to step; make any other memory an \
-                observation, an input without an output";
-    for (from, to) in named {
-        let is_pair = |(i, o): &(usize, usize)| model.graph.inputs[*i].name == *from && outputs[*o].name == *to;
-        ensure!(
-            pairs.iter().any(is_pair),
-            "--state {}={}: no cell between them leads to the action; {help}",
-            printable(from),
-            printable(to)
-        );
-    }
-    for &i in live_inputs.iter().filter(|i| !pairs.iter().any(|(state, _)| state == *i)) {
-        let port = &model.graph.inputs[i];
-        let len: usize = port.shape.iter().flatten().map(|n| n.unwrap_or(1)).product();
-        let same = |output: &&Output| {
-            output.name != action && output.value.len() == len && are_sides(&port.name, &output.name)
-        };
-        if let Some(output) = outputs.iter().find(same) {
-            bail!(
-                "the input {:?} and the output {:?} look like a recurrent state, but no LSTM or GRU cell is between them; {help}",
-                printable(&port.name),
-                printable(&output.name)
+/// A graph with its cells, whose action is chosen.
+pub(crate) struct Chosen<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) exprs: &'a Exprs,
+    pub(crate) cells: &'a Cells,
+    pub(crate) outputs: &'a [Output],
+    /// Name of the action.
+    pub(crate) action: &'a str,
+}
+
+impl Chosen<'_> {
+    /// Refuses inputs that look like a state but belong to no cell, and are not among the `observed`: the policy would
+    /// read them as observations. `live` are the inputs that the action reads, `named` the pairs of the caller.
+    pub(crate) fn refuse_lost_states(
+        &self,
+        live: &[usize],
+        pairs: &Pairs,
+        named: &[(String, String)],
+        observed: &[String],
+    ) -> Result<()> {
+        let help = "only states of LSTM and GRU cells (in torch's forms) are carried from step to step; make any other memory an \
+                    observation, an input without an output";
+        for (from, to) in named {
+            let is_pair =
+                |(i, o): &(usize, usize)| self.model.graph.inputs[*i].name == *from && self.outputs[*o].name == *to;
+            ensure!(
+                pairs.iter().any(is_pair),
+                "--state {}={}: no cell between them leads to the action; {help}",
+                printable(from),
+                printable(to)
             );
         }
+        for name in observed {
+            let at = live.iter().find(|i| self.model.graph.inputs[**i].name == *name);
+            let at = at.with_context(|| format!("--observe {}: the action does not depend on it", printable(name)))?;
+            ensure!(
+                !pairs.iter().any(|(state, _)| state == at),
+                "--observe {}: an LSTM or GRU cell reads it as its state, which the policy keeps",
+                printable(name)
+            );
+        }
+        let is_open = |i: &&usize| {
+            let name = &self.model.graph.inputs[**i].name;
+            !pairs.iter().any(|(state, _)| state == *i) && !observed.contains(name)
+        };
+        for &i in live.iter().filter(is_open) {
+            let port = &self.model.graph.inputs[i];
+            let name = printable(&port.name);
+            ensure!(
+                !self.is_read_by_cells(i),
+                "the action reads the input {name:?} before the cell that has it as its state; only the value after the step has an \
+                 operation"
+            );
+            let len: usize = port.shape.iter().flatten().map(|n| n.unwrap_or(1)).product();
+            let next = self.outputs.iter().find(|output| {
+                output.name != self.action
+                    && output.value.len() == len
+                    && are_sides(&port.name, &output.name)
+                    && !self.is_observation(i, live, output)
+            });
+            if let Some(output) = next {
+                bail!(
+                    "the input {name:?} and the output {:?} look like a recurrent state, but no LSTM or GRU cell is between them; if it \
+                     is measured anew in each step, pass --observe {name}; {help}",
+                    printable(&output.name)
+                );
+            }
+        }
+        Ok(())
     }
-    Ok(())
+
+    /// Returns `true` if a cell of any output has this input as its state.
+    fn is_read_by_cells(&self, input: usize) -> bool {
+        let is_input = |run: &Run| *self.exprs.get(run.of) == Expr::Input(input);
+        self.needed(self.outputs).iter().any(|&id| match self.exprs.get(id) {
+            Expr::Cell(cell) => cell.states.iter().any(is_input),
+            _ => false,
+        })
+    }
+
+    /// Returns `true` if an input is no state, although an output may be its next value: it has an observation's name,
+    /// or the graph only passes it on, or the policy would observe nothing in any step.
+    fn is_observation(&self, input: usize, live: &[usize], next: &Output) -> bool {
+        let name = &self.model.graph.inputs[input].name;
+        if parts(name).any(|part| MEMORY.contains(&part.as_str())) {
+            return false;
+        }
+        let is_passed = |(k, element): (usize, &Element)| {
+            value(element).is_some_and(|(id, i)| i == k && *self.exprs.get(id) == Expr::Input(input))
+        };
+        let reads = self.needed(std::slice::from_ref(next));
+        let is_other = |&id: &Id| matches!(self.exprs.get(id), Expr::Input(i) | Expr::Integers(i) if *i != input);
+        let last = stem(name).rsplit('_').next().map(str::to_owned);
+        last.is_some_and(|last| ["obs", "observation", "observations"].contains(&last.as_str()))
+            || next.value.elements().iter().enumerate().all(is_passed)
+            || live == [input] && !reads.iter().any(is_other)
+    }
+
+    /// Lists the expressions that outputs need.
+    fn needed(&self, outputs: &[Output]) -> Vec<Id> {
+        let ids = outputs.iter().flat_map(|output| self.cells.elements(&output.value));
+        let mut ids: Vec<Id> = ids.filter_map(|element| value(&element)).map(|(id, _)| id).collect();
+        ids.dedup();
+        self.exprs.needed_instead(&ids, &self.cells.instead)
+    }
+}
+
+/// Parts of names of what a network remembers.
+const MEMORY: [&str; 20] = [
+    "hidden", "memory", "history", "hist", "carry", "h", "h0", "h1", "hn", "c", "c0", "c1", "cn", "prev", "previous",
+    "last", "old", "buffer", "lstm", "gru",
+];
+
+/// Splits a name into lower-case parts.
+fn parts(name: &str) -> impl Iterator<Item = String> {
+    let parts = name.split(|c: char| !c.is_ascii_alphanumeric()).map(str::to_lowercase);
+    parts.collect::<Vec<_>>().into_iter()
 }
 
 /// Returns `true` if two names are those of one state, before a step and after it.

@@ -171,7 +171,9 @@ fn import_bundle(path: &Path, accept_profile: bool, answers: &str) -> PyResult<P
         .or_raise()?;
     let folder = Scratch::new().or_raise()?;
     for (name, content) in Gathered::of(&bundle, &reading).or_raise()?.files {
-        fs::write(folder.path().join(name), content).or_raise()?;
+        let place = folder.path().join(name);
+        fs::create_dir_all(place.parent().unwrap_or(folder.path())).or_raise()?;
+        fs::write(place, content).or_raise()?;
     }
     let mut policy = load(folder.path()).map_err(|error| error.context(DESCRIPTION)).or_raise()?;
     policy.dir = folder.path().to_owned();

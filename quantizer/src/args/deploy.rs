@@ -24,6 +24,9 @@ pub(crate) struct ImportArgs {
     /// the LSTM and GRU cells]
     #[arg(long, value_name = "IN=OUT", value_parser = pair)]
     pub(crate) state: Vec<(String, String)>,
+    /// An input that is measured anew in each step, although its name is that of a state or a constant; may be repeated
+    #[arg(long, value_name = "NAME")]
+    pub(crate) observe: Vec<String>,
     /// Compare the actions with onnxruntime's, on the recording or on random observations, to 1e-5 of the largest
     /// action. If they differ, a run in float64 decides which is right. Needs Python with onnxruntime and onnx
     /// (python3, or the interpreter that ACTQ_PYTHON names)

@@ -1,17 +1,18 @@
 //! `actq import` of a deploy bundle
 
-use std::collections::BTreeMap;
-use std::ffi::OsStr;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
 use actq::data::NpzWriter;
+use actq::import::Importer as _;
 use actq::text::count;
 use actq_deploy::description::Description;
 use actq_deploy::{
     Answers, Bundle, DESCRIPTION, Deployment, Plan, Raw, Reading, Reference, Runner, explain, orders, read,
 };
+use actq_onnx::{Onnx, data_files};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::import::refuse_existing;
@@ -30,8 +31,8 @@ pub(crate) fn is_bundle(args: &ImportArgs) -> bool {
 
 /// Reads a bundle, checks it, and writes its description with copies of the networks.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
-    let of_files = args.output.is_some() || !args.state.is_empty();
-    ensure!(!of_files, "a bundle takes no --output and no --state: its description names them");
+    let of_files = args.output.is_some() || !args.state.is_empty() || !args.observe.is_empty();
+    ensure!(!of_files, "a bundle takes no --output, --state and --observe: its description names them");
     ensure!(
         !args.check || args.reading.reference.is_some(),
         "--check of a bundle needs --reference RAW.npz:EXPECT.npz"
@@ -45,6 +46,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     };
     note(deployment::unread(&reading.unread));
     note(deployment::without_limits(&reading.description));
+    note(deployment::guards(&bundle.guards()));
 
     let Gathered { mut files, mut inputs } = Gathered::of(&bundle, &reading)?;
     inputs.extend(args.calib.iter().chain(&args.reading.answers).cloned());
@@ -57,6 +59,9 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     let names: Vec<&Path> = names.iter().map(PathBuf::as_path).collect();
     refuse_existing(args, &names)?;
     let _folder = OutputFolder::new(&args.out)?;
+    // The deepest folders come first, so that all those that stay empty can be removed.
+    let folders: BTreeSet<&Path> = names.iter().filter_map(|path| path.parent()).collect();
+    let _folders: Vec<OutputFolder> = folders.into_iter().rev().map(OutputFolder::new).collect::<Result<_>>()?;
     reserve(&names, &inputs)?.write(&contents)?;
     print(&deployment::summary(&reading))?;
     if let Some(checked) = checked {
@@ -167,7 +172,7 @@ pub struct Gathered {
 impl Gathered {
     /// Reads the files that a description names.
     pub fn of(bundle: &Bundle, reading: &Reading) -> Result<Self> {
-        let (description, copies) = gathered(&reading.description)?;
+        let (description, copies) = gathered(&reading.description, bundle)?;
         let inputs: Vec<PathBuf> = copies.keys().map(|file| bundle.path(file)).collect::<actq::error::Result<_>>()?;
         let mut files = vec![(DESCRIPTION.to_owned(), description.to_toml(&reading.sources)?.into_bytes())];
         for (name, path) in copies.into_values().zip(&inputs) {
@@ -178,21 +183,38 @@ impl Gathered {
     }
 }
 
-/// Returns the description with its files in one folder, and their names there by their paths in the bundle.
-fn gathered(description: &Description) -> Result<(Description, BTreeMap<String, String>)> {
+/// Returns the description with its files in one folder, and the names there of all files that it needs, by their paths
+/// in the bundle. A network's weights keep their place beside it. If two files would have one name, all keep their paths.
+fn gathered(description: &Description, bundle: &Bundle) -> Result<(Description, BTreeMap<String, String>)> {
+    let mut moved: Vec<(String, String)> = Vec::new();
+    for file in description.files() {
+        let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let name = file.rsplit('/').next().unwrap_or(file);
+        moved.push((file.to_owned(), name.to_owned()));
+        if Onnx.accepts(Path::new(file)) {
+            for data in data_files(&bundle.path(file)?)? {
+                let name = data.to_str().with_context(|| format!("{}: the name is not UTF-8", data.display()))?;
+                moved.push((joined(folder, name), name.to_owned()));
+            }
+        }
+    }
+    let places: BTreeSet<&(String, String)> = moved.iter().collect();
+    let [files, names]: [BTreeSet<&String>; 2] =
+        [places.iter().map(|(file, _)| file).collect(), places.iter().map(|(_, name)| name).collect()];
+    let is_one_to_one = files.len() == places.len() && names.len() == places.len();
+    let copies: BTreeMap<String, String> =
+        moved.into_iter().map(|(file, name)| if is_one_to_one { (file, name) } else { (file.clone(), file) }).collect();
     let mut description = description.clone();
-    let mut copies: BTreeMap<String, String> = BTreeMap::new();
     let networks = description.networks.iter_mut().map(|network| &mut network.file);
     for file in networks.chain(description.motions.iter_mut().map(|motion| &mut motion.file)) {
-        let name = Path::new(file.as_str()).file_name().and_then(OsStr::to_str);
-        let mut name = name.with_context(|| format!("{file:?} is not the name of a file"))?.to_owned();
-        // Files of one name in two folders take the folders' names.
-        if copies.iter().any(|(other, taken)| other != file && *taken == name) {
-            name = file.replace('/', "_");
-        }
-        *file = copies.entry(file.clone()).or_insert(name).clone();
+        file.clone_from(&copies[file]);
     }
     Ok((description, copies))
+}
+
+/// Joins the path of a folder, which may be empty, and a path in it.
+fn joined(folder: &str, path: &str) -> String {
+    if matches!(folder, "" | ".") { path.to_owned() } else { format!("{folder}/{path}") }
 }
 
 /// Returns a recording of what the networks read, made of raw inputs: what they learn from.

@@ -7,10 +7,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use actq::data::files_of;
+use actq::import::Importer as _;
 use actq::methods::{Effort, Method};
 use actq::runtime::ImageBuffer;
 use actq_deploy::description::Description;
 use actq_deploy::{Bundle, DESCRIPTION};
+use actq_onnx::{Onnx, data_files};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::{bundle, check, constants, quantize};
@@ -86,6 +88,7 @@ fn import_bundle(args: &DeployArgs, policy: &Path, description: &Path) -> Result
             calib: raw.filter(|_| only_reference),
             output: None,
             state: Vec::new(),
+            observe: Vec::new(),
             check: false,
             reading: args.reading.clone(),
             force: false,
@@ -105,7 +108,12 @@ fn checksums(bundle: &Path) -> Result<String> {
     let files = Bundle::open(bundle)?;
     let mut text = String::new();
     for file in files.files() {
-        text += &format!("{:08x} {file}\n", checksum(&files.path(file)?)?);
+        let path = files.path(file)?;
+        text += &format!("{:08x} {file}\n", checksum(&path)?);
+        // A bundle of one file may have weights beside it.
+        for data in if bundle.is_file() && Onnx.accepts(&path) { data_files(&path)? } else { Vec::new() } {
+            text += &format!("{:08x} {}\n", checksum(&path.with_file_name(&data))?, data.display());
+        }
     }
     Ok(text)
 }

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use actq::data::{Dataset, Recording, Sizes};
-use actq::import::FILES;
+use actq::import::{FILES, Importer as _};
 use actq::policy::Policy;
-use actq_onnx::{Choice, import};
+use actq_onnx::{Choice, Onnx, import};
 use anyhow::{Result, ensure};
 
 use crate::args::ImportArgs;
@@ -16,10 +16,21 @@ use crate::terminal::{note, print, reserve};
 
 /// Converts an ONNX file to a policy folder and prints a summary.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
-    let choice = Choice { output: args.output.clone(), states: args.state.clone(), ..Choice::default() };
+    let choice = Choice {
+        output: args.output.clone(),
+        states: args.state.clone(),
+        observed: args.observe.clone(),
+        ..Choice::default()
+    };
     let imported = import(&args.model, &choice)?;
     let [json, weights] = FILES.map(|name| args.out.join(name));
     let policy = Policy::of_files(&args.out, [&args.model, &args.model], &imported.json, &imported.weights)?;
+    if let Some(fault) = imported.faults.first() {
+        let remedy = "export it with a lower opset_version (torch declares 18 for 26 and above)";
+        let invalid = format!("{}: the file is invalid: {fault}; {remedy}", args.model.display());
+        ensure!(!args.check, "{invalid}. No other program can run it for --check");
+        note([invalid + ". Its network is read by the operator's definition"]);
+    }
     let calib = args.calib.as_ref().map(|path| Dataset::load(path, Sizes::of(&policy))).transpose()?;
     note(calib.as_ref().and_then(notes::single_steps));
     note(notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))));
@@ -34,7 +45,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         other.map_or("".into(), |p| p.display().to_string())
     );
     let _folder = OutputFolder::new(&args.out)?;
-    let outputs = reserve(&names, [&args.model].into_iter().chain(&args.calib))?;
+    let outputs = reserve(&names, Onnx.files(&args.model).into_iter().chain(args.calib.clone()))?;
     let checked = match args.check {
         true => Some(check(&args.model, &imported, &policy, calib.as_ref())?),
         false => None,

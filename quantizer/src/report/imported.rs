@@ -34,6 +34,13 @@ pub fn summary(imported: &Imported, policy: &Policy) -> String {
         count(policy.weights, "weight"),
         count(policy.parameters, "parameter")
     );
+    for (i, guard) in imported.guards.iter().enumerate() {
+        text += &format!("{:9} {guard}\n", if i == 0 { "guard" } else { "" });
+    }
+    if !imported.guards.is_empty() {
+        text += "          the image has none of these: a step with NaN or infinity in its observation is refused, and the application \
+                 must replace such values before the step\n";
+    }
     for (what, names, why) in [
         ("inputs", &imported.cut_inputs, "the action does not depend on them"),
         ("outputs", &imported.cut_outputs, "only the action is kept"),

@@ -7,15 +7,17 @@ use std::process::{Command, Output};
 
 use actq::data::{Element, write_npy};
 use actq::import::Importer as _;
+use actq::measure::actions::actions;
 use actq::policy::Policy;
 use actq_bench::command::{actq, binary, failed, succeeded};
 use actq_bench::skipped;
+use actq_cli::importers::load;
 use actq_onnx::{Onnx, proto};
 use anyhow::{Result, ensure};
 use ndarray::{Array, Array2, Array3, Dimension};
 use tempfile::TempDir;
 
-use super::file::{File, tensor};
+use super::file::{File, encoded, tensor};
 
 const OBS: usize = 6;
 
@@ -93,6 +95,128 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     fs::rename(&obs, dir.path().join("heldout.npy"))?;
     let printed = succeeded(&actq(&["eval", text(&image), "--policy", text(&model)]).output()?)?;
     ensure!(printed.contains("observations   300"), "{printed}");
+    Ok(())
+}
+
+/// Writes a network of one layer of 4 by 4 with its weights in another file, from `offset` on.
+fn write_layer(model: &Path, [input, output]: [&str; 2], location: &str, offset: usize) -> Result<()> {
+    let entry = |key: &str, value: String| encoded(&proto::Entry { key: Some(key.to_owned()), value: Some(value) });
+    let weights = proto::Tensor {
+        raw_data: None,
+        external_data: vec![entry("location", location.to_owned()), entry("offset", offset.to_string())],
+        data_location: Some(1),
+        ..tensor("w", &[4, 4], &[])
+    };
+    let mut file = File::default();
+    file.input(input, &[1, 4]);
+    file.initializer(&weights);
+    file.write(&[], &format!("{output} := MatMul({input}, w)"));
+    file.output(output, &[1, 4]);
+    fs::create_dir_all(model.parent().expect("a folder"))?;
+    Ok(fs::write(model, file.bytes())?)
+}
+
+/// Writes a bundle of two networks, each with its file and the place of its weights beside it.
+fn write_bundle(folder: &Path, networks: [(&str, &str); 2]) -> Result<()> {
+    let [first, second] = networks;
+    write_layer(&folder.join(first.0), ["obs", "latent"], first.1, 0)?;
+    write_layer(&folder.join(second.0), ["latent", "actions"], second.1, 64)?;
+    for (i, (model, location)) in networks.into_iter().enumerate() {
+        let data = folder.join(model).with_file_name("").join(location);
+        fs::create_dir_all(data.parent().expect("a folder"))?;
+        let weights = (0..32).flat_map(|k| ((7 * k + i) as f32 / 9.0).sin().to_le_bytes());
+        fs::write(data, weights.collect::<Vec<u8>>())?;
+    }
+    let description = format!(
+        "schema = 1\nname = \"t\"\nrate_hz = 50\naction = \"second.actions\"\n\
+         [[input]]\nname = \"x\"\nlen = 4\n\
+         [[network]]\nname = \"first\"\nfile = {:?}\ninputs = {{ obs = \"x\" }}\n\
+         [[network]]\nname = \"second\"\nfile = {:?}\ninputs = {{ latent = \"first.latent\" }}\n\
+         [[value]]\nname = \"target\"\nfrom = \"second.actions\"\n\
+         [[target]]\nkind = \"position\"\nvalue = \"target\"\nlimits = [-20, 20]\n",
+        first.0, second.0
+    );
+    Ok(fs::write(folder.join("deploy.toml"), description)?)
+}
+
+/// Lists the files below a folder, by their paths from it.
+fn files_below(folder: &Path) -> Result<Vec<String>> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        match path.is_dir() {
+            true => files.extend(files_below(&path)?.into_iter().map(|inner| format!("{name}/{inner}"))),
+            false => files.push(name),
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+#[test]
+fn an_imported_bundle_keeps_weights_of_other_files() -> Result<()> {
+    for (networks, expected) in [
+        // One folder of the bundle is the new folder, with its own folders.
+        ([("a.onnx", "a.onnx.data"), ("b.onnx", "data/b.bin")], &["a.onnx", "a.onnx.data", "b.onnx", "data/b.bin"][..]),
+        ([("nets/a.onnx", "w.bin"), ("nets/b.onnx", "./w.bin")], &["a.onnx", "b.onnx", "w.bin"]),
+        // Files of one name keep their folders.
+        (
+            [("first/model.onnx", "w.bin"), ("second/model.onnx", "w.bin")],
+            &["first/model.onnx", "first/w.bin", "second/model.onnx", "second/w.bin"],
+        ),
+        ([("a.onnx", "nets/w.bin"), ("nets/b.onnx", "w.bin")], &["a.onnx", "nets/b.onnx", "nets/w.bin"]),
+    ] {
+        let dir = TempDir::new()?;
+        let [bundle, out, moved, image] = ["bundle", "out/policy", "moved", "a.actq"].map(|name| dir.path().join(name));
+        fs::create_dir(&bundle)?;
+        write_bundle(&bundle, networks)?;
+        let observations = [vec![0.5, -1.0, 2.0, 0.25]];
+        let expected_actions = actions(&load(&bundle)?, &observations);
+        succeeded(&actq(&["import", text(&bundle), "--out", text(&out)]).output()?)?;
+        fs::rename(&out, &moved)?;
+        fs::remove_dir_all(&bundle)?;
+        let mut expected_files = [expected, &["deploy.toml"]].concat();
+        expected_files.sort_unstable();
+        assert_eq!(files_below(&moved)?, expected_files, "{networks:?}");
+        let policy = load(&moved)?;
+        assert_eq!(actions(&policy, &observations), expected_actions);
+        succeeded(
+            &actq(&["quantize", text(&moved), "--bits", "8", "--method", "rtn", "--out", text(&image)]).output()?,
+        )?;
+        let weights = moved.join(expected.iter().find(|name| !name.ends_with("onnx")).expect("weights"));
+        let mut changed = fs::read(&weights)?;
+        changed[3] ^= 0x80;
+        changed[67] ^= 0x80;
+        fs::write(&weights, changed)?;
+        ensure!(load(&moved)?.digest != policy.digest, "the digest ignores {}", weights.display());
+    }
+    Ok(())
+}
+
+#[test]
+fn weights_outside_missing_or_short_are_refused() -> Result<()> {
+    let dir = TempDir::new()?;
+    let (bundle, out) = (dir.path().join("bundle"), dir.path().join("out"));
+    fs::create_dir(&bundle)?;
+    let import = || actq(&["import", text(&bundle), "--out", text(&out)]).output();
+    write_bundle(&bundle, [("a.onnx", "a.bin"), ("b.onnx", "b.bin")])?;
+    fs::write(bundle.join("b.bin"), [0; 100])?;
+    failed(
+        &import()?,
+        1,
+        &["the elements are 64 bytes at offset 64 of \"b.bin\", which has 100 bytes; copy the whole file"],
+    )?;
+    fs::remove_file(bundle.join("b.bin"))?;
+    failed(
+        &import()?,
+        1,
+        &["b.onnx", "cannot read \"b.bin\", which holds the elements (64 bytes); put it beside the model"],
+    )?;
+    fs::write(dir.path().join("b.bin"), [0; 128])?;
+    write_layer(&bundle.join("b.onnx"), ["latent", "actions"], "../b.bin", 64)?;
+    failed(&import()?, 1, &["the elements are in \"../b.bin\", outside the model's folder"])?;
+    ensure!(!out.exists(), "nothing is written");
     Ok(())
 }
 

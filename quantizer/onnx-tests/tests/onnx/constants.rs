@@ -63,6 +63,21 @@ fn quantized_weights_are_read_as_their_values() -> Result<()> {
     // A scale for each index of an axis, without zero points.
     let codes = [integers("q", 3, &[1, 3], &[1, 2, -4])];
     is("[0.5, 3.0, -1.0]", "DequantizeLinear(q, [0.5, 1.5, 0.25], axis=1)", &codes)?;
+    // Codes of 4 and 2 bits, the first in the lowest bits.
+    for (kind, byte) in [(22, [0x14, 0xfa]), (21, [0x14, 0x0a])] {
+        let values = if kind == 22 { "[2.0, 0.5, -3.0]" } else { "[2.0, 0.5, 5.0]" };
+        let typed = integers("q", kind, &[3], &byte);
+        let raw = proto::Tensor {
+            raw_data: Some(byte.map(|byte| byte as u8).to_vec().into()),
+            ..integers("q", kind, &[3], &[])
+        };
+        is(values, "DequantizeLinear(q, 0.5)", &[typed])?;
+        is(values, "DequantizeLinear(q, 0.5)", &[raw])?;
+    }
+    for (kind, values) in [(26, "[-1.0, 0.5, -0.5]"), (25, "[1.0, 0.5, 1.5]")] {
+        is(values, "DequantizeLinear(q, 0.5)", &[integers("q", kind, &[3], &[0b00_11_01_10])])?;
+    }
+    is("[2.0, -0.875, 0.5]", "DequantizeLinear(q, 2.0)", &[integers("q", 17, &[3], &[0x38, 0xae, 0x28])])?;
     // Values quantized at run time are not weights.
     let mut file = begun();
     file.initializer(&zero(0));
@@ -70,4 +85,44 @@ fn quantized_weights_are_read_as_their_values() -> Result<()> {
     file.output("actions", &[1, OBS as i64]);
     refused(&file.bytes(), "(QuantizeLinear): the file is already quantized");
     Ok(())
+}
+
+#[test]
+fn weights_of_blocks_have_their_blocks_scale() -> Result<()> {
+    // Blocks of 2 along either axis; the last one of a row is shorter.
+    let rows = [integers("q", 3, &[1, 3], &[1, 2, 4]), integers("zero", 3, &[1, 2], &[1, -1])];
+    is("[0.0, 0.5, 15.0]", "DequantizeLinear(q, Reshape([0.5, 3.0], [1, 2]), zero, axis=1, block_size=2)", &rows)?;
+    // Column sums of 1 .. 12, the upper and the lower half scaled by 1, 10, 100 and by 2, 1, 3.
+    let columns = [integers("q", 3, &[4, 3], &(1..=12).collect::<Vec<_>>())];
+    is(
+        "[39.0, 89.0, 963.0]",
+        "ReduceSum(DequantizeLinear(q, Reshape([1.0, 10.0, 100.0, 2.0, 1.0, 3.0], [2, 3]), axis=0, block_size=2), [0], keepdims=0)",
+        &columns,
+    )
+}
+
+#[test]
+fn other_quantized_weights_are_refused_by_name() {
+    let network = |codes: &proto::Tensor, text: &str| {
+        let mut file = begun();
+        file.initializer(codes);
+        file.write(&[], &format!("actions := gemm(obs, 3, 11) + {text}"));
+        file.output("actions", &[1, 3]);
+        file.bytes()
+    };
+    for (kind, name) in [(18, "FLOAT8E4M3FNUZ"), (24, "FLOAT8E8M0"), (28, "FLOAT6E3M2"), (99, "with ONNX's number 99")]
+    {
+        let bytes = network(&integers("q", kind, &[3], &[1, 2, 3]), "DequantizeLinear(q, 0.5)");
+        refused(&bytes, &format!("tensor \"q\": the type {name} is not supported; export it as float32 or int64"));
+    }
+    let odd = network(&integers("q", 22, &[3], &[1, 2, 3]), "DequantizeLinear(q, 0.5)");
+    refused(&odd, "tensor \"q\": 3 elements of 4 bits need 2 bytes, and 3 are present");
+    let shape = network(
+        &integers("q", 3, &[1, 3], &[1, 2, 3]),
+        "DequantizeLinear(q, Reshape([1.0, 2.0, 3.0], [1, 3]), axis=1, block_size=2)",
+    );
+    refused(
+        &shape,
+        "has scales of the shape [1, 3] for weights of [1, 3] along axis 1 with block_size 2; the shape [1, 2] fits",
+    );
 }

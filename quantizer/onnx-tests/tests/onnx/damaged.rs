@@ -1,7 +1,9 @@
 //! Malicious and damaged files: the importer refuses each with its fault, and none ends the process or fills the
 //! memory.
 
-use actq_onnx::{Choice, import_bytes, proto};
+use std::path::PathBuf;
+
+use actq_onnx::{Choice, data_files, import_bytes, proto};
 use anyhow::Result;
 use proptest::prelude::*;
 use tempfile::TempDir;
@@ -30,15 +32,35 @@ fn whole() -> Vec<u8> {
     with("actions := Tanh(gemm(Elu(gemm(obs, 6, 4)), 4, 6))")
 }
 
-fn external(location: &str) -> Vec<u8> {
+fn external_tensor(location: &str) -> proto::Tensor {
     let entry = proto::Entry { key: Some("location".to_owned()), value: Some(location.to_owned()) };
-    let outside = proto::Tensor {
+    proto::Tensor {
         raw_data: None,
         external_data: vec![encoded(&entry)],
         data_location: Some(1),
         ..tensor("w", &[4, 4], &[0.0; 16])
+    }
+}
+
+fn external(location: &str) -> Vec<u8> {
+    with_initializers(&[external_tensor(location)], "actions := MatMul(obs, w)")
+}
+
+/// A graph with a constant node and an initializer, both of another file, inside a branch of a node.
+fn external_in_a_branch() -> Vec<u8> {
+    let node = |name: &str, attribute: proto::Attribute| {
+        let attribute = proto::Attribute { name: Some(name.to_owned()), ..attribute };
+        encoded(&proto::Node { attribute: vec![encoded(&attribute)], ..Default::default() })
     };
-    with_initializers(&[outside], "actions := MatMul(obs, w)")
+    let constant = proto::Attribute { t: Some(encoded(&external_tensor("constant.bin"))), ..Default::default() };
+    let branch = proto::Graph {
+        node: vec![node("value", constant)],
+        initializer: vec![encoded(&external_tensor("./inner/initializer.bin"))],
+        ..Default::default()
+    };
+    let branch = proto::Attribute { g: Some(encoded(&branch)), ..Default::default() };
+    let graph = proto::Graph { node: vec![node("then_branch", branch)], ..Default::default() };
+    encoded(&proto::Model { graph: Some(encoded(&graph)), ..File::default().model() }).to_vec()
 }
 
 /// The addresses in a store depend on these files, and no output may replace them.
@@ -48,6 +70,11 @@ fn files_of_weights_are_files_of_the_policy() -> std::io::Result<()> {
     let [policy, weights] = ["policy.onnx", "weights.bin"].map(|name| dir.path().join(name));
     std::fs::write(&policy, external("weights.bin"))?;
     assert_eq!(Onnx.files(&policy), [policy.clone(), weights]);
+    std::fs::write(&policy, external_in_a_branch())?;
+    assert_eq!(data_files(&policy).expect("a model"), ["constant.bin", "inner/initializer.bin"].map(PathBuf::from));
+    std::fs::write(&policy, external("data/../../w.bin"))?;
+    let error = format!("{:#}", data_files(&policy).expect_err("outside"));
+    assert!(error.ends_with("tensor \"w\": the elements are in \"data/../../w.bin\", outside the model's folder; move that file beside the model"), "{error}");
     std::fs::write(&policy, whole())?;
     assert_eq!(Onnx.files(&policy), std::slice::from_ref(&policy));
     std::fs::write(&policy, "no model")?;
@@ -72,7 +99,10 @@ fn each_malformed_file_is_refused_with_its_fault() {
     refused(&with_initializers(&[not_finite], "actions := MatMul(obs, w)"), "holds a value that is not finite");
     refused(&external("../secret"), "outside the model's folder");
     refused(&external("/etc/passwd"), "outside the model's folder");
-    refused(&external("weights.bin"), "cannot read \"weights.bin\", which holds the elements; put it beside the model");
+    refused(
+        &external("weights.bin"),
+        "cannot read \"weights.bin\", which holds the elements (64 bytes); put it beside the model",
+    );
     let doubled = "x = Concat(x, x, axis=1)\n".repeat(40);
     let doubled = format!("x = Identity(obs)\n{doubled}actions := Identity(x)");
     refused(&with(&doubled), "gives more values than a policy of this size can have");

@@ -11,7 +11,9 @@ mod integers;
 mod norms;
 mod notation;
 mod pools;
+mod remarks;
 mod rows;
+mod states;
 mod styles;
 
 use std::path::Path;

@@ -5,14 +5,13 @@ use std::fs::{self, File};
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 
-use actq::error::{Context as _, Error, Result, bail, ensure};
+use actq::error::{Context as _, Error, Result, ensure};
 use actq::text::printable;
-use half::{bf16, f16};
 use prost::Message;
 use prost::bytes::Bytes;
 
-use crate::file::proto;
-use crate::values::tensor::{Data, Tensor, count};
+use crate::file::{kinds, proto};
+use crate::values::tensor::{Tensor, count};
 
 /// The most nodes, initializers, inputs or outputs of a graph, and attributes of a node.
 const MOST_ENTRIES: usize = 1 << 16;
@@ -21,6 +20,9 @@ const MOST_BYTES: u64 = 1 << 31;
 
 /// The most bytes of the file's metadata: names and gains take a few thousand.
 const MOST_METADATA: usize = 1 << 20;
+
+/// The most nested graphs and functions.
+pub(crate) const MOST_DEPTH: usize = 16;
 
 /// The first operator set whose arithmetic broadcasts as numpy does.
 const LEAST_OPSET: i64 = 7;
@@ -73,6 +75,8 @@ pub(crate) struct Model {
     pub(crate) functions: HashMap<[String; 3], Function>,
     /// Name and version of the exporter, and the opset, human-readable.
     pub(crate) producer: String,
+    /// Version of ONNX's own operators that the file declares.
+    pub(crate) opset: i64,
     /// Texts that the exporter stored beside the graph, by key.
     pub(crate) metadata: BTreeMap<String, String>,
     /// Folder of external tensors.
@@ -152,6 +156,7 @@ impl Model {
             graph: Graph::parse(graph)?,
             functions: functions.collect::<Result<_>>()?,
             producer,
+            opset,
             metadata: metadata(&model.metadata_props)?,
             folder: folder.to_owned(),
         })
@@ -165,20 +170,53 @@ impl Model {
         Ok(Tensor { name: (!name.is_empty()).then_some(name), ..read })
     }
 
-    /// Returns the files in the model's folder that hold elements of its tensors, each one time.
-    pub(crate) fn external_files(&self) -> Vec<PathBuf> {
-        let constants = self.graph.nodes.iter().flat_map(|node| node.attributes.values()).filter_map(|a| a.t.as_ref());
+    /// Returns the files that hold elements of its tensors, by their paths from the model's folder.
+    ///
+    /// # Errors
+    ///
+    /// If a path leaves that folder.
+    pub(crate) fn external_files(&self) -> Result<BTreeSet<PathBuf>> {
         let mut files = BTreeSet::new();
-        for bytes in self.graph.initializers.values().chain(constants) {
-            let tensor: proto::Tensor = decode(bytes, "a tensor").unwrap_or_default();
-            if tensor.data_location == Some(1)
-                && let Ok(entries) = all::<proto::Entry>(&tensor.external_data, "the places of a tensor")
-            {
-                let location = entries.into_iter().find(|entry| entry.key.as_deref() == Some("location"));
-                files.extend(location.and_then(|entry| entry.value).map(|location| self.folder.join(location)));
-            }
+        let functions = self.functions.values().map(|function| &function.graph);
+        for graph in [&self.graph].into_iter().chain(functions) {
+            self.add_external_files(graph, &mut files, MOST_DEPTH)?;
         }
-        files.into_iter().collect()
+        Ok(files)
+    }
+
+    /// Adds the files of a graph's tensors, and of the graphs in its nodes.
+    fn add_external_files(&self, graph: &Graph, files: &mut BTreeSet<PathBuf>, depth: usize) -> Result<()> {
+        ensure!(depth > 0, "more than {MOST_DEPTH} graphs are nested");
+        let attributes = || graph.nodes.iter().flat_map(|node| node.attributes.values());
+        for bytes in graph.initializers.values().chain(attributes().filter_map(|attribute| attribute.t.as_ref())) {
+            files.extend(self.external_file(bytes)?);
+        }
+        for bytes in attributes().filter_map(|attribute| attribute.g.as_ref()) {
+            self.add_external_files(&Graph::parse(bytes)?, files, depth - 1)?;
+        }
+        Ok(())
+    }
+
+    /// Returns the file that holds a tensor's elements, if they are not in the model.
+    fn external_file(&self, bytes: &Bytes) -> Result<Option<PathBuf>> {
+        let tensor: proto::Tensor = decode(bytes, "a tensor")?;
+        if tensor.data_location != Some(1) {
+            return Ok(None);
+        }
+        let path = Places::of(&tensor).and_then(|places| places.path());
+        let path = path.and_then(|path| self.inside(&path).map(|()| path));
+        path.map(Some).with_context(|| format!("tensor {:?}", printable(tensor.name.as_deref().unwrap_or_default())))
+    }
+
+    /// Fails if a file of the model's folder is a link that leaves the folder.
+    fn inside(&self, path: &Path) -> Result<()> {
+        let Ok(real) = fs::canonicalize(self.folder.join(path)) else { return Ok(()) };
+        ensure!(
+            real.starts_with(fs::canonicalize(&self.folder)?),
+            "the elements are in {:?}, a link that leaves the model's folder; copy the file instead",
+            printable(&path.to_string_lossy())
+        );
+        Ok(())
     }
 
     fn elements(&self, tensor: &proto::Tensor) -> Result<Tensor> {
@@ -186,112 +224,89 @@ impl Model {
         let shape = axes.with_context(|| format!("shape {:?} has a negative length", tensor.dims))?;
         let n = count(&shape)?;
         let kind = tensor.data_type.unwrap_or_default();
+        let bits = kinds::bits(kind).with_context(|| {
+            format!("the type {} is not supported; export it as float32 or int64", kinds::name(kind))
+        })?;
         let raw = match (tensor.data_location, &tensor.raw_data) {
-            (Some(1), _) => Some(self.external(tensor, n)?),
+            (Some(1), _) => Some(self.external(tensor, (n * bits).div_ceil(8))?),
             (_, raw) => raw.clone(),
         };
-        let real = |v: &f32| f64::from(*v);
-        let data = match (kind, &raw) {
-            (1, Some(raw)) => Data::Real(cut(raw, |b| f64::from(f32::from_le_bytes(b)))?),
-            (1, None) => Data::Real(tensor.float_data.iter().map(real).collect()),
-            (11, Some(raw)) => Data::Real(cut(raw, f64::from_le_bytes)?),
-            (11, None) => Data::Real(tensor.double_data.clone()),
-            (10, Some(raw)) => Data::Real(cut(raw, |b| f16::from_le_bytes(b).to_f64())?),
-            (10, None) => Data::Real(tensor.int32_data.iter().map(|&b| f16::from_bits(b as u16).to_f64()).collect()),
-            (16, Some(raw)) => Data::Real(cut(raw, |b| bf16::from_le_bytes(b).to_f64())?),
-            (16, None) => Data::Real(tensor.int32_data.iter().map(|&b| bf16::from_bits(b as u16).to_f64()).collect()),
-            (7, Some(raw)) => Data::Int(cut(raw, i64::from_le_bytes)?),
-            (7, None) => Data::Int(tensor.int64_data.clone()),
-            (6, Some(raw)) => Data::Int(cut(raw, |b| i32::from_le_bytes(b).into())?),
-            (4, Some(raw)) => Data::Int(cut(raw, |b| u16::from_le_bytes(b).into())?),
-            (5, Some(raw)) => Data::Int(cut(raw, |b| i16::from_le_bytes(b).into())?),
-            (12, Some(raw)) => Data::Int(cut(raw, |b| u32::from_le_bytes(b).into())?),
-            (3, Some(raw)) => Data::Int(cut(raw, |b| i8::from_le_bytes(b).into())?),
-            (2 | 9, Some(raw)) => Data::Int(cut(raw, |b| u8::from_le_bytes(b).into())?),
-            (2..=6 | 9, None) => Data::Int(tensor.int32_data.iter().map(|&v| v.into()).collect()),
-            (12, None) => Data::Int(tensor.uint64_data.iter().map(|&v| v as i64).collect()),
-            _ => bail!("the type {} is not supported; export it as float32 or int64", kind_name(kind)),
-        };
-        let tensor = Tensor::new(shape, data);
+        let tensor = Tensor::new(shape, kinds::elements(tensor, kind, raw, n)?);
         ensure!(tensor.len() == n, "shape {:?} needs {n} values, and {} are present", tensor.shape, tensor.len());
         Ok(tensor)
     }
 
-    /// Reads the bytes of a tensor of `n` elements from a file in the model's folder.
-    fn external(&self, tensor: &proto::Tensor, n: usize) -> Result<Bytes> {
-        let entries: Vec<proto::Entry> = all(&tensor.external_data, "the places of a tensor")?;
-        let entry = |key: &str| {
-            let found = entries.iter().find(|entry| entry.key.as_deref() == Some(key));
-            found.and_then(|entry| entry.value.as_deref())
-        };
-        let location =
-            entry("location").context("the elements are in an external file without a name; export the file again")?;
-        let shown = printable(location);
-        let inside = Path::new(location).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-        ensure!(
-            inside && !location.is_empty(),
-            "the elements are in {shown:?}, outside the model's folder; move that file beside the model"
-        );
-        let path = self.folder.join(location);
-        let missing = || format!("cannot read {shown:?}, which holds the elements; put it beside the model");
-        let (real, folder) = (fs::canonicalize(&path).with_context(missing)?, fs::canonicalize(&self.folder)?);
-        ensure!(
-            real.starts_with(folder),
-            "the elements are in {shown:?}, a link that leaves the model's folder; copy the file instead"
-        );
-        ensure!(real.is_file(), "the elements are in {shown:?}, which is not a file");
-        let mut file = File::open(real).with_context(missing)?;
-        let there = file.metadata().with_context(missing)?.len();
-        let number = |key: &str, default: u64| match entry(key) {
-            None => Ok(default),
-            Some(text) => text
-                .parse()
-                .map_err(Error::other)
-                .with_context(|| format!("{key} {:?} is not a number", printable(text))),
-        };
-        let offset = number("offset", 0)?;
-        let length = number("length", there.saturating_sub(offset))?;
+    /// Reads the `size` bytes of a tensor from a file in the model's folder.
+    fn external(&self, tensor: &proto::Tensor, size: usize) -> Result<Bytes> {
+        let places = Places::of(tensor)?;
+        let path = places.path()?;
+        let shown = printable(&path.to_string_lossy()).into_owned();
+        let missing =
+            || format!("cannot read {shown:?}, which holds the elements ({size} bytes); put it beside the model");
+        self.inside(&path)?;
+        let path = self.folder.join(path);
+        let there = fs::metadata(&path).with_context(missing)?;
+        ensure!(there.is_file(), "the elements are in {shown:?}, which is not a file");
+        let there = there.len();
+        let offset = places.number("offset", 0)?;
+        let length = places.number("length", size as u64)?;
         let end = offset.checked_add(length).filter(|end| *end <= there);
         ensure!(
             end.is_some(),
-            "the elements are {length} bytes at offset {offset} of {shown:?}, which has {there} bytes"
+            "the elements are {length} bytes at offset {offset} of {shown:?}, which has {there} bytes; copy the whole file"
         );
-        ensure!(length <= 8 * n as u64, "the elements are {length} bytes of {shown:?}, too many for {n} values");
-        let mut bytes = vec![0; usize::try_from(length)?];
+        ensure!(length == size as u64, "the elements are {length} bytes of {shown:?}, and the shape needs {size}");
+        let mut bytes = vec![0; size];
+        let mut file = File::open(path).with_context(missing)?;
         file.seek(SeekFrom::Start(offset)).and_then(|_| file.read_exact(&mut bytes)).with_context(missing)?;
         Ok(bytes.into())
     }
 }
 
-/// Returns ONNX's name of a type of elements.
-pub(crate) fn kind_name(kind: i32) -> String {
-    const NAMES: [&str; 17] = [
-        "undefined",
-        "float32",
-        "uint8",
-        "int8",
-        "uint16",
-        "int16",
-        "int32",
-        "int64",
-        "string",
-        "bool",
-        "float16",
-        "float64",
-        "uint32",
-        "uint64",
-        "complex64",
-        "complex128",
-        "bfloat16",
-    ];
-    let name = usize::try_from(kind).ok().and_then(|kind| NAMES.get(kind));
-    name.map_or_else(|| format!("ONNX's number {kind}"), |name| (*name).to_owned())
-}
+/// The place of a tensor's elements in another file.
+struct Places(Vec<proto::Entry>);
 
-fn cut<const N: usize, T>(raw: &Bytes, one: impl Fn([u8; N]) -> T) -> Result<Vec<T>> {
-    let (whole, rest) = raw.as_chunks::<N>();
-    ensure!(rest.is_empty(), "{} bytes are not a whole number of elements of {N} bytes", raw.len());
-    Ok(whole.iter().map(|bytes| one(*bytes)).collect())
+impl Places {
+    fn of(tensor: &proto::Tensor) -> Result<Self> {
+        Ok(Self(all(&tensor.external_data, "the places of a tensor")?))
+    }
+
+    fn entry(&self, key: &str) -> Option<&str> {
+        self.0.iter().find(|entry| entry.key.as_deref() == Some(key))?.value.as_deref()
+    }
+
+    /// Returns the file, by its path from the model's folder. Refuses a path that leaves it.
+    fn path(&self) -> Result<PathBuf> {
+        let location = self.entry("location");
+        let location =
+            location.context("the elements are in an external file without a name; export the file again")?;
+        let mut path = PathBuf::new();
+        for part in Path::new(location).components() {
+            match part {
+                Component::Normal(name) => path.push(name),
+                Component::CurDir => {}
+                _ => path.clear(),
+            }
+            ensure!(
+                matches!(part, Component::Normal(_) | Component::CurDir),
+                "the elements are in {:?}, outside the model's folder; move that file beside the model",
+                printable(location)
+            );
+        }
+        ensure!(
+            path.file_name().is_some(),
+            "the elements are in the file {:?}, which has no name",
+            printable(location)
+        );
+        Ok(path)
+    }
+
+    fn number(&self, key: &str, default: u64) -> Result<u64> {
+        self.entry(key).map_or(Ok(default), |text| {
+            let number = text.parse().map_err(Error::other);
+            number.with_context(|| format!("{key} {:?} is not a number", printable(text)))
+        })
+    }
 }
 
 impl Graph {

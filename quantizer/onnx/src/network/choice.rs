@@ -15,6 +15,8 @@ pub struct Choice {
     pub output: Option<String>,
     /// Inputs that hold recurrent state, with the outputs of their next values.
     pub states: Vec<(String, String)>,
+    /// Inputs that are observed, although their names are those of states or constants.
+    pub observed: Vec<String>,
     /// `true` if the caller gives each input its value in each step, and takes the values of the output one after the
     /// other. An input may then hold a state without a cell, and the output's axes mean nothing.
     pub is_fed: bool,
@@ -34,6 +36,14 @@ impl Choice {
                 "--output {}: the file has no value of this name; {}",
                 printable(name),
                 outputs()
+            );
+        }
+        for name in &self.observed {
+            ensure!(
+                graph.inputs.iter().any(|port| port.name == *name),
+                "--observe {}: the file has no input of this name; its inputs are {}",
+                printable(name),
+                listed(&graph.inputs)
             );
         }
         for (from, to) in &self.states {

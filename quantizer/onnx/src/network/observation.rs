@@ -8,7 +8,7 @@ use actq::text::printable;
 use super::choice::Choice;
 use crate::file::model::Model;
 use crate::nodes::follow::INTEGERS;
-use crate::states::{Output, Pairs, refuse_lost_states};
+use crate::states::{Chosen, Output, Pairs};
 use crate::values::expr::{Expr, Exprs, Id};
 
 /// The observed inputs, one after the other.
@@ -42,23 +42,58 @@ impl Observation {
 }
 
 /// Returns the indices of the inputs that the action depends on, except states. Refuses an action without any.
-pub(super) fn observed_inputs(
-    model: &Model,
-    exprs: &Exprs,
-    live: &[Id],
-    (pairs, outputs): (&Pairs, &[Output]),
-    action: &str,
-    choice: &Choice,
-) -> Result<Vec<usize>> {
-    let mut read: Vec<usize> =
-        live.iter().filter_map(|&id| if let Expr::Input(i) = exprs.get(id) { Some(*i) } else { None }).collect();
+pub(super) fn observed_inputs(graph: &Chosen<'_>, live: &[Id], pairs: &Pairs, choice: &Choice) -> Result<Vec<usize>> {
+    let input = |&id: &Id| if let Expr::Input(i) = graph.exprs.get(id) { Some(*i) } else { None };
+    let mut read: Vec<usize> = live.iter().filter_map(input).collect();
     read.sort_unstable();
     if !choice.is_fed {
-        refuse_lost_states(model, &read, pairs, outputs, action, &choice.states)?;
+        graph.refuse_lost_states(&read, pairs, &choice.states, &choice.observed)?;
     }
     read.retain(|i| !pairs.iter().any(|(state, _)| state == i));
-    ensure!(!read.is_empty(), "output {:?} depends on no input; choose another by --output NAME", printable(action));
+    let action = printable(graph.action);
+    ensure!(!read.is_empty(), "output {action:?} depends on no input; choose another by --output NAME");
+    if !choice.is_fed {
+        refuse_constants(graph.model, &read, &choice.observed)?;
+    }
     Ok(read)
+}
+
+/// Refuses inputs beside the observation that look like constants of the network, as exporters make them of a
+/// normalizer's mean and variance, unless they are among the `observed`.
+fn refuse_constants(model: &Model, read: &[usize], observed: &[String]) -> Result<()> {
+    let shape = |i: usize| model.graph.inputs[i].shape.as_deref().unwrap_or_default();
+    let len = |i: usize| shape(i).iter().map(|axis| axis.unwrap_or(1)).product::<usize>();
+    let is_dynamic = |i: usize| shape(i).contains(&None);
+    for &i in read.iter().filter(|i| !observed.contains(&model.graph.inputs[**i].name)) {
+        let name = &model.graph.inputs[i].name;
+        let batch = read.iter().find(|&&other| is_dynamic(other) && !is_dynamic(i) && len(other) == len(i));
+        let fact = match batch {
+            Some(&other) => {
+                format!(
+                    "has no dynamic axis, unlike {:?} of the same length",
+                    printable(&model.graph.inputs[other].name)
+                )
+            }
+            None if read.len() > 1 && is_constant(name) => "has the name of a constant of the network".to_owned(),
+            None => continue,
+        };
+        let name = printable(name);
+        bail!(
+            "the input {name:?} {fact}: exporters make the mean and the variance of a normalizer such inputs; export it as an \
+             initializer with its values, or, if it is measured anew in each step, pass --observe {name}"
+        );
+    }
+    Ok(())
+}
+
+/// Returns `true` if a name is that of a constant of a network, as `mean` or `model/normalization_1/Sub/y:0`.
+fn is_constant(name: &str) -> bool {
+    const LAST: [&str; 11] =
+        ["mean", "variance", "var", "std", "stddev", "kernel", "weight", "weights", "bias", "gamma", "beta"];
+    const ANY: [&str; 3] = ["normalization", "batchnorm", "layernorm"];
+    let name = name.to_lowercase();
+    let mut parts = name.rsplit(|c: char| !c.is_ascii_alphabetic()).filter(|part| !part.is_empty());
+    parts.next().is_some_and(|part| LAST.contains(&part)) || parts.any(|part| ANY.contains(&part))
 }
 
 /// Names the inputs that hold states and the outputs of their next values, with their lengths.

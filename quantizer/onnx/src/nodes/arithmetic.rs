@@ -120,7 +120,7 @@ fn with_known(op: &str, exprs: &mut Exprs, x: Id, y: &[f64]) -> Result<Vec<Eleme
         "Pow" | "Max" | "Min" => {
             let value = match (op, same) {
                 ("Pow", Some(p)) => power(exprs, x, p)?,
-                ("Max", Some(low)) => maximum(exprs, x, low),
+                ("Max", Some(low)) => exprs.clip(x, low, f64::INFINITY),
                 ("Min", Some(high)) => exprs.clip(x, f64::NEG_INFINITY, high),
                 _ => {
                     ensure!(op != "Pow", "has several exponents; use one exponent for all elements");
@@ -131,11 +131,6 @@ fn with_known(op: &str, exprs: &mut Exprs, x: Id, y: &[f64]) -> Result<Vec<Eleme
         }
         _ => bail!("{op} of a value and a constant is not supported"),
     }
-}
-
-/// Computes `max(x, low)`. [`both`] handles the maximum of a LeakyReLU.
-fn maximum(exprs: &mut Exprs, x: Id, low: f64) -> Id {
-    if low == f64::NEG_INFINITY { x } else { exprs.clip(x, low, f64::INFINITY) }
 }
 
 fn known_with(op: &str, exprs: &mut Exprs, x: &[f64], y: Id) -> Result<Vec<Element>> {

@@ -97,9 +97,13 @@ impl<'a> Call<'a> {
             | "QLinearMatMul"
             | "QLinearConv"
             | "QGemm"
-            | "DynamicQuantizeMatMul"
-            | "MatMulNBits" => {
+            | "DynamicQuantizeMatMul" => {
                 bail!("the file is already quantized; export it in float32 and quantize it by actq")
+            }
+            "MatMulNBits" => {
+                bail!(
+                    "the file is already quantized; export it in float32, or with QuantFormat.QDQ, and quantize it by actq"
+                )
             }
             "Loop" | "Scan" => bail!("runs a loop; export one step of the policy, unrolled"),
             "SequenceAt" | "SequenceConstruct" | "SplitToSequence" | "ConcatFromSequence" => {

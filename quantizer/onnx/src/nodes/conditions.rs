@@ -6,7 +6,7 @@ use crate::nodes::call::Call;
 use crate::nodes::moves::expanded;
 use crate::nodes::places::broadcast;
 use crate::values::elements::{apply, value};
-use crate::values::expr::{Expr, Exprs, Id, Unary};
+use crate::values::expr::{Expr, Exprs, Guard, Id, Unary};
 use crate::values::tensor::{Data, Element, Tensor};
 
 /// Converts a comparison of a value with one number to [`Unary::Above`].
@@ -34,20 +34,26 @@ pub(crate) fn above(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>
 }
 
 /// Tests for NaN or infinity. Elements of values count as finite, as an image gives no action if one is not.
-pub(crate) fn not_finite(call: &Call<'_>) -> Result<Tensor> {
+pub(crate) fn not_finite(call: &Call<'_>, exprs: &mut Exprs) -> Result<Tensor> {
     let found = |v: f64| match call.op() {
         "IsNaN" => v.is_nan(),
         _ => v.is_infinite() && call.int(if v > 0.0 { "detect_positive" } else { "detect_negative" }) != Some(0),
     };
     let one = |element: &Element| if let Element::Known(v) = element { found(*v).into() } else { 0 };
     let x = call.input(0)?;
+    if !x.is_known() {
+        exprs.guards.insert((exprs.node, if call.op() == "IsNaN" { Guard::Nan } else { Guard::Infinity }));
+    }
     Ok(Tensor::new(x.shape.clone(), Data::Int(x.elements().iter().map(one).collect())))
 }
 
 /// Converts the comparison of a value with itself, a test for NaN.
-pub(crate) fn itself(call: &Call<'_>) -> Result<Option<Tensor>> {
+pub(crate) fn itself(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
     let (x, y) = (call.input(0)?, call.input(1)?);
     let same = x.shape == y.shape && x.elements() == y.elements();
+    if same && !x.is_known() {
+        exprs.guards.insert((exprs.node, Guard::Nan));
+    }
     Ok(same.then(|| Tensor::new(x.shape.clone(), Data::Int(vec![1; x.len()]))))
 }
 

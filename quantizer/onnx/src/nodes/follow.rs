@@ -6,7 +6,8 @@ use std::rc::Rc;
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 
-use crate::file::model::{Graph, Model, Node, Port, kind_name};
+use crate::file::kinds;
+use crate::file::model::{Graph, MOST_DEPTH, Model, Node, Port};
 use crate::file::proto;
 use crate::nodes::call::Call;
 use crate::nodes::cells;
@@ -29,11 +30,8 @@ const TRUTH: i64 = 9;
 /// ONNX's type numbers of int32 and int64.
 pub(crate) const INTEGERS: [i32; 2] = [6, 7];
 
-/// The most nested graphs and functions.
-const MOST_DEPTH: usize = 16;
-
 /// Values so far, by name.
-type Scope = HashMap<String, Rc<Tensor>>;
+pub(crate) type Scope = HashMap<String, Rc<Tensor>>;
 
 /// A conversion in progress.
 pub(crate) struct Follower<'m> {
@@ -243,7 +241,7 @@ impl<'m> Follower<'m> {
         ensure!(
             integers || [0, 1, 11].contains(&port.kind),
             "the input {name:?} has the type {}, and an observation is float32; export the input as float32",
-            kind_name(port.kind)
+            kinds::name(port.kind)
         );
         let shape =
             port.shape.as_ref().with_context(|| format!("the input {name:?} has no shape; export it with one"))?;
@@ -271,12 +269,12 @@ impl<'m> Follower<'m> {
 }
 
 /// The nodes and names that the targets depend on.
-struct Needed {
-    nodes: HashSet<usize>,
+pub(crate) struct Needed {
+    pub(crate) nodes: HashSet<usize>,
     names: BTreeSet<String>,
 }
 
-fn needed(graph: &Graph, scope: &Scope, targets: &[String]) -> Result<Needed> {
+pub(crate) fn needed(graph: &Graph, scope: &Scope, targets: &[String]) -> Result<Needed> {
     let mut giver: HashMap<&str, usize> = HashMap::new();
     for (i, node) in graph.nodes.iter().enumerate() {
         for name in node.outputs.iter().filter(|name| !name.is_empty()) {

@@ -65,9 +65,6 @@ pub(crate) fn one(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
         "Clip" => {
             let (low, high) = limits(call)?;
             ensure!(low <= high, "limits to {low} .. {high}; the lower limit exceeds the upper one");
-            if low == f64::NEG_INFINITY && high == f64::INFINITY {
-                return call.input(0).cloned().map(Some);
-            }
             let x = call.input(0)?;
             return each(exprs, x, &|exprs, x| exprs.clip(x, low, high)).map(Some);
         }
@@ -108,7 +105,5 @@ fn limits(call: &Call<'_>) -> Result<(f64, f64)> {
             values.first().copied().context("a limit has no value")
         }
     };
-    // Exporters write f32's largest number for no limit.
-    let open = |limit: f64| if limit.abs() >= f64::from(f32::MAX) { limit * f64::INFINITY } else { limit };
-    Ok((open(limit(1, "min", f64::NEG_INFINITY)?), open(limit(2, "max", f64::INFINITY)?)))
+    Ok((limit(1, "min", f64::NEG_INFINITY)?, limit(2, "max", f64::INFINITY)?))
 }

@@ -52,26 +52,38 @@ fn nonzero(x: &Tensor) -> Result<Tensor> {
     Ok(Tensor::new(vec![x.shape.len(), places.len()], Data::Int(rows)))
 }
 
-/// Dequantizes weights with one scale and zero point for all, or for each index of an axis.
+/// Dequantizes weights with one scale and zero point for all, for each index of an axis, or for each block of an axis.
 fn dequantized(call: &Call<'_>) -> Result<Tensor> {
     let (x, scale) = (call.input(0)?, call.input(1)?);
-    ensure!(
-        scale.shape.len() < 2 && call.int("block_size").unwrap_or(0) == 0,
-        "has a scale for each block of weights; export it in float32"
-    );
+    let block = usize::try_from(call.int("block_size").unwrap_or(0)).ok().context("has a negative block_size")?;
     let n = scale.len();
-    let each = if n == 1 {
-        x.len()
+    // Elements of one scale are those of equal `place`.
+    let (len, inner, each) = if n == 1 && block == 0 {
+        (1, 1, 1)
     } else {
         let at = axis(call.int("axis").unwrap_or(1), x.shape.len())?;
-        ensure!(x.shape[at] == n, "has {n} scales for an axis of {}", x.shape[at]);
-        count(&x.shape[at + 1..])?
+        let mut shape = if block == 0 { vec![x.shape[at]] } else { x.shape.clone() };
+        if block > 0 {
+            shape[at] = x.shape[at].div_ceil(block);
+        }
+        ensure!(
+            scale.shape == shape,
+            "has scales of the shape {:?} for weights of {:?} along axis {at} with block_size {block}; the shape {shape:?} fits",
+            scale.shape,
+            x.shape
+        );
+        (x.shape[at], count(&x.shape[at + 1..])?, block)
+    };
+    let blocks = len.div_ceil(each.max(1));
+    let place = |i: usize| match each {
+        _ if n == 1 => 0,
+        0 => i / inner % len,
+        each => (i / (inner * len) * blocks + i / inner % len / each) * inner + i % inner,
     };
     let (scales, values) = (call.reals(1, "the scale")?, call.reals(0, "the quantized tensor")?);
     let zeros = if call.optional(2).is_some() { call.reals(2, "the zero point")? } else { vec![0.0; n] };
     ensure!(zeros.len() == n, "has {} zero points for {n} scales", zeros.len());
-    let runs = values.chunks(each.max(1)).zip((0..n).cycle());
-    let values = runs.flat_map(|(run, k)| run.iter().map(|v| (v - zeros[k]) * scales[k]).collect::<Vec<f64>>());
+    let values = values.iter().enumerate().map(|(i, v)| (v - zeros[place(i)]) * scales[place(i)]);
     Ok(Tensor::new(x.shape.clone(), Data::Real(values.collect())))
 }
 

@@ -3,7 +3,7 @@
 use actq::error::{Context as _, Result, bail, ensure};
 use half::{bf16, f16};
 
-use crate::file::model::kind_name;
+use crate::file::kinds;
 use crate::nodes::call::Call;
 use crate::nodes::gather;
 use crate::nodes::places::{self, Places, along, axis, broadcast};
@@ -162,14 +162,14 @@ fn cast(call: &Call<'_>) -> Result<Tensor> {
                 ensure!(
                     one as f64 == v.trunc() && wrapped(one, to) == one,
                     "casts {v} to {}, which cannot hold it",
-                    kind_name(to as i32)
+                    kinds::name(to as i32)
                 );
                 Ok(one)
             };
             Data::Int(v.iter().map(whole).collect::<Result<_>>()?)
         }
         _ => {
-            bail!("rounds a value of the network to {}; export the whole policy in float32", kind_name(to as i32))
+            bail!("rounds a value of the network to {}; export the whole policy in float32", kinds::name(to as i32))
         }
     };
     Ok(Tensor { data, ..input.clone() })

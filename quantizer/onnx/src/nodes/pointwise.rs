@@ -31,8 +31,8 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Opt
             Ok(Some(all))
         }
         "Greater" | "GreaterOrEqual" | "Less" | "LessOrEqual" => conditions::above(call, exprs),
-        "IsNaN" | "IsInf" => conditions::not_finite(call).map(Some),
-        "Equal" => conditions::itself(call),
+        "IsNaN" | "IsInf" => conditions::not_finite(call, exprs).map(Some),
+        "Equal" => conditions::itself(call, exprs),
         "And" | "Or" => conditions::both(call, most),
         "Not" => conditions::not(call, exprs),
         "Where" => conditions::choice(call, exprs, most).map(Some),

@@ -1,6 +1,6 @@
 //! Expressions over vectors, each stored one time, in the order of the graph.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::mem::discriminant;
 use std::sync::Arc;
 
@@ -18,6 +18,13 @@ pub(crate) struct Matrix {
     pub(crate) cols: usize,
     /// Row-major.
     pub(crate) data: Vec<f64>,
+}
+
+/// A value that is not finite, which a node tests for or limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Guard {
+    Nan,
+    Infinity,
 }
 
 /// A run of elements of an expression.
@@ -147,6 +154,8 @@ pub(crate) struct Exprs {
     /// Vectors that are limited on one side, each element by its own number: operand, limits, and 1 for lower ones, -1
     /// for upper ones.
     pub(crate) limited_each: HashMap<Id, (Id, Vec<f64>, f64)>,
+    /// Nodes that give NaN or infinite values a meaning, which no kernel does.
+    pub(crate) guards: BTreeSet<(usize, Guard)>,
     /// Index of the node that each expression comes from.
     origins: Vec<usize>,
     /// Index of the current node.

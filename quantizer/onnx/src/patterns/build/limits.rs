@@ -3,7 +3,7 @@
 use actq_kernels::math::Function;
 
 use crate::values::elements::value;
-use crate::values::expr::{Expr, Exprs, Id};
+use crate::values::expr::{Expr, Exprs, Guard, Id};
 use crate::values::tensor::Element;
 
 /// Largest limit of a clip that becomes one operation about its middle; beyond it, the offset would cost digits.
@@ -72,7 +72,10 @@ impl Exprs {
         };
         let [low, high] = if sign > 0.0 { [limits, &others] } else { [&others, limits] };
         let ranges = || low.iter().zip(high);
-        let fits = |(low, high): (&f64, &f64)| low < high && (-low == *high || low.abs().max(high.abs()) <= MOST_CLIP);
+        let fits = |(low, high): (&f64, &f64)| {
+            let most = low.abs().max(high.abs());
+            low < high && (most <= MOST_CLIP || -low == *high && most < f64::from(f32::MAX))
+        };
         if !ranges().all(fits) {
             return None;
         }
@@ -89,6 +92,9 @@ impl Exprs {
         let mut all = self.elements(x);
         for far in [false, true] {
             let side = |i: usize| -sign * limits[i];
+            if (0..limits.len()).any(|i| limits[i].is_finite() && side(i) >= f64::from(f32::MAX)) {
+                self.guards.insert((self.node, Guard::Infinity));
+            }
             let at = (0..limits.len()).filter(|&i| side(i) < f64::from(f32::MAX) && (side(i) > FAR_LIMIT) == far);
             let at: Vec<usize> = at.collect();
             let values: Vec<(Id, usize)> = at.iter().filter_map(|&i| value(&all[i])).collect();
@@ -132,6 +138,16 @@ impl Exprs {
 
     /// Limits `x` to low ..= high, either of which may be infinite.
     pub(crate) fn clip(&mut self, x: Id, low: f64, high: f64) -> Id {
+        // Exporters write f32's largest number for no limit. It limits infinity only.
+        let most = f64::from(f32::MAX);
+        if low.is_finite() && low <= -most || high.is_finite() && high >= most {
+            self.guards.insert((self.node, Guard::Infinity));
+        }
+        let low = if low <= -most { f64::NEG_INFINITY } else { low };
+        let high = if high >= most { f64::INFINITY } else { high };
+        if low == f64::NEG_INFINITY && high == f64::INFINITY {
+            return x;
+        }
         // Two successive limits, as by Max and Min.
         if let Some((inner, lowest, highest)) = self.limited(x)
             && low.max(lowest) < high.min(highest)

@@ -1,0 +1,110 @@
+//! Remarks on a file: what its graph does with values that are not finite, and operators that it must not have.
+
+use std::collections::BTreeSet;
+
+use actq::error::Result;
+
+use crate::file::model::{Model, Node};
+use crate::nodes::follow::{Follower, Scope, needed};
+use crate::values::compare::uniform;
+use crate::values::expr::{Exprs, Guard};
+
+/// The most nodes between a test and the choice by it.
+const MOST_BETWEEN: usize = 6;
+
+/// Operators of the importer that are younger than the oldest set it reads, with their first operator sets.
+const FIRST_SETS: [(&str, i64); 29] = [
+    ("Expand", 8),
+    ("ConstantOfShape", 9),
+    ("Erf", 9),
+    ("IsNaN", 9),
+    ("NonZero", 9),
+    ("Sign", 9),
+    ("Where", 9),
+    ("DequantizeLinear", 10),
+    ("IsInf", 10),
+    ("Mod", 10),
+    ("GatherElements", 11),
+    ("GatherND", 11),
+    ("Range", 11),
+    ("Round", 11),
+    ("ScatterElements", 11),
+    ("ScatterND", 11),
+    ("Celu", 12),
+    ("Einsum", 12),
+    ("GreaterOrEqual", 12),
+    ("LessOrEqual", 12),
+    ("HardSwish", 14),
+    ("CastLike", 15),
+    ("LayerNormalization", 17),
+    ("GroupNormalization", 18),
+    ("Mish", 18),
+    ("Gelu", 20),
+    ("Attention", 23),
+    ("RMSNormalization", 23),
+    ("Swish", 24),
+];
+
+/// Describes the nodes that give NaN and infinity a meaning, of those that these outputs need.
+pub(super) fn guards(model: &Model, exprs: &Exprs, outputs: &[String]) -> Result<Vec<String>> {
+    let needed = needed(&model.graph, &Scope::new(), outputs)?;
+    let guards = exprs.guards.iter().filter(|(at, _)| needed.nodes.contains(at));
+    Ok(guards
+        .filter_map(|&(at, guard)| {
+            let node = model.graph.nodes.get(at)?;
+            let what = if guard == Guard::Nan { "NaN" } else { "infinity" };
+            let mut by = BTreeSet::new();
+            let name = node.outputs.first()?;
+            replacements(model, name, &mut by, MOST_BETWEEN);
+            let verb = match &by.into_iter().collect::<Vec<_>>()[..] {
+                _ if matches!(node.op.as_str(), "Clip" | "Max" | "Min") => format!("limits {what} to a finite number"),
+                [] => format!("tests for {what}"),
+                by => format!("replaces {what} by {}", by.join(" and ")),
+            };
+            Some(format!("{} {verb}", named(at, node)))
+        })
+        .collect())
+}
+
+/// Collects the numbers that the graph chooses instead of a value, by a test of this name.
+fn replacements(model: &Model, test: &str, found: &mut BTreeSet<String>, depth: usize) {
+    let Some(depth) = depth.checked_sub(1) else { return };
+    for node in model.graph.nodes.iter().filter(|node| node.inputs.iter().any(|input| input == test)) {
+        match (node.op.as_str(), &node.inputs[..], node.outputs.first()) {
+            ("Not" | "And" | "Or" | "Cast" | "Identity", _, Some(output)) => replacements(model, output, found, depth),
+            ("Where", [condition, choices @ ..], _) if condition == test => {
+                let numbers = choices.iter().filter_map(|name| Follower::new(model).value(name).ok()?.reals());
+                found.extend(numbers.filter_map(|numbers| uniform(&numbers)).map(shown));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Formats a number, with an exponent if it is large.
+fn shown(number: f64) -> String {
+    let number = number as f32;
+    if number.abs() < 1e6 { number.to_string() } else { format!("{number:e}") }
+}
+
+/// Describes each operator that is younger than the operator set which the file declares: the file is invalid.
+pub(super) fn faults(model: &Model) -> Vec<String> {
+    let mut faults = Vec::new();
+    for (at, node) in model.graph.nodes.iter().enumerate() {
+        let is_function = model.functions.keys().any(|[domain, name, _]| *domain == node.domain && *name == node.op);
+        let is_own = ["", "ai.onnx"].contains(&node.domain.as_str()) && !is_function;
+        let first = FIRST_SETS.iter().find(|(op, _)| is_own && *op == node.op);
+        if let Some((op, first)) = first.filter(|(_, first)| *first > model.opset) {
+            faults.push(format!(
+                "{}: {op} is an operator from operator set {first} on, and the file declares {}",
+                named(at, node),
+                model.opset
+            ));
+        }
+    }
+    faults
+}
+
+fn named(at: usize, node: &Node) -> String {
+    format!("node {at} {:?} ({})", node.name, node.op)
+}
