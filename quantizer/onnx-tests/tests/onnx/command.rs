@@ -98,7 +98,7 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     Ok(())
 }
 
-/// Writes a network of one layer of 4 by 4 with its weights in another file, from `offset` on.
+/// Writes a network that replaces NaN, then has one layer of 4 by 4 with its weights in another file, from `offset` on.
 fn write_layer(model: &Path, [input, output]: [&str; 2], location: &str, offset: usize) -> Result<()> {
     let entry = |key: &str, value: String| encoded(&proto::Entry { key: Some(key.to_owned()), value: Some(value) });
     let weights = proto::Tensor {
@@ -110,7 +110,7 @@ fn write_layer(model: &Path, [input, output]: [&str; 2], location: &str, offset:
     let mut file = File::default();
     file.input(input, &[1, 4]);
     file.initializer(&weights);
-    file.write(&[], &format!("{output} := MatMul({input}, w)"));
+    file.write(&[], &format!("{output} := MatMul(Where(IsNaN({input}), 0.0, {input}), w)"));
     file.output(output, &[1, 4]);
     fs::create_dir_all(model.parent().expect("a folder"))?;
     Ok(fs::write(model, file.bytes())?)
@@ -173,7 +173,11 @@ fn an_imported_bundle_keeps_weights_of_other_files() -> Result<()> {
         write_bundle(&bundle, networks)?;
         let observations = [vec![0.5, -1.0, 2.0, 0.25]];
         let expected_actions = actions(&load(&bundle)?, &observations);
-        succeeded(&actq(&["import", text(&bundle), "--out", text(&out)]).output()?)?;
+        let imported = actq(&["import", text(&bundle), "--out", text(&out)]).output()?;
+        succeeded(&imported)?;
+        let noted = String::from_utf8_lossy(&imported.stderr);
+        let guard = format!("{}: node 0 \"/node/0\" (IsNaN) replaces NaN by 0", networks[0].0);
+        ensure!(noted.matches(&guard).count() == 1, "{noted}");
         fs::rename(&out, &moved)?;
         fs::remove_dir_all(&bundle)?;
         let mut expected_files = [expected, &["deploy.toml"]].concat();
