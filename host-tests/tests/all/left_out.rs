@@ -14,7 +14,7 @@ use anyhow::{Result, ensure};
 use tempfile::TempDir;
 
 use crate::denoising;
-use crate::deployed::{Made, four_bits};
+use crate::deployed::Made;
 
 /// Compiles a program that includes `policy.actq` of its folder, with these features of the kernels.
 fn compile(folder: &Path, features: &BTreeSet<&str>) -> Result<Output> {
@@ -44,7 +44,7 @@ fn images_without_their_features_do_not_compile() -> Result<()> {
     let mut images = vec![
         fs::read(root().join("kernels/tests/valid.actq"))?,
         emit::image(&policy, &outcomes)?,
-        four_bits(&Made::deployment()?.1.policy)?,
+        Made::deployment()?.1.four_bits()?,
     ];
     images.extend(denoising::images()?.first().map(|image| image.bytes().to_vec()));
     let mut tried = BTreeSet::new();
