@@ -132,7 +132,8 @@ pub fn refuse_open_questions(reading: &Reading) -> Result<()> {
     )
 }
 
-/// Compares the description, and an image of it, with the reference; an error names the first difference, and the conventions that explain it.
+/// Compares the description with the reference, and an image of it with the description; an error names the first
+/// difference, and the conventions that explain it.
 fn compare(description: &Description, plan: Plan, bundle: &Bundle, reference: &Reference) -> Result<String> {
     let unused: Vec<String> = reference.raw().unused(&plan).map(str::to_owned).collect();
     let comparison = reference.compare(description, bundle)?;

@@ -26,7 +26,7 @@ use crate::bits;
 /// Ticks of a run.
 const TICKS: usize = 40;
 /// Errors of values, and of outputs of a network at 8 bits.
-const EIGHT_BITS: [f64; 2] = [ROUNDING[0], 0.02];
+const EIGHT_BITS: [f64; 2] = [ROUNDING[0], 0.05];
 /// Reasons for which a description has no image; each error names the value.
 pub const REFUSALS: [&str; 4] = [
     "cannot divide by a value",

@@ -7,7 +7,7 @@ use crate::description::Numbers;
 /// Refuses numbers that are not finite in f32.
 pub(super) fn finite(numbers: &[f64]) -> Result<()> {
     match numbers.iter().position(|number| !(*number as f32).is_finite()) {
-        Some(i) => bail!("number {i} is {}; give numbers from -3.4e38 to 3.4e38", numbers[i]),
+        Some(i) => bail!("number {i} is {:e}; give numbers from -3.4e38 to 3.4e38", numbers[i]),
         None => Ok(()),
     }
 }

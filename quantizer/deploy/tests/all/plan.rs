@@ -191,6 +191,17 @@ fn mistakes_are_refused_by_their_keys() {
             "{ clip = [[-1.0, 1.0], 0.5] }",
             "value \"sum\": do[1]: clip = [1, 0.5]; give the lowest number first",
         ),
+        ("{ add = \"phase\" }", "{ add = 1e39 }", "do[1]: number 0 is 1e39; give numbers from -3.4e38"),
+        (
+            "advance = 0.25",
+            "advance = 0.25\nstanding = { of = [], below = 0.1, at = [0.0, 0.0] }",
+            "clock \"phase\": standing.of is empty",
+        ),
+        (
+            "value = \"target\"\njoints = \"robot\"",
+            "value = \"target\"\nlimits = [[0.0, 2.0], 1.0]",
+            "target \"target\": limits: value 1: [2, 1]; give the lowest number first",
+        ),
         ("{ add = \"phase\" }", "{ select = [0, 2] }", "place 2 (from 0) is not in 2 values"),
         ("{ add = \"phase\" }", "{ place = [1, 1] }", "not a permutation"),
         ("{ add = \"phase\" }", "{ gravity = \"wxyz\" }", "an orientation has 4 values; this value has 2"),
