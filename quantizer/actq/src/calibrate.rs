@@ -2,6 +2,7 @@
 
 pub mod allowance;
 mod dynamics;
+pub mod equalize;
 pub mod imagined;
 pub mod moments;
 pub mod sensitivity;

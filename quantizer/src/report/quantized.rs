@@ -55,8 +55,12 @@ pub fn imagined(imagined: &Imagined) -> String {
 
 /// Formats the choice of learning, and the settings that were tried.
 pub fn learning(learning: &Learning) -> String {
-    let Learning { steps, choice, tried } = learning;
+    let Learning { steps, discarded, choice, tried } = learning;
     let mut text = match choice {
+        Choice::Feedback { .. } if *discarded > 0 => format!(
+            "learned {}, and discarded the result: its error is higher than without learning; took {choice}\n",
+            count(*discarded, "step")
+        ),
         Choice::Learning(recipe) => format!("learned {} with {recipe}\n", count(*steps, "step")),
         Choice::Feedback { .. } => format!("not learned: {choice}\n"),
     };

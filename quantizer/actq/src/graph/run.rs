@@ -11,6 +11,7 @@ use ndarray::{Array2, s};
 use super::denoising::Iterates;
 use super::nodes::Graph;
 use super::operation::{Backward, Forward, Saved, Values};
+use super::values::ValueId;
 use super::weights::{Derivatives, State, Weights};
 
 /// Values of a forward pass.
@@ -48,6 +49,13 @@ impl Pass {
     /// Returns the network's output.
     pub fn output(&self) -> &Array2<f32> {
         self.denoised.as_ref().unwrap_or_else(|| &self.values[self.values.len() - 1])
+    }
+
+    /// Returns every value with its identifier; those of denoising steps one time for each step.
+    pub fn all_values(&self) -> impl Iterator<Item = (ValueId, &Array2<f32>)> {
+        let of_step = |step: &'_ StepPass| self.values.len()..self.values.len() + step.values.len();
+        let of_steps = self.steps.iter().flat_map(move |step| of_step(step).zip(&step.values));
+        self.values.iter().enumerate().chain(of_steps)
     }
 
     /// Returns the network's output and drops the other values.

@@ -28,7 +28,7 @@ pub use statistics::{MIN_FRAMES, RowStatistics};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::learning::{Choice, Learning, Recipe};
+use super::learning::{Choice, Learning, Recipe, Tried};
 use super::options::Options;
 use super::packing::Activations;
 use super::progress::Progress;
@@ -36,13 +36,14 @@ use super::quantized::{Outcome, Quantized, QuantizedNetwork, RowAllocation};
 use crate::budget::Rate;
 use crate::calibrate::allowance::Allowance;
 use crate::calibrate::moments::Moments;
+use crate::calibrate::sensitivity::DAMPING_INPUT;
 use crate::calibrate::widening::Widening;
 use crate::error::{Result, ensure};
 use crate::graph::Graph;
 use activations::choose_activations;
 use allocate::Rows;
 use candidate::Candidate;
-use choose::{Chosen, choose};
+use choose::{Chosen, choose, errors};
 use compact::add_to_bias;
 use feedback::feedback;
 use schedule::Bounds;
@@ -60,13 +61,13 @@ pub fn quantize(
 ) -> Result<QuantizedNetwork> {
     check_names(&statistics.windows.graph, options)?;
     let goal = Goal { statistics, rate, options };
-    let (candidate, Chosen { choice, bounds, tried, share }) = choose_candidate(goal, progress)?;
-    let Learned { quantized, graph: learned, steps } = learn(goal, &candidate, choice, bounds, share, progress);
+    let (candidate, chosen) = choose_candidate(goal, progress)?;
+    let bounds = chosen.bounds;
+    let (Learned { quantized, graph: learned, .. }, learning) = learn(goal, &candidate, chosen, progress);
     let outcomes = outcomes(goal, &candidate, &learned, &quantized, bounds)?;
     let cycles = candidate.shape.cycles;
     let outcomes = with_allocations(statistics, candidate, outcomes);
-    let learning = Some(Learning { steps, choice, tried });
-    Ok(QuantizedNetwork { graph: learned, outcomes, learning, cycles })
+    Ok(QuantizedNetwork { graph: learned, outcomes, learning: Some(learning), cycles })
 }
 
 /// Refuses a forced width for a matrix that the network does not have.
@@ -101,28 +102,48 @@ fn choose_candidate(goal: Goal<'_>, progress: &mut dyn FnMut(Progress)) -> Resul
     Ok((first, chosen))
 }
 
-/// Learns, or takes two-sided error feedback; `from` is the share of the work that the choice took.
+/// Learns, or takes two-sided error feedback; also feedback if learning has made the network worse.
 fn learn(
     goal: Goal<'_>,
     candidate: &Candidate,
-    choice: Choice,
-    bounds: Bounds,
-    from: f64,
+    Chosen { choice, bounds, mut tried, share: from }: Chosen,
     progress: &mut dyn FnMut(Progress),
-) -> Learned {
+) -> (Learned, Learning) {
     let Goal { statistics: RowStatistics { windows, moments, .. }, options, .. } = goal;
-    match choice {
+    let fed_back = |damping: f64| {
+        let (quantized, graph) = feed_back(candidate, options.group, moments, damping);
+        Learned { quantized, graph, steps: 0 }
+    };
+    let recipe = match choice {
         Choice::Feedback { damping } => {
-            let (quantized, graph) = feed_back(candidate, options.group, moments, damping);
-            Learned { quantized, graph, steps: 0 }
+            return (fed_back(damping), Learning { steps: 0, discarded: 0, choice, tried });
         }
-        Choice::Learning(recipe) => {
-            let task = Task { bounds, ..candidate.task(goal, recipe) };
-            distill(&task, windows, &mut |Present { share, error, held_out }| {
-                progress(Progress::Learning { share: from + (1.0 - from) * share, error, held_out });
-            })
-        }
+        Choice::Learning(recipe) => recipe,
+    };
+    let task = Task { bounds, ..candidate.task(goal, recipe) };
+    let learned = distill(&task, windows, &mut |Present { share, error, held_out }| {
+        progress(Progress::Learning { share: from + (1.0 - from) * share, error, held_out });
+    });
+    let before = fed_back(DAMPING_INPUT);
+    let damping = Choice::Feedback { damping: DAMPING_INPUT };
+    let [after, start, feedback] =
+        [(choice, &learned), (choice, &task.start()), (damping, &before)].map(|(choice, of)| {
+            let [recorded, widened] = errors(&task, &of.graph, &of.quantized, windows);
+            Tried { choice, recorded, widened }
+        });
+    if is_kept(&after, &start, &feedback) {
+        let learning = Learning { steps: learned.steps, discarded: 0, choice, tried };
+        return (learned, learning);
     }
+    tried.extend([after, feedback]);
+    (before, Learning { steps: 0, discarded: learned.steps, choice: damping, tried })
+}
+
+/// `true` if learning has not raised the error of what it started from, nor is feedback better. Feedback fits the
+/// recorded observations more closely than others, so it has to be better at the widened ones, too. An error that is
+/// not a number counts as higher.
+fn is_kept(learned: &Tried, start: &Tried, feedback: &Tried) -> bool {
+    learned.recorded <= start.recorded && (learned.recorded <= feedback.recorded || learned.widened <= feedback.widened)
 }
 
 /// Returns the matrices with the activations that they get: int16 has another layout, which may pad more, so a matrix
@@ -204,4 +225,22 @@ fn feed_back(
         quantized
     });
     (quantized.collect(), graph)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn learning_counts_only_if_it_lowers_the_error() {
+        let tried =
+            |recorded, widened| Tried { choice: Choice::Feedback { damping: DAMPING_INPUT }, recorded, widened };
+        let (start, feedback) = (tried(1.0, 2.0), tried(0.5, 1.0));
+        let kept = |recorded, widened| is_kept(&tried(recorded, widened), &start, &feedback);
+        assert!(kept(0.4, 0.9) && kept(0.4, 1.1), "lower at the recorded observations");
+        assert!(kept(0.6, 0.9), "feedback fits the recorded observations more closely than others");
+        assert!(!kept(0.6, 1.1), "feedback is better");
+        assert!(!kept(1.1, 0.9), "higher than before learning");
+        assert!(!kept(f64::NAN, 0.1) && !kept(f64::INFINITY, 0.1));
+    }
 }

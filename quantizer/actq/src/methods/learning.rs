@@ -74,6 +74,9 @@ impl fmt::Display for Choice {
 pub struct Learning {
     /// Steps of learning; 0 if nothing was learned.
     pub steps: usize,
+    /// Steps of learning that were discarded, since they ended with a higher error than they began with, or than
+    /// feedback has.
+    pub discarded: usize,
     /// Selected way.
     pub choice: Choice,
     /// Ways that were compared.

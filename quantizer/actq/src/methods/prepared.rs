@@ -13,6 +13,7 @@ use super::progress::Progress;
 use super::quantized::{Outcome, QuantizedNetwork};
 use crate::budget::Rate;
 use crate::calibrate::allowance::{Allowance, Sampled};
+use crate::calibrate::equalize::equalized;
 use crate::calibrate::imagined::Imagined;
 use crate::calibrate::moments::{Moments, collect};
 use crate::data::{Dataset, Recording};
@@ -33,7 +34,8 @@ const TIMED: usize = 8;
 /// A prepared method, which quantizes a network at any number of rates.
 #[derive(Debug)]
 pub struct PreparedMethod<'a> {
-    graph: &'a Graph,
+    /// The network with equalized hidden elements.
+    graph: Cow<'a, Graph>,
     method: Method,
     statistics: Statistics,
     sampled: Option<Sampled>,
@@ -71,6 +73,8 @@ impl<'a> PreparedMethod<'a> {
         minutes: Option<f64>,
         mut progress: impl FnMut(f64),
     ) -> Result<Self> {
+        let equalized = equalized(graph, calib);
+        let graph = &*equalized;
         let steps = graph.denoising_steps();
         let time = minutes.filter(|_| steps > 1).map(|minutes| Duration::from_secs_f64(60.0 * minutes));
         let allowance = time.map(Allowance::of);
@@ -109,7 +113,7 @@ impl<'a> PreparedMethod<'a> {
             }
             Method::Custom(custom) => Statistics::Custom(custom.prepare(graph, calib()?, &mut progress)?),
         };
-        Ok(Self { graph, method, statistics, sampled: sampled.filter(|_| steps > 1) })
+        Ok(Self { graph: equalized, method, statistics, sampled: sampled.filter(|_| steps > 1) })
     }
 
     /// Reports errors on some of a held-out recording while something is learned; nothing else depends on it.
@@ -141,11 +145,11 @@ impl<'a> PreparedMethod<'a> {
         }
     }
 
-    /// Returns the network that is quantized; for distill, with balanced columns.
+    /// Returns the network that is quantized: with equalized hidden elements and, for distill, balanced columns.
     pub fn graph(&self) -> &Graph {
         match &self.statistics {
             Statistics::Distill(statistics) => statistics.graph(),
-            _ => self.graph,
+            _ => &self.graph,
         }
     }
 
@@ -181,7 +185,7 @@ impl<'a> PreparedMethod<'a> {
                 outcomes
             }
         };
-        Ok(QuantizedNetwork { graph: (*graph).clone(), outcomes, learning: None, cycles: None })
+        Ok(QuantizedNetwork { graph: graph.clone().into_owned(), outcomes, learning: None, cycles: None })
     }
 
     /// Returns the most steps of distillation with these options; 0 for methods that do not learn.

@@ -52,7 +52,8 @@ pub struct Stats {
     pub matrices: Vec<MatrixRecord>,
 }
 
-/// Statistics of one matrix. Rows and columns are those of the matrix as it was trained.
+/// Statistics of one matrix. Rows and columns are those of the matrix as it was trained, without those that the network
+/// ignores.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MatrixRecord {
     /// Name of its tensor.

@@ -139,17 +139,27 @@ mod tests {
 
     #[test]
     fn without_learning_the_better_damping_is_taken() {
-        let Learning { steps, choice, tried } = chosen(4, 0);
+        let Learning { steps, choice, tried, .. } = chosen(4, 0);
         assert_eq!((steps, tried.len()), (0, DAMPINGS.len()));
         assert_eq!(lowest_error(&tried, false).map(|tried| tried.choice), Some(choice));
     }
 
     #[test]
     fn with_enough_steps_feedback_competes_with_learning() {
-        let Learning { steps, choice, tried } = chosen(4, LEAST_STEPS);
-        assert_eq!(tried.len(), DAMPINGS.len() + 1);
-        assert_eq!(lowest_error(&tried, false).map(|tried| tried.choice), Some(choice));
-        assert_eq!(steps > 0, matches!(choice, Choice::Learning(_)));
+        let Learning { choice, tried, .. } = chosen(4, LEAST_STEPS);
+        let (compared, after) = tried.split_at(DAMPINGS.len() + 1);
+        let first = lowest_error(compared, false).map(|tried| tried.choice);
+        // What learning gave in the end is compared, too, if it is discarded.
+        assert_eq!(Some(choice), after.last().map(|tried| tried.choice).or(first));
+    }
+
+    #[test]
+    fn learning_that_raises_the_error_is_discarded() {
+        let Learning { steps, discarded, choice, tried } = chosen(4, LEAST_STEPS);
+        assert!(steps == 0 && discarded > 0, "{steps} {discarded}");
+        assert_eq!(choice, Choice::Feedback { damping: DAMPING_INPUT });
+        let [.., learned, fed_back] = tried[..] else { panic!("{tried:?}") };
+        assert!(learned.recorded > fed_back.recorded && fed_back.choice == choice);
     }
 
     #[test]

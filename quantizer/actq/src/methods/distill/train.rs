@@ -16,6 +16,7 @@ use super::objective::{Frames, Objective};
 use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
+use crate::data::mean_and_variance;
 use crate::graph::{Derivatives, Graph, Matrix, Network, Node, NodeKind, STRIP, Vectors, WeightMatrix, Weights};
 use crate::methods::learning::Recipe;
 use crate::methods::options::Effort;
@@ -51,6 +52,8 @@ const WINDOW_SHARDS: usize = 2;
 /// Least steps between two runs for a recurrent network's own states, and frames of the recording for each step.
 const MIN_STEPS_BETWEEN_STATE_RUNS: usize = 100;
 const RECORDED_FRAMES_PER_STEP: usize = 50;
+/// Frames that the units of biases are measured on.
+const UNIT_FRAMES: usize = 1024;
 /// Batches that an error is measured on, and frames in each.
 const ERROR_BATCHES: usize = 16;
 const ERROR_FRAMES: usize = 512;
@@ -93,6 +96,17 @@ impl Task<'_> {
         4 * self.weights() < windows.graph.weights()
     }
 
+    /// Returns what learning starts from: every weight rounded to the nearest level.
+    pub(super) fn start(&self) -> Learned {
+        let quantized = self.latents().iter().map(Latent::quantized).collect();
+        Learned { quantized, graph: self.graph.clone(), steps: 0 }
+    }
+
+    fn latents(&self) -> Vec<Latent> {
+        let matrices = self.graph.matrices.iter().zip(self.widths).zip(self.importance);
+        matrices.map(|((matrix, widths), importance)| Latent::new(matrix, widths, self.group, importance)).collect()
+    }
+
     /// Returns the weights that have bits.
     fn weights(&self) -> usize {
         let of_matrix =
@@ -127,11 +141,9 @@ pub struct Present {
 pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Present)) -> Learned {
     let network = Network::rounded(task.graph, task.x_max);
     let mut weights = Weights::of(task.graph);
-    let matrices = task.graph.matrices.iter().zip(task.widths).zip(task.importance);
-    let mut latents: Vec<Latent> =
-        matrices.map(|((matrix, widths), importance)| Latent::new(matrix, widths, task.group, importance)).collect();
+    let mut latents = task.latents();
     let mut adam_vectors: Vec<Adam> = weights.vectors.iter().flatten().map(|v| Adam::new(v.len())).collect();
-    let units = units_of_vectors(task.graph, &windows.output_variance);
+    let units = units_of_vectors(task.graph, windows, task.seed);
     latents.iter_mut().zip(&mut weights.matrices).for_each(|(latent, matrix)| latent.write(matrix));
     let mut lessons = Lessons::new(task.seed);
     let (size, shards) = batch_size(task.graph, windows);
@@ -205,16 +217,41 @@ fn learn(latents: &mut [Latent], grads: &mut [Array2<f32>], gait: Gait, weights:
     });
 }
 
-/// Returns the units that each vector learns in. The bias of a last matrix is in the unit of the actions, which people
-/// choose, so it learns in their deviations. All others are in the network's own units, which are about 1.
-fn units_of_vectors(graph: &Graph, output_variance: &[f32]) -> Vec<Option<Vec<f32>>> {
-    let deviations = || output_variance.iter().map(|variance| variance.sqrt()).collect();
-    let of_node = |(index, node): (usize, &Node)| {
-        let is_last = index + 1 == graph.output() && graph.denoising.is_none();
-        let is_action = is_last && matches!(node.kind, NodeKind::Linear(_));
-        vec![is_action.then(deviations); node.kind.vectors().len()]
+/// Returns the units that each vector learns in: about the deviation of what it is added to, so that a step means the
+/// same in every unit of a layer. Vectors of recurrent cells learn in the units of their gates.
+fn units_of_vectors(graph: &Graph, windows: &Windows, seed: u64) -> Vec<Option<Vec<f32>>> {
+    let batch = windows.batch(UNIT_FRAMES.div_ceil(windows.window), None, &mut Random::new(seed));
+    let lesson = Lesson::of(windows, batch, graph, &windows.states_of(&Network::new(graph), &Weights::of(graph)));
+    let pass = lesson.pass(&Network::new(graph), &Weights::of(graph));
+    let mut deviations = vec![Vec::new(); graph.nodes.len() + 1];
+    pass.all_values().for_each(|(value, of)| deviations[value] = column_deviations(of));
+    let of_node = |(index, node): (usize, &Node)| match &node.kind {
+        // People choose the unit of the actions.
+        NodeKind::Linear(_) if index + 1 == graph.output() && graph.denoising.is_none() => {
+            vec![Some(windows.output_variance.iter().map(|variance| variance.sqrt()).collect())]
+        }
+        NodeKind::Linear(_) => vec![Some(with_least(deviations[index + 1].clone()))],
+        NodeKind::LayerNorm(_) | NodeKind::RmsNorm(_) => {
+            let weights = node.kind.vectors()[0].iter().map(|w| w.abs()).collect();
+            vec![Some(with_least(weights)); node.kind.vectors().len()]
+        }
+        _ => vec![None; node.kind.vectors().len()],
     };
     graph.nodes.iter().enumerate().flat_map(of_node).collect()
+}
+
+/// Returns the standard deviation of every column.
+fn column_deviations(values: &Array2<f32>) -> Vec<f32> {
+    mean_and_variance(values.ncols(), || values.rows().into_iter()).1.into_iter().map(|of| of.sqrt() as f32).collect()
+}
+
+/// Raises units to a tenth of their root mean square: an element may hardly move in the recording. Units are 1 if none
+/// moves.
+fn with_least(mut units: Vec<f32>) -> Vec<f32> {
+    let square = units.iter().map(|unit| f64::from(*unit).powi(2)).sum::<f64>() / units.len().max(1) as f64;
+    let least = if square > 0.0 { 0.1 * square.sqrt() as f32 } else { 1.0 };
+    units.iter_mut().for_each(|unit| *unit = unit.max(least));
+    units
 }
 
 /// Returns the samples of a batch, frames or windows, and the parts that it is cut into. A frame of an iterative head
