@@ -11,6 +11,8 @@ fn main() {
     println!("cargo::rustc-check-cfg=cfg(actq_armv7em)");
     println!("cargo::rustc-check-cfg=cfg(actq_armv8m)");
     println!("cargo::rustc-check-cfg=cfg(actq_fpu)");
+    println!("cargo::rustc-check-cfg=cfg(actq_soft)");
+    println!("cargo::rustc-check-cfg=cfg(actq_narrow)");
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed=ACTQ_BACKEND");
     let target = std::env::var("TARGET").unwrap_or_default();
@@ -19,6 +21,13 @@ fn main() {
         Ok("") | Err(_) => false,
         Ok(other) => panic!("ACTQ_BACKEND is {other:?}; set it to `portable` or unset it"),
     };
+    if !has_fpu(&target) {
+        println!("cargo::rustc-cfg=actq_soft");
+    }
+    // Neither a product of 64 bits nor a division.
+    if target.starts_with("thumbv6m") {
+        println!("cargo::rustc-cfg=actq_narrow");
+    }
     let dsp = target.starts_with("thumbv7em") || target.starts_with("thumbv8m.main") && flags_have_dsp();
     if dsp && !portable {
         println!("cargo::rustc-cfg=actq_armv7em");
@@ -29,6 +38,16 @@ fn main() {
         if target.ends_with("eabihf") {
             println!("cargo::rustc-cfg=actq_fpu");
         }
+    }
+}
+
+/// Returns `true` if the target's floats are not in software.
+fn has_fpu(target: &str) -> bool {
+    let features = std::env::var("CARGO_CFG_TARGET_FEATURE").unwrap_or_default();
+    match target.split_once('-').map_or(target, |(architecture, _)| architecture) {
+        thumb if thumb.starts_with("thumb") => target.ends_with("eabihf"),
+        riscv if riscv.starts_with("riscv") => features.split(',').any(|feature| feature == "f"),
+        _ => true,
     }
 }
 

@@ -60,6 +60,8 @@ targets! {
     NoDsp: "thumbv7m-none-eabi" on mps2::host::AN385;
     /// Cortex-M0: the portable kernels in little memory.
     Small: "thumbv6m-none-eabi" on microbit::BOARD;
+    /// Code of the Cortex-M0 on a Cortex-M3, which has the memory to count all of it.
+    V6m: "thumbv6m-none-eabi" on mps2::host::AN385;
     /// RV32IMAC: the portable kernels.
     Riscv: "riscv32imac-unknown-none-elf" on virt::BOARD;
     /// Cortex-M33 with FPU and DSP extension.
@@ -187,6 +189,6 @@ mod tests {
     #[test]
     fn features_select_boards_that_triples_do_not() {
         let chosen: Vec<_> = Target::ALL.into_iter().filter_map(Target::feature).collect();
-        assert_eq!(chosen, ["mps2-an500", "stm32f405"]);
+        assert_eq!(chosen, ["mps2-an385", "mps2-an500", "stm32f405"]);
     }
 }

@@ -8,6 +8,6 @@ pub(crate) const BOARD: Board = Board {
     small: false,
     emulator: "qemu-system-riscv32",
     machine: &["-M", "virt", "-cpu", "sifive-e31", "-bios", "none"],
-    binaries: &["golden", "portable"],
+    binaries: &["functions", "golden", "portable"],
     application: None,
 };

@@ -1,5 +1,6 @@
 //! Powers of two and exponentials, as fractions.
 
+use super::real::Real;
 use crate::round::ROUND;
 
 /// Computes `2^(y / one)` as a fraction of two positive numbers, for a finite y. `one` is a power of two: it sets the
@@ -38,8 +39,8 @@ fn by_comparison(whole: f32, one: f32) -> i32 {
 
 /// Computes `2^(f / one)` as in [`exp2`], for `|f| <= one / 2`.
 #[inline(always)]
-pub(super) fn fraction(f: f32, one: f32) -> (f32, f32) {
-    let [_, p1, p0, q0] = exp2_constants(one);
+pub(super) fn fraction<R: Real>(f: R, one: f32) -> (R, R) {
+    let [_, p1, p0, q0] = exp2_constants(one).map(R::of);
     let square = f * f;
     let p = (p1 * square + p0) * f;
     let q = square + q0;
@@ -75,15 +76,15 @@ pub(crate) const EXP: f32 = core::f32::consts::LOG2_E * QUARTER;
 
 /// Computes `e^x` as a fraction.
 #[inline(always)]
-pub(crate) fn exp_fraction(x: f32) -> (f32, f32) {
-    exp2(x * EXP, QUARTER)
+pub(crate) fn exp_fraction<R: Real>(x: R) -> (R, R) {
+    (x * R::of(EXP)).power(QUARTER)
 }
 
 /// Computes `tanh(x)` as a fraction.
 #[inline(always)]
 #[cfg(any(feature = "writer", not(actq_fpu)))]
-pub(crate) fn tanh_fraction(x: f32) -> (f32, f32) {
-    let (n, d) = exp2(x * (2.0 * EXP), QUARTER);
+pub(crate) fn tanh_fraction<R: Real>(x: R) -> (R, R) {
+    let (n, d) = (x * R::of(2.0 * EXP)).power(QUARTER);
     (n - d, n + d)
 }
 

@@ -2,8 +2,9 @@
 
 #[cfg(any(test, feature = "writer"))]
 use super::exp2::tanh_fraction;
-use super::exp2::{EXP, EXPONENT, FIXED_ONE, QUARTER, exp_fraction, exp2, fraction, power};
+use super::exp2::{EXP, EXPONENT, FIXED_ONE, QUARTER, exp_fraction, fraction, power};
 use super::limits::zero_or_nan;
+use super::real::{Native, Real};
 use crate::round::ROUND;
 
 macro_rules! functions {
@@ -85,15 +86,15 @@ impl Function {
             Self::Tanh => each_ratio(x, &TANH),
             Self::Sigmoid => each_ratio(x, &SIGMOID),
             Self::Silu if !cfg!(feature = "silu") => {}
-            Self::Silu => each(x, silu),
+            Self::Silu => each(x, |x| native(silu, x)),
             _ if !cfg!(feature = "functions") => {}
-            Self::Gelu => in_pairs(x, |pairs| each(pairs, |[a, b]| [gelu(a), gelu(b)])),
-            Self::GeluTanh => each(x, gelu_tanh),
-            Self::Exp => in_pairs(x, |pairs| each(pairs, |[a, b]| [exp(a), exp(b)])),
-            Self::Sin => in_pairs(x, |pairs| each(pairs, |[a, b]| [sin(a), sin(b)])),
-            Self::Cos => in_pairs(x, |pairs| each(pairs, |[a, b]| [cos(a), cos(b)])),
-            Self::Softplus => in_pairs(x, |pairs| each(pairs, |[a, b]| [softplus(a), softplus(b)])),
-            Self::Mish => each(x, mish),
+            Self::Gelu => in_pairs(x, |pairs| each(pairs, |[a, b]| [native(gelu, a), native(gelu, b)])),
+            Self::GeluTanh => each(x, |x| native(gelu_tanh, x)),
+            Self::Exp => in_pairs(x, |pairs| each(pairs, |[a, b]| [native(exp, a), native(exp, b)])),
+            Self::Sin => in_pairs(x, |pairs| each(pairs, |[a, b]| [native(sin, a), native(sin, b)])),
+            Self::Cos => in_pairs(x, |pairs| each(pairs, |[a, b]| [native(cos, a), native(cos, b)])),
+            Self::Softplus => in_pairs(x, |pairs| each(pairs, |[a, b]| [native(softplus, a), native(softplus, b)])),
+            Self::Mish => each(x, |x| native(mish, x)),
         }
     }
 
@@ -117,6 +118,12 @@ impl Function {
             Self::Mish => each_inlined(x, mish),
         }
     }
+}
+
+/// Calculates with this build's numbers.
+#[inline(always)]
+fn native(function: impl Fn(Native) -> Native, x: f32) -> f32 {
+    function(Native::of(x)).get()
 }
 
 #[cfg(feature = "writer")]
@@ -146,26 +153,26 @@ fn in_pairs(x: &mut [f32], each: fn(&mut [[f32; 2]])) {
     each(pairs);
 }
 
-/// A function `(n - a d) / (b n + d)` with `n / d = e^x` or another power; above `end` it is x itself.
-struct Ratio {
-    factor: f32,
-    a: f32,
-    b: f32,
+/// A function `(n - a d) / (b n + d)` with `n / d = 2^(factor x)`, in quarters; above `end` it is x itself. `a` and `b`
+/// are 0 or 1.
+pub struct Ratio {
+    pub(super) factor: f32,
+    pub(super) a: f32,
+    pub(super) b: f32,
     end: f32,
 }
 
 const ELU: Ratio = Ratio { factor: EXP, a: 1.0, b: 0.0, end: 0.0 };
 const TANH: Ratio = Ratio { factor: 2.0 * EXP, a: 1.0, b: 1.0, end: f32::INFINITY };
-const SIGMOID: Ratio = Ratio { factor: EXP, a: 0.0, b: 1.0, end: f32::INFINITY };
+pub(super) const SIGMOID: Ratio = Ratio { factor: EXP, a: 0.0, b: 1.0, end: f32::INFINITY };
 
 impl Ratio {
     #[inline(always)]
-    fn of(&self, x: f32) -> f32 {
-        if x > self.end {
+    fn of<R: Real>(&self, x: R) -> R {
+        if x.is_above(self.end) {
             return x;
         }
-        let (n, d) = exp2(x * self.factor, QUARTER);
-        (n - self.a * d) / (self.b * n + d)
+        x.ratio(self)
     }
 }
 
@@ -173,24 +180,24 @@ impl Ratio {
 #[inline(never)]
 fn each_ratio(x: &mut [f32], ratio: &Ratio) {
     for x in x {
-        *x = ratio.of(*x);
+        *x = native(|x| ratio.of(x), *x);
     }
 }
 
 /// Computes `e^x`, infinite outside f32's range: whole powers of two by two factors, because one does not reach f32's
 /// limits, and a fraction for the rest.
 #[inline(always)]
-pub fn exp(x: f32) -> f32 {
+pub fn exp<R: Real>(x: R) -> R {
     // Limited by its bits: magnitudes compare as their bits.
     const END: u32 = 250f32.to_bits();
-    let y = (x * core::f32::consts::LOG2_E).to_bits();
-    let y = f32::from_bits(if y << 1 > END << 1 { y & (1 << 31) | END } else { y });
+    let y = (x * R::of(core::f32::consts::LOG2_E)).get().to_bits();
+    let y = R::of(f32::from_bits(if y << 1 > END << 1 { y & (1 << 31) | END } else { y }));
     // The sum's last bits are the whole part; here they move to the bits of an exponent.
-    let sum = y + ROUND;
-    let whole = (sum.to_bits() << EXPONENT) as i32;
-    let (n, d) = fraction(y - (sum - ROUND), 1.0);
+    let sum = y + R::of(ROUND);
+    let whole = (sum.get().to_bits() << EXPONENT) as i32;
+    let (n, d) = fraction(y - (sum - R::of(ROUND)), 1.0);
     let half = whole >> 1 & (-1 << EXPONENT);
-    n / d * power(half) * power(whole - half) + zero_or_nan(x)
+    n / d * R::of(power(half)) * R::of(power(whole - half)) + zero_or_nan(x)
 }
 
 /// A zero of sine and of cosine, in half turns.
@@ -199,13 +206,13 @@ const COS: f32 = 0.5;
 
 /// Computes the sine of radians
 #[inline(always)]
-pub fn sin(x: f32) -> f32 {
+pub fn sin<R: Real>(x: R) -> R {
     wave(x, SIN)
 }
 
 /// Computes the cosine of radians
 #[inline(always)]
-pub fn cos(x: f32) -> f32 {
+pub fn cos<R: Real>(x: R) -> R {
     wave(x, COS)
 }
 
@@ -214,46 +221,49 @@ pub fn cos(x: f32) -> f32 {
 /// the first part without error with every number of half turns below 2^16. The sine is a polynomial, fitted for the
 /// smallest error, 3e-9.
 #[inline(always)]
-fn wave(x: f32, zero: f32) -> f32 {
+fn wave<R: Real>(x: R, zero: f32) -> R {
     const TURN: [f32; 2] = [3.140_625, 9.676_536e-4];
-    let turns = (x * core::f32::consts::FRAC_1_PI - zero) + ROUND;
-    let n = (turns - ROUND) + zero;
-    let r = (x - n * TURN[0]) - n * TURN[1];
+    let c = R::of;
+    let turns = (x * c(core::f32::consts::FRAC_1_PI) - c(zero)) + c(ROUND);
+    let n = (turns - c(ROUND)) + c(zero);
+    let r = (x - n * c(TURN[0])) - n * c(TURN[1]);
+    let turns = turns.get().to_bits();
     // Above 2^22 half turns, the sum has another exponent than ROUND, and x does not determine the angle.
-    let r = if turns.to_bits() >> 23 == ROUND.to_bits() >> 23 { r } else { 0.0 * x };
+    let r = if turns >> 23 == ROUND.to_bits() >> 23 { r } else { c(0.0) * x };
     // ROUND is even: the sum's last bit is 1 if the number of half turns is odd. Then the sine falls.
-    let falls = (turns.to_bits() << 31) ^ (((zero != 0.0) as u32) << 31);
-    let r = f32::from_bits(r.to_bits() ^ falls);
+    let falls = (turns << 31) ^ (((zero != 0.0) as u32) << 31);
+    let r = c(f32::from_bits(r.get().to_bits() ^ falls));
     let square = r * r;
-    let p = 2.590_488_5e-6 * square - 1.980_089_7e-4;
-    let p = p * square + 8.332_9e-3;
-    let p = p * square - 0.166_666_48;
+    let p = c(2.590_488_5e-6) * square - c(1.980_089_7e-4);
+    let p = p * square + c(8.332_9e-3);
+    let p = p * square - c(0.166_666_48);
     p * square * r + r
 }
 
 /// Computes `ln(1 + exp(x)) = max(x, 0) + ln(1 + e)` with `e = exp(-|x|) = n / d`; of that, `ln(1 + e) = 2 artanh(s)`
 /// with `s = e / (2 + e)` at most 1/3, by a polynomial that was fitted for the smallest error, 1.4e-9.
 #[inline(always)]
-pub fn softplus(x: f32) -> f32 {
-    let half = 0.5 * x;
-    let magnitude = half.abs();
-    let (n, d) = exp2(magnitude * (-2.0 * EXP), QUARTER);
+pub fn softplus<R: Real>(x: R) -> R {
+    let c = R::of;
+    let half = c(0.5) * x;
+    let magnitude = c(half.get().abs());
+    let (n, d) = (magnitude * c(-2.0 * EXP)).power(QUARTER);
     // 2 s, and so 2^-2k for k powers of s in the polynomial.
-    let t = n / (0.5 * n + d);
+    let t = n / (c(0.5) * n + d);
     let square = t * t;
-    let p = 0.288_700_2 / 512.0 * square + 0.277_875_78 / 128.0;
-    let p = p * square + 0.400_393_4 / 32.0;
-    let p = p * square + 0.666_658_7 / 8.0;
+    let p = c(0.288_700_2 / 512.0) * square + c(0.277_875_78 / 128.0);
+    let p = p * square + c(0.400_393_4 / 32.0);
+    let p = p * square + c(0.666_658_7 / 8.0);
     // Half and its magnitude are max(x, 0) without a comparison.
     (half + magnitude) + (p * square * t + t)
 }
 
 /// Computes `x * tanh(softplus(x))`, which is `x w / (w + 2)` with `w = e (e + 2)` and `e = exp(x) = n / d`.
 #[inline(always)]
-pub fn mish(x: f32) -> f32 {
+pub fn mish<R: Real>(x: R) -> R {
     let (n, d) = exp_fraction(x);
-    let w = n * (n + 2.0 * d);
-    x * (w / (w + 2.0 * (d * d)))
+    let w = n * (n + R::of(2.0) * d);
+    x * (w / (w + R::of(2.0) * (d * d)))
 }
 
 /// Computes `max(x, 0)`; a number that is not finite stays unchanged, so that an overflow stays visible. It compares
@@ -267,28 +277,27 @@ pub fn relu(x: f32) -> f32 {
 /// Computes `x` if positive, otherwise `exp(x) - 1`
 #[inline(always)]
 #[cfg(any(test, feature = "writer"))]
-pub fn elu(x: f32) -> f32 {
+pub fn elu<R: Real>(x: R) -> R {
     ELU.of(x)
 }
 
 /// Computes `1 / (1 + exp(-x))`
 #[inline(always)]
-pub fn sigmoid(x: f32) -> f32 {
-    let (n, d) = exp_fraction(x);
-    n / (n + d)
+pub fn sigmoid<R: Real>(x: R) -> R {
+    x.sigmoid()
 }
 
 /// Computes `(e - 1) / (e + 1)` with `e = exp(2 x)`
 #[inline(always)]
 #[cfg(any(test, feature = "writer"))]
-pub fn tanh(x: f32) -> f32 {
+pub fn tanh<R: Real>(x: R) -> R {
     let (n, d) = tanh_fraction(x);
     n / d
 }
 
 /// Computes `x * sigmoid(x)`
 #[inline(always)]
-pub fn silu(x: f32) -> f32 {
+pub fn silu<R: Real>(x: R) -> R {
     x * sigmoid(x)
 }
 
@@ -296,21 +305,22 @@ pub fn silu(x: f32) -> f32 {
 /// fitted for the smallest error of `a * tail / max(1, a)`, 5e-8. From 5.5 on, `a * tail` is below 1.1e-7 and keeps its
 /// value at 5.5. The code takes half of `a`, whose double is in `p^8`.
 #[inline(always)]
-pub fn gelu(x: f32) -> f32 {
+pub fn gelu<R: Real>(x: R) -> R {
     const END: f32 = 5.5 / 2.0;
-    let half = 0.5 * x;
-    let a = half.abs();
+    let c = R::of;
+    let half = c(0.5) * x;
+    let magnitude = c(half.get().abs());
+    let a = if magnitude.is_above(END) { c(END) } else { magnitude };
     // max(x, 0) without a comparison.
-    let positive = half + a;
-    let a = if a > END { END } else { a };
-    let p = 4.969_945e-4;
-    let p = p * a - 2.747_417_2e-3;
-    let p = p * a - 8.232_198e-4;
-    let p = p * a + 2.781_584_9e-2;
-    let p = p * a - 6.546_224e-3;
-    let p = p * a - 0.139_111_97;
-    let p = p * a - 0.199_487_34;
-    let p = p * a + 1.000_000_6;
+    let positive = half + magnitude;
+    let p = c(4.969_945e-4);
+    let p = p * a - c(2.747_417_2e-3);
+    let p = p * a - c(8.232_198e-4);
+    let p = p * a + c(2.781_584_9e-2);
+    let p = p * a - c(6.546_224e-3);
+    let p = p * a - c(0.139_111_97);
+    let p = p * a - c(0.199_487_34);
+    let p = p * a + c(1.000_000_6);
     let p = p * p;
     let p = p * p;
     positive - p * p * a
@@ -318,11 +328,11 @@ pub fn gelu(x: f32) -> f32 {
 
 /// Computes `x * sigmoid(2 u)` with `u = sqrt(2 / pi) (x + 0.044715 x^3)`, which is `x / 2 * (1 + tanh(u))`.
 #[inline(always)]
-pub fn gelu_tanh(x: f32) -> f32 {
+pub fn gelu_tanh<R: Real>(x: R) -> R {
     // The factors of x and x^3 in 2 u log2(e).
-    let y = x * (2.302_208_2 * FIXED_ONE + 0.102_943_24 * FIXED_ONE * (x * x));
+    let y = x * (R::of(2.302_208_2 * FIXED_ONE) + R::of(0.102_943_24 * FIXED_ONE) * (x * x));
     // The conversion to an integer limits it to -32 ..= 32: the cube of a large x is not finite.
-    let (n, d) = exp2(y as i32 as f32, FIXED_ONE);
+    let (n, d) = y.truncated().power(FIXED_ONE);
     x * (n / (n + d))
 }
 

@@ -19,6 +19,9 @@
 pub(crate) mod exp2;
 mod functions;
 mod limits;
+pub(crate) mod real;
+#[cfg(any(test, actq_soft))]
+mod soft;
 
 pub use functions::Function;
 #[cfg(any(feature = "writer", not(actq_fpu)))]
@@ -27,3 +30,4 @@ pub use functions::sigmoid;
 pub use functions::{cos, elu, exp, gelu, gelu_tanh, mish, relu, silu, sin, softplus, tanh};
 pub(crate) use limits::zero_or_nan;
 pub use limits::{ORIENTATION, clamp};
+pub(crate) use real::{Native, Real};

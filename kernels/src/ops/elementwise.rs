@@ -1,6 +1,7 @@
 //! Operations on the elements of vectors.
 
 use crate::arch;
+use crate::math::{Native, Real};
 
 /// Computes `y = clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`, up to the shortest length; an infinite clip does
 /// nothing. `mean` and `scale` hold f32 bits. An x that is not finite gives NaN.
@@ -11,13 +12,13 @@ pub fn normalize(x: &[f32], mean: &[u32], scale: &[u32], pre_clip: f32, clip: f3
 /// Computes `y += x`, up to the shorter length.
 #[inline(never)]
 pub fn add(x: &[f32], y: &mut [f32]) {
-    in_pairs(x, y, |y, x| y + x);
+    in_pairs(x, y, |y, x| (Native::of(y) + Native::of(x)).get());
 }
 
 /// Computes `y *= x`, up to the shorter length.
 #[inline(never)]
 pub fn mul(x: &[f32], y: &mut [f32]) {
-    in_pairs(x, y, |y, x| y * x);
+    in_pairs(x, y, |y, x| (Native::of(y) * Native::of(x)).get());
 }
 
 #[inline(always)]

@@ -18,6 +18,7 @@ use crate::image::header::BLOCK_WORDS;
 use crate::image::{Matrix, RowBlock, row_block};
 use crate::layout::half::bf16;
 use crate::layout::{QUAD, STRIP};
+use crate::math::{Native, Real};
 use crate::meter::{Meter, OutputStart, RUN, Work};
 use crate::x::{Plan, Prepared, Scale};
 
@@ -136,7 +137,8 @@ impl RowBlock<'_> {
         let steps = bytemuck::must_cast_slice::<u32, u8>(self.steps).get(first..)?;
         for ((sum, scale), step) in sums.iter().zip(scales).zip(steps) {
             *output += usize::from(*step);
-            *y.get_mut(*output)? += *sum as f32 * (bf16(u16::from_le(*scale)) * x_scale);
+            let scale = bf16(u16::from_le(*scale));
+            Native::add_scaled(y.get_mut(*output)?, *sum, scale, x_scale);
         }
         Some(())
     }
@@ -216,7 +218,8 @@ impl Matrix<'_> {
         let bias = self.bias.get(outputs.clone()).unwrap_or(&[]);
         let Some(y) = y.get_mut(outputs) else { return };
         if accumulate {
-            y.iter_mut().zip(bias).for_each(|(y, bias)| *y += f32::from_bits(u32::from_le(*bias)));
+            let bias = bias.iter().map(|bits| Native::of(f32::from_bits(u32::from_le(*bits))));
+            y.iter_mut().zip(bias).for_each(|(y, bias)| *y = (Native::of(*y) + bias).get());
         } else if bias.is_empty() {
             y.fill(0.0);
         } else {

@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use crate::arch::{sqrt, standardize, sum, sum_squares};
 use crate::cursor::Moments;
-use crate::math::zero_or_nan;
+use crate::math::{Native, Real, zero_or_nan};
 
 /// Computes in place `(x - mean) / sqrt(variance + eps) * weight + bias`, with mean and biased variance over the vector
 /// (torch's LayerNorm). Sums run in order from the first element. It does nothing if there are too few weights or
@@ -46,7 +46,8 @@ pub(crate) fn rms_norm_units(units: Range<usize>, moments: &mut Moments, x: &mut
     let inverse = inverse_deviation(moments, x, squared, 0.0, eps);
     let Some(weight) = weight.get(normed.clone()) else { return };
     for (x, &weight) in x.get_mut(normed).unwrap_or_default().iter_mut().zip(weight) {
-        *x = *x * inverse * f32::from_bits(u32::from_le(weight));
+        let weight = Native::of(f32::from_bits(u32::from_le(weight)));
+        *x = (Native::of(*x) * Native::of(inverse) * weight).get();
     }
 }
 

@@ -13,8 +13,9 @@ mod firmware {
 
     use actq_firmware_bench::functions::{LEN, each};
     use actq_firmware_support::host;
+    use actq_firmware_support::machine::entry;
 
-    #[cortex_m_rt::entry]
+    #[entry]
     fn main() -> ! {
         host::exit(run().is_some())
     }

@@ -1,4 +1,4 @@
-//! The functions on the Cortex-M4's FPU: the host's bits, and their cost.
+//! The functions on the Cortex-M4's FPU and on cores without one: the host's bits, and their cost.
 
 use actq::methods::Activations;
 use actq::policy::Policy;
@@ -60,6 +60,52 @@ fn every_function_keeps_its_bits_and_instruction_limit() -> Result<()> {
             instructions > 1.0 && instructions <= limit(name) as f64,
             "{name}: {instructions} instructions an element"
         );
+    }
+    Ok(())
+}
+
+/// Instructions per element without an FPU, at most: on a Cortex-M3, in Armv6-M code and on RV32IMAC.
+const WITHOUT_FPU: [(&str, [u64; 3]); 19] = [
+    ("relu", [6, 6, 7]),
+    ("elu", [164, 318, 162]),
+    ("silu", [200, 402, 203]),
+    ("gelu", [966, 1872, 1147]),
+    ("gelu_tanh", [495, 965, 566]),
+    ("tanh", [176, 334, 174]),
+    ("sigmoid", [166, 315, 156]),
+    ("exp", [788, 1442, 934]),
+    ("sin", [868, 1596, 1021]),
+    ("cos", [952, 1776, 1154]),
+    ("softplus", [863, 1657, 1000]),
+    ("mish", [508, 1036, 604]),
+    ("layernorm", [406, 737, 498]),
+    ("rmsnorm", [214, 421, 250]),
+    ("add", [56, 83, 64]),
+    ("mul", [46, 103, 55]),
+    ("normalize", [171, 279, 178]),
+    ("lstm", [968, 1889, 1037]),
+    ("gru", [1074, 2014, 1239]),
+];
+
+/// By integers, the functions have the bits of the FPU's.
+#[test]
+fn functions_without_fpu_keep_bits_and_instruction_limit() -> Result<()> {
+    for (core, target) in [Target::NoDsp, Target::V6m, Target::Riscv].into_iter().enumerate() {
+        let elf = firmware::binary("functions", target)?;
+        let (text, regions) = Counter::build()?.run(target, &elf, None, &[])?;
+        let expected = expected();
+        ensure!(text.lines().count() == expected.len() && regions.len() == expected.len(), "{target:?}: {text}");
+        for ((line, region), (name, hash)) in text.lines().zip(regions).zip(expected) {
+            assert_eq!(line, format!("{name} {LEN} {hash:08x}"), "{target:?}");
+            let instructions = region.instructions as f64 / LEN as f64;
+            println!("{target:?} {name:29} {instructions:7.2} instructions");
+            if let Some((_, limits)) = WITHOUT_FPU.iter().find(|(limited, _)| *limited == name) {
+                assert!(
+                    instructions <= limits[core] as f64,
+                    "{target:?} {name}: {instructions} instructions an element"
+                );
+            }
+        }
     }
     Ok(())
 }

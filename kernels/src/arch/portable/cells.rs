@@ -3,15 +3,7 @@
 use core::ops::Range;
 
 use crate::math::exp2::{exp_fraction, tanh_fraction};
-use crate::math::sigmoid;
-
-/// Computes `sigmoid(gate) * tanh(x)` with one division.
-#[inline(always)]
-fn gated(gate: f32, x: f32) -> f32 {
-    let (on, off) = exp_fraction(gate);
-    let (n, d) = tanh_fraction(x);
-    (on * n) / ((on + off) * d)
-}
+use crate::math::{Native, Real, sigmoid};
 
 /// Computes some elements of an LSTM cell (`ops::cells`). It does nothing if a length does not fit.
 #[inline(never)]
@@ -27,8 +19,10 @@ fn lstm(elements: Range<usize>, gates: &[f32], c: &mut [f32], h: &mut [f32]) -> 
     let rows = of(i)?.iter().zip(of(f)?).zip(of(g)?).zip(of(o)?);
     let (c, h) = (c.get_mut(elements.clone())?, h.get_mut(elements.clone())?);
     for ((c, h), (((i, f), g), o)) in c.iter_mut().zip(h).zip(rows) {
-        *c = sigmoid(*f) * *c + gated(*i, *g);
-        *h = gated(*o, *c);
+        let [i, f, g, o] = [i, f, g, o].map(|gate| Native::of(*gate));
+        let new = sigmoid(f) * Native::of(*c) + i.gate(g);
+        *c = new.get();
+        *h = o.gate(new).get();
     }
     Some(())
 }
@@ -49,11 +43,12 @@ fn gru(elements: Range<usize>, a: &[f32], b: &[f32], h: &mut [f32]) -> Option<()
     let hidden = of(br)?.iter().zip(of(bz)?).zip(of(bn)?);
     let h = h.get_mut(elements.clone())?;
     for (h, (((ar, az), an), ((br, bz), bn))) in h.iter_mut().zip(input.zip(hidden)) {
-        let r = sigmoid(*ar + *br);
+        let [ar, az, an, br, bz, bn] = [ar, az, an, br, bz, bn].map(|gate| Native::of(*gate));
+        let r = sigmoid(ar + br);
         // z = keep / (keep + renew), 1 - z = renew / (keep + renew).
-        let (keep, renew) = exp_fraction(*az + *bz);
-        let (n, d) = tanh_fraction(*an + r * *bn);
-        *h = (renew * n + keep * *h * d) / ((keep + renew) * d);
+        let (keep, renew) = exp_fraction(az + bz);
+        let (n, d) = tanh_fraction(an + r * bn);
+        *h = ((renew * n + keep * Native::of(*h) * d) / ((keep + renew) * d)).get();
     }
     Some(())
 }

@@ -1,8 +1,7 @@
 //! Conversion of vectors between f32 and integers.
 
 use crate::layout::half::{bf16, half_word};
-#[cfg(not(actq_fpu))]
-use crate::round::ROUND;
+use crate::math::{Native, Real};
 #[cfg(not(actq_fpu))]
 use crate::x::{Plan, lay_out};
 
@@ -13,7 +12,6 @@ pub fn magnitude(x: &[f32]) -> u32 {
 }
 
 /// Copies `from` to `to`, up to the shorter length.
-#[cfg(any(feature = "writer", not(actq_armv7em)))]
 pub fn copy(from: &[u32], to: &mut [u32]) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
 }
@@ -22,17 +20,30 @@ pub fn copy(from: &[u32], to: &mut [u32]) {
 /// [`Plan::room`].
 #[cfg(not(actq_fpu))]
 pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
-    lay_out(x, plan, out.get_mut(..plan.room(x.len()))?, |value: f32| (value * inverse + ROUND).to_bits());
+    lay_out(x, plan, out.get_mut(..plan.room(x.len()))?, |value: f32| Native::of(value).rounded(inverse));
     Some(())
 }
 
 /// Computes `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word. If `sums` or `start` is
 /// `None`, `y` holds them, the sums as their bits.
 pub fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
-    for (i, y) in y.iter_mut().enumerate() {
-        let start = start.and_then(|s| s.get(i)).map_or(*y, |bits| f32::from_bits(u32::from_le(*bits)));
-        let sum = sums.and_then(|s| s.get(i)).map_or(y.to_bits() as i32, |sum| *sum);
-        *y = start + sum as f32 * (bf16(half_word(scales, i)) * x_scale);
+    let (others, others_are_sums) = match (sums, start) {
+        (Some(sums), None) => (bytemuck::must_cast_slice(sums), true),
+        (Some(sums), Some(start)) => {
+            copy(bytemuck::must_cast_slice(sums), bytemuck::must_cast_slice_mut(y));
+            (start, false)
+        }
+        (None, start) => (start.unwrap_or(&[]), false),
+    };
+    for (i, (y, other)) in y.iter_mut().zip(others).enumerate() {
+        let sum = if others_are_sums {
+            *other as i32
+        } else {
+            let sum = y.to_bits() as i32;
+            *y = f32::from_bits(u32::from_le(*other));
+            sum
+        };
+        Native::add_scaled(y, sum, bf16(half_word(scales, i)), x_scale);
     }
 }
 
