@@ -60,7 +60,9 @@ def test_rounds_learn_from_their_rollouts(mlp):
     first, second = tuned
     assert first.image == second.image, "the same seed gives the same image"
     assert first.image == first.rounds[-1].image and len(first.rounds) == 3
-    assert [row.frames for row in first.rounds] == [300, 600, 900]
+    frames = [row.frames for row in first.rounds]
+    # About a tenth of the f32 policy's frames is held out for the error.
+    assert 240 <= frames[0] < 300 and [n - frames[0] for n in frames] == [0, 300, 600]
     assert first.image.bits_per_weight <= 2.5
     assert all(row.own_nmse < 1 and len(row.rollout.episodes) == 9 for row in first.rounds)
     assert "own path" in str(first)
@@ -85,7 +87,7 @@ def test_recordings_and_functions_of_the_caller(mlp, observations):
         steps=5,
         progress=False,
     )
-    assert tuned.rounds[0].frames == 500 and tuned.rounds[1].frames >= 600
+    assert tuned.rounds[0].frames == 450 and tuned.rounds[1].frames >= 550
     assert told and all(episode.terminated and "is_success" in episode.info for episode in told)
     assert tuned.rounds[0].rollout.success == 1.0
 

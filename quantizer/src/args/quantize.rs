@@ -23,7 +23,7 @@ pub struct QuantizeArgs {
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) calib: Vec<PathBuf>,
     /// The held-out recording to measure on [default: heldout.* in POLICY_DIR, else parts of the calibration recording
-    /// in turn, which takes about as long again as making the image]
+    /// in turn, which takes 1 to 2.5 times as long as making the image]
     #[arg(long, value_name = "FILE")]
     pub(crate) heldout: Option<PathBuf>,
     #[command(flatten)]

@@ -17,7 +17,7 @@ use actq_kernels::Width;
 use anyhow::{Result, bail};
 
 use crate::args::{ActivationArg, QuantizeArgs};
-use crate::importers::{learned as learned_from, load, policy_files};
+use crate::importers::{self, learned as learned_from, load, policy_files};
 use crate::outputs::files::refuse_foreign;
 use crate::report::learned::learned;
 use crate::report::{notes, quantized, time};
@@ -47,7 +47,10 @@ pub fn run(
     check_budget(&source, &options)?;
     let (calib, shares) = learned_from(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
     let shares = shares.unwrap_or_default();
-    let heldout = Recording::Heldout.load(Some(&args.policy_dir), args.heldout.as_deref(), Sizes::of(&source))?;
+    let heldout = match &args.heldout {
+        Some(file) => Some(importers::recorded(&source, file)?),
+        None => Recording::Heldout.load(Some(&args.policy_dir), None, Sizes::of(&source))?,
+    };
     let mut recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
     note(recorded::use_policy(&mut recordings, &source.graph).iter().map(ToString::to_string));
@@ -117,8 +120,8 @@ fn report(
     let (parameters, bytes) = (source.parameters, found.image.len());
     let f32_bytes = 4 * parameters;
     print(&format!(
-        "{search}{}{learned}\n{}: {bytes} bytes, {:.3} bits per weight: also {}. The policy's {parameters} parameters take {f32_bytes} bytes in f32 ({:.1}x) and {} in \
-         bf16 ({:.1}x).\n{time}Took {:.1} s.\n",
+        "{search}{}{learned}\n{}: {bytes} bytes, {:.3} bits per weight: also {}. The policy's {parameters} parameters take \
+         {f32_bytes} bytes in f32 ({:.1}x) and {} in bf16 ({:.1}x).\n{time}Took {:.1} s.\n",
         quantized::matrices(found),
         args.out.display(),
         file_bits_per_weight(&image),

@@ -9,6 +9,8 @@ use crate::graph::{Evaluator, Graph};
 
 /// Frames to hold out in all parts together: fewer successive frames are a few situations, whose error is chance.
 const HELD_OUT_FRAMES: usize = 400;
+/// Least parts: images that learned from other frames differ by chance.
+const LEAST_PARTS: usize = 2;
 /// Frames of a recording below which a part is a fifth, else a tenth.
 const SHORT: usize = 1000;
 
@@ -22,13 +24,13 @@ pub struct Part {
 }
 
 impl Dataset {
-    /// Returns the parts to hold out in turn: one tenth of a long recording, and up to five fifths of a short one. A part
+    /// Returns the parts to hold out in turn: two tenths of a long recording, and up to five fifths of a short one. A part
     /// is whole episodes, or successive frames if the episodes are few. Each leaves at least `least` frames to learn
     /// from; there are none if that cannot be.
     pub fn parts(&self, graph: &Graph, least: usize) -> Vec<Part> {
         let frames = self.frames();
         let divisor = if frames < SHORT && frames - frames / 5 >= least { 5 } else { 10 };
-        let count = (HELD_OUT_FRAMES * divisor).div_ceil(frames.max(1)).clamp(1, divisor);
+        let count = (HELD_OUT_FRAMES * divisor).div_ceil(frames.max(1)).clamp(LEAST_PARTS, divisor);
         let parts = (0..count).map(|i| self.part(graph, (2 * i + 1) * divisor / (2 * count), divisor));
         parts.filter(|part| part.learned.frames() >= least && part.held_out.frames() > 0).collect()
     }
@@ -99,7 +101,7 @@ mod tests {
     fn parts_hold_out_every_frame_or_enough() {
         let graph = mlp();
         for (episodes, steps, count, held_out) in
-            [(1, 300, 5, 300), (30, 10, 5, 300), (1, 1000, 4, 400), (2, 1000, 2, 400), (20, 200, 1, 400)]
+            [(1, 300, 5, 300), (30, 10, 5, 300), (1, 1000, 4, 400), (2, 1000, 2, 400), (20, 200, 2, 800)]
         {
             let whole = dataset(&graph, episodes, steps);
             let parts = whole.parts(&graph, 200);

@@ -97,7 +97,7 @@ def quantize(
     max_nmse: largest error; searches the fewest bits that keep it. At most one of these budgets may be given, or flash and
         ms, which are then both kept.
     heldout: recordings that nothing learns from; errors are measured on them. Without them, parts of `recordings` are held
-        out in turn for the error, which takes about as long again. The log `actq` has the errors.
+        out in turn for the error, which takes 1 to 2.5 times as long as the image. The log `actq` has the errors.
     method: "distill" (the default with recordings), "gptq" or "rtn" (the default without).
     group: columns that share a scale: 0, 32, 64 or 128.
     activations: bits of the activations: 8 or 16.
