@@ -216,7 +216,8 @@ impl Draw {
         };
         let mut is_fed = true;
         match self.below(3) {
-            0 => clock.advance = self.number(),
+            // Slow, as 8 bits of a weight are few for phases that grow.
+            0 => clock.advance = self.number() / 40.0,
             1 => {
                 // Phases of n steps, half a step beside the limits, where rounding decides.
                 let (n, low, span) = (3 + self.below(20), self.number(), 0.5 + self.number().abs());
