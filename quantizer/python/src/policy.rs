@@ -125,17 +125,18 @@ impl Policy {
 
 /// Reads a policy folder, an ONNX file, or a deploy bundle.
 #[pyfunction]
-#[pyo3(signature = (path, *, output, states, accept_profile, answers))]
+#[pyo3(signature = (path, *, output, states, observe, accept_profile, answers))]
 pub(crate) fn import_path(
     py: Python<'_>,
     #[pyo3(from_py_with = given)] path: PathBuf,
     #[pyo3(from_py_with = given)] output: Option<String>,
     #[pyo3(from_py_with = given)] states: Vec<(String, String)>,
+    #[pyo3(from_py_with = given)] observe: Vec<String>,
     #[pyo3(from_py_with = given)] accept_profile: bool,
     #[pyo3(from_py_with = given)] answers: String,
 ) -> PyResult<Policy> {
     py.detach(|| {
-        let choice = Choice { output, states, ..Choice::default() };
+        let choice = Choice { output, states, observed: observe, ..Choice::default() };
         let is_answered = accept_profile || !answers.is_empty();
         let refuse_answers = || error!("{}: only a deploy bundle takes accept_profile and answers", path.display());
         if Onnx.accepts(&path) {
@@ -147,8 +148,8 @@ pub(crate) fn import_path(
                 actq::policy::Policy::of_files(&path, [&path, &path], &imported.json, &imported.weights).or_raise()?;
             return Ok(Policy::new(policy));
         }
-        if choice.output.is_some() || !choice.states.is_empty() {
-            return Err(error!("{}: only an ONNX file takes output and states", path.display()));
+        if choice.output.is_some() || !choice.states.is_empty() || !choice.observed.is_empty() {
+            return Err(error!("{}: only an ONNX file takes output, states and observe", path.display()));
         }
         let is_policy = DeployFolder.accepts(&path) || path.join(actq::import::FILES[0]).is_file();
         let is_bundle = path.is_dir() || path.extension().is_some_and(|ending| ending == "kinfer");
@@ -188,16 +189,17 @@ const FRAMES: usize = 32;
 /// Reads the bytes of an ONNX file. Returns the policy, and how to compare its source with it: observed inputs, pairs of
 /// states, the output, drawn observations [block, frame, value], and the policy's actions on them.
 #[pyfunction]
-#[pyo3(signature = (bytes, *, name, output, states))]
+#[pyo3(signature = (bytes, *, name, output, states, observe))]
 pub(crate) fn import_onnx<'py>(
     py: Python<'py>,
     bytes: Vec<u8>,
     #[pyo3(from_py_with = given)] name: String,
     #[pyo3(from_py_with = given)] output: Option<String>,
     #[pyo3(from_py_with = given)] states: Vec<(String, String)>,
+    #[pyo3(from_py_with = given)] observe: Vec<String>,
 ) -> PyResult<(Policy, Bound<'py, PyDict>)> {
     let (imported, policy, probes, actions) = py.detach(|| {
-        let choice = Choice { output, states, ..Choice::default() };
+        let choice = Choice { output, states, observed: observe, ..Choice::default() };
         let imported = import_bytes(bytes, Path::new(""), &name, &choice).map_err(|error| error.context(name.clone()));
         let imported = imported.map_err(raise)?;
         let names = [Path::new(&name); 2];

@@ -97,6 +97,25 @@ def test_a_recurrent_module_keeps_its_state(observations):
         assert np.abs(head(row) - expected.numpy()[0]).max() < 0.02
 
 
+def test_an_observed_input_is_no_state():
+    class Predicts(nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.next, self.out = nn.Linear(12, 12), nn.Linear(12, 4)
+
+        def forward(self, state, gain):
+            return self.out(state) * gain, self.next(state)
+
+    example = (torch.zeros(1, 12), torch.zeros(1, 4))
+    names = {"input_names": ["state", "gain"], "output_names": ["action", "next_state"]}
+    with pytest.raises(actq.Error, match="--observe"):
+        actq.import_policy(Predicts(), example, **names)
+    policy = actq.import_policy(Predicts(), example, observe=["state"], **names)
+    assert (policy.obs_len, policy.state_len) == (16, 0)
+    with pytest.raises(actq.Error, match="observe is the text 'state'; pass a list of inputs"):
+        actq.import_policy(Predicts(), example, observe="state", **names)
+
+
 def test_what_cannot_be_imported_is_named():
     class Sorted(nn.Module):
         def forward(self, obs):

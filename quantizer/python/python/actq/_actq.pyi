@@ -3,7 +3,7 @@
 import builtins
 import os
 import pathlib
-from typing import Any, Callable, Dict, List, Optional, Tuple, TypedDict, Union
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, TypedDict, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -242,9 +242,9 @@ class Link:
     def __exit__(self, *exception: object) -> None: ...
 
 def import_path(
-    path: _Path, *, output: Optional[str], states: List[Tuple[str, str]], accept_profile: bool, answers: str
+    path: _Path, *, output: Optional[str], states: List[Tuple[str, str]], observe: Sequence[str], accept_profile: bool, answers: str
 ) -> Policy: ...
-def import_onnx(bytes: bytes, *, name: str, output: Optional[str], states: List[Tuple[str, str]]) -> Tuple[Policy, Dict[str, Any]]: ...
+def import_onnx(bytes: bytes, *, name: str, output: Optional[str], states: List[Tuple[str, str]], observe: Sequence[str]) -> Tuple[Policy, Dict[str, Any]]: ...
 def quantize(
     policy: Policy, recordings: Any, heldout: Any, request: Dict[str, Any], progress: _Report
 ) -> Tuple[Image, List[str], List[str]]: ...

@@ -27,6 +27,7 @@ def import_policy(
     *,
     output: Optional[str] = None,
     states: Optional[Mapping[str, str]] = None,
+    observe: Sequence[str] = (),
     input_names: Optional[Sequence[str]] = None,
     output_names: Optional[Sequence[str]] = None,
     name: Optional[str] = None,
@@ -42,6 +43,7 @@ def import_policy(
     output: of ONNX or a module, the output that is the action. The default is the one named "action", or the only
         candidate.
     states: of ONNX or a module, the inputs that hold recurrent state, each with the output of its next value.
+    observe: of ONNX or a module, the inputs that are observed in each step, although they look like memory.
     input_names, output_names: of a module, names of its inputs and outputs, for `output` and `states`. The default are
         the keys of a mapping or named tuple, else input_0 .. and output_0 .. .
     name: of a module, the policy's name; the default is its class.
@@ -54,6 +56,8 @@ def import_policy(
     """
     if states is not None and not isinstance(states, Mapping):
         raise _actq.Error(f"states is of type {type(states).__name__}; pass a mapping of inputs to outputs")
+    if isinstance(observe, str):
+        raise _actq.Error(f"observe is the text {observe!r}; pass a list of inputs")
     pairs = list((states or {}).items())
     if isinstance(source, (str, os.PathLike)):
         if not os.fspath(source):
@@ -67,7 +71,7 @@ def import_policy(
                 if value is not None:
                     raise _actq.Error(f"{path}: only a module or a TorchScript file takes {key}")
             return _actq.import_path(
-                path, output=output, states=pairs, accept_profile=accept_profile, answers=_toml(answers)
+                path, output=output, states=pairs, observe=observe, accept_profile=accept_profile, answers=_toml(answers)
             )
         if not path.is_file():
             raise _actq.Error(f"{path}: there is no such file")
@@ -90,7 +94,7 @@ def import_policy(
     if example is None:
         raise _actq.Error(f"{name}: pass an example of the module's input, as torch.zeros(1, n_obs)")
     return import_module(
-        source, example, name, output=output, states=pairs, input_names=input_names, output_names=output_names
+        source, example, name, output=output, states=pairs, observe=observe, input_names=input_names, output_names=output_names
     )  # fmt: skip
 
 

@@ -43,6 +43,7 @@ def import_module(
     *,
     output: Optional[str],
     states: Sequence[Tuple[str, str]],
+    observe: Sequence[str],
     input_names: Optional[Sequence[str]],
     output_names: Optional[Sequence[str]],
 ) -> Policy:
@@ -64,7 +65,7 @@ def import_module(
         tracer: Any = torch.jit
         branches = [warning for warning in caught if issubclass(warning.category, tracer.TracerWarning)]
         try:
-            policy, plan = _actq.import_onnx(content, name=name, output=output, states=list(states))
+            policy, plan = _actq.import_onnx(content, name=name, output=output, states=list(states), observe=observe)
         except Error as error:
             changed = source.kept_values()
             raise (Error(f"{name}: {memory(changed)}") if changed else error) from error.__cause__
