@@ -49,7 +49,7 @@ pub(crate) fn published(name: &str, answers: &str) -> Result<Option<(Plan, Deplo
 /// Requires that an image gives targets to 1e-5 of the largest.
 fn gives(deployment: &Deployment, raw: &[Vec<Vec<f64>>], targets: &[f64]) -> Result<()> {
     let bytes = deployment.four_bits()?;
-    let found = deployment.in_f32(&bytes, raw)?.concat();
+    let found = deployment.in_f32(raw)?.concat();
     let largest = targets.iter().fold(0f64, |most, x| most.max(x.abs()));
     ensure!(found.len() == targets.len() && deployment.columns.len() == deployment.policy.graph.obs_len);
     let differences = found.iter().zip(targets).map(|(found, expected)| (f64::from(*found) - expected).abs());

@@ -20,7 +20,7 @@ pub(crate) mod exp2;
 mod functions;
 mod limits;
 pub(crate) mod real;
-#[cfg(any(test, actq_soft))]
+#[cfg(any(all(test, feature = "writer"), actq_soft))]
 mod soft;
 
 pub use functions::Function;

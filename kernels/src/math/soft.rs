@@ -595,7 +595,7 @@ impl<const NARROW: bool> Real for Soft<NARROW> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "writer"))]
 mod tests {
     use super::*;
     use crate::math::exp2::{FIXED_ONE, QUARTER};

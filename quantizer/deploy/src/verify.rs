@@ -8,7 +8,7 @@ use actq::emit::raw_values;
 use actq::error::{Cause, Context as _, Error, Result, bail};
 use actq::measure::unrounded::Unrounded;
 use actq::methods::{Method, Options};
-use actq::pipeline::quantize;
+use actq::pipeline::{QuantizedPolicy, quantize};
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
 use actq_kernels::{StepError, Width};
@@ -36,6 +36,23 @@ const GROWTH: f64 = 4.0;
 fn is_no_action(error: &Error) -> bool {
     let Cause::Other(cause) = error.cause() else { return false };
     cause.downcast_ref() == Some(&StepError::Orientation)
+}
+
+/// Returns the targets of an image with all operations in f32, and the weights as they were before they were quantized.
+fn in_f32(rounded: &QuantizedPolicy, bytes: &[u8], raw: &[Raw]) -> Result<Vec<Vec<f32>>> {
+    let buffer = ImageBuffer::new(bytes);
+    let image = buffer.image(Path::new("image"))?;
+    let mut unrounded = Unrounded::with_weights(image, &rounded.policy.graph)?;
+    let limited = |(i, x): (usize, &f32)| image.limits(i).map_or(*x, |[low, high]| x.max(low).min(high));
+    let mut tick = |raw: &Raw| -> Result<Vec<f32>> {
+        let raw: Vec<f32> = raw.iter().flatten().map(|x| *x as f32).collect();
+        match unrounded.infer(&raw) {
+            Ok(targets) => Ok(targets.iter().enumerate().map(limited).collect()),
+            Err(error) if is_no_action(&error) => Ok(vec![f32::NAN; image.act_len()]),
+            Err(error) => Err(error),
+        }
+    };
+    raw.iter().map(&mut tick).collect()
 }
 
 impl Runner {
@@ -105,30 +122,23 @@ impl Deployment {
     ///
     /// If the description does not fit an image.
     pub fn four_bits(&self) -> Result<Vec<u8>> {
-        let options = Options::new(Method::Rtn, Budget::Width(Width::W4));
-        quantize(&self.policy, &Recordings::default(), &options, ())?.whole_image()
+        self.rounded()?.whole_image()
     }
 
-    /// Returns the targets of an image with all operations in f32 and the weights as they were before they were
-    /// quantized.
+    fn rounded(&self) -> Result<QuantizedPolicy> {
+        let options = Options::new(Method::Rtn, Budget::Width(Width::W4));
+        quantize(&self.policy, &Recordings::default(), &options, ())
+    }
+
+    /// Returns the targets of an image in 4 bits with all operations in f32 and the weights as they were before they
+    /// were quantized.
     ///
     /// # Errors
     ///
-    /// If the image is not of this description.
-    pub fn in_f32(&self, image: &[u8], raw: &[Raw]) -> Result<Vec<Vec<f32>>> {
-        let buffer = ImageBuffer::new(image);
-        let image = buffer.image(Path::new("image"))?;
-        let mut unrounded = Unrounded::with_weights(image, &self.policy.graph)?;
-        let limited = |(i, x): (usize, &f32)| image.limits(i).map_or(*x, |[low, high]| x.max(low).min(high));
-        let mut tick = |raw: &Raw| -> Result<Vec<f32>> {
-            let raw: Vec<f32> = raw.iter().flatten().map(|x| *x as f32).collect();
-            match unrounded.infer(&raw) {
-                Ok(targets) => Ok(targets.iter().enumerate().map(limited).collect()),
-                Err(error) if is_no_action(&error) => Ok(vec![f32::NAN; image.act_len()]),
-                Err(error) => Err(error),
-            }
-        };
-        raw.iter().map(&mut tick).collect()
+    /// If the description does not fit an image.
+    pub fn in_f32(&self, raw: &[Raw]) -> Result<Vec<Vec<f32>>> {
+        let rounded = self.rounded()?;
+        in_f32(&rounded, &rounded.whole_image()?, raw)
     }
 
     /// Draws raw inputs of some ticks: numbers from -1 to 1 in the inputs' ranges, quaternions of length 1, zeros.
@@ -144,9 +154,10 @@ impl Deployment {
     /// If they differ; the error names the tick and the target.
     pub fn verify(&self, runner: &mut Runner, raw: &[Raw]) -> Result<()> {
         // A description that fits no image in 4 bits may fit one in other bits; quantization reports why.
-        let Ok(image) = self.four_bits() else { return Ok(()) };
+        let Ok(rounded) = self.rounded() else { return Ok(()) };
+        let Ok(image) = rounded.whole_image() else { return Ok(()) };
         let raw = &raw[..raw.len().min(MOST_TICKS)];
-        let mut found = self.in_f32(&image, raw).context("compare an image with the description")?;
+        let mut found = in_f32(&rounded, &image, raw).context("compare an image with the description")?;
         // An image gives no action that is not finite.
         found.truncate(found.iter().take_while(|target| target.iter().all(|x| x.is_finite())).count());
         if let Some(Difference { tick, what, got, expected, .. }) =

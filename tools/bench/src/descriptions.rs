@@ -78,7 +78,7 @@ fn compared(folder: &Path, drawn: &Description, seed: u64) -> Result<Compared> {
     };
     let raw = deployment.draws(&plan, &mut Random::new(seed), TICKS);
     let mut runner = Runner::new(plan);
-    let in_f32 = deployment.in_f32(&deployment.four_bits()?, &raw)?;
+    let in_f32 = deployment.in_f32(&raw)?;
     if let Some(difference) = runner.difference(&raw, &in_f32, ROUNDING) {
         bail!("in f32: {difference}");
     }

@@ -452,10 +452,10 @@ mod tests {
         let mut units = vec![0.0; elements.parents.len()];
         let drawn: Vec<f32> = units.iter().map(|_| 20.0 * random.unit()).collect();
         let drawn: Vec<f32> = drawn.into_iter().map(|power| if whole { power.round() } else { power }.exp2()).collect();
-        for element in 0..units.len() {
+        for (element, to) in units.iter_mut().enumerate() {
             let root = elements.root(element);
             let unit = drawn[if by_layer { layer(root) } else { root }];
-            units[element] = if elements.fixed[root] { 1.0 } else { unit };
+            *to = if elements.fixed[root] { 1.0 } else { unit };
         }
         let mut scaled = graph.clone();
         elements.scale(&mut scaled, &units);

@@ -134,11 +134,12 @@ fn mark_inputs(graph: &Graph, n: usize, live: &mut Marks) {
         | NodeKind::Balance(_)
         | NodeKind::Add(_)
         | NodeKind::Mul(_) => {
+            let (inputs, made) = live.split_at_mut(value);
             for &input in &node.inputs {
-                for e in 0..node.len {
-                    live[input][e] |= live[value][e];
+                for (read, made) in inputs[input].iter_mut().zip(&mut made[0]) {
+                    *read |= *made;
                     // An element that stays for another reader stays here, too: selecting it would cost a copy.
-                    live[value][e] |= live[input][e] && can_narrow(graph, input);
+                    *made |= *read && can_narrow(graph, input);
                 }
             }
         }

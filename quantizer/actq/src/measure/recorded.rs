@@ -383,7 +383,8 @@ mod tests {
     #[test]
     fn causes_of_other_actions_are_named() {
         let graph = layers(&[5, 16, 3]);
-        let said = |change: &dyn Fn(&[Vec<f32>], &mut Random) -> Vec<Vec<f32>>| {
+        type Change<'a> = &'a dyn Fn(&[Vec<f32>], &mut Random) -> Vec<Vec<f32>>;
+        let said = |change: Change<'_>| {
             recorded(&graph, change).expect("they differ").causes.join(", ")
         };
         assert_eq!(said(&|rows, _| each(rows, |_, v| 0.25 * v)), "0.25 times the policy's");

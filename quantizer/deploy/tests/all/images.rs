@@ -48,7 +48,7 @@ fn both(folder: &TempDir, raw: &[[f64; 2]]) -> Result<[Vec<f64>; 2]> {
     let described = raw.iter().map(|raw| Ok(runner.step(raw)?.targets)).collect::<Result<Vec<_>>>()?;
     let described = described.into_iter().flatten().flat_map(|(_, target)| target);
     let deployment = Deployment::load(folder.path())?;
-    let image = deployment.in_f32(&deployment.four_bits()?, &raw)?.concat();
+    let image = deployment.in_f32(&raw)?.concat();
     Ok([described.collect(), image.into_iter().map(f64::from).collect()])
 }
 
@@ -154,7 +154,7 @@ value = "net.out"
 "#,
     )?;
     let deployment = Deployment::load(folder.path())?;
-    let image = deployment.in_f32(&deployment.four_bits()?, &[vec![vec![0.5, 4.0], vec![2.25, 3.0]]])?;
+    let image = deployment.in_f32(&[vec![vec![0.5, 4.0], vec![2.25, 3.0]]])?;
     ensure!(image[0][..2] == [2.25, 3.0], "{image:?}");
     Ok(())
 }

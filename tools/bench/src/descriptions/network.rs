@@ -3,10 +3,13 @@
 use actq::random::Random;
 use actq_testkit::onnx::{Node, shaped};
 
+/// Operator, inputs, outputs and attributes of a node.
+type Parts = (&'static str, Vec<String>, Vec<String>, Vec<(&'static str, usize)>);
+
 /// A file under construction.
 #[derive(Debug, Default)]
 pub(super) struct File {
-    nodes: Vec<(&'static str, Vec<String>, Vec<String>, Vec<(&'static str, usize)>)>,
+    nodes: Vec<Parts>,
     tensors: Vec<(String, Vec<usize>, Vec<f32>)>,
     inputs: Vec<(String, usize)>,
     outputs: Vec<(String, usize)>,
