@@ -292,8 +292,8 @@ uint32_t actq_abi(void);
 
 /**
  * Initializes a head of `image` in `scratch`, of at least `actq_sizes.scratch_words` words, and resets it. `scratch`
- * belongs to the head from now on. A head whose scratch memory another head has taken is no longer usable: its calls
- * return `ACTQ_SCRATCH_TAKEN`.
+ * belongs to the head from now on, and heads must not share it. A call returns `ACTQ_SCRATCH_TAKEN` if another head was
+ * initialized over the first word of this head's memory; other overlaps are not noticed.
  */
 actq_status actq_head_init(struct actq_head *head, const struct actq_image *image, uint32_t *scratch, size_t words);
 

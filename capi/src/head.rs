@@ -90,7 +90,8 @@ unsafe fn write(to: Buffer<f32>, action: &[f32]) {
 /// # Safety
 ///
 /// `head` is null, misaligned, or valid for reads and writes, and nothing else uses it meanwhile; if it was
-/// initialized, the image's bytes are as they were, and its scratch memory is still there.
+/// initialized, the image's bytes are as they were, and its scratch memory is still there: another head's memory shares
+/// none of it, or its first word.
 unsafe fn with(head: *mut ActqHead, run: impl FnOnce(&mut Running) -> Result<(), Failure>) -> ActqStatus {
     let place = head.cast::<Running>();
     status(Buffer::new(place.cast::<usize>(), 1).and_then(|found| {
@@ -109,8 +110,8 @@ unsafe fn with(head: *mut ActqHead, run: impl FnOnce(&mut Running) -> Result<(),
 }
 
 /// Initializes a head of `image` in `scratch`, of at least `actq_sizes.scratch_words` words, and resets it. `scratch`
-/// belongs to the head from now on. A head whose scratch memory another head has taken is no longer usable: its calls
-/// return `ACTQ_SCRATCH_TAKEN`.
+/// belongs to the head from now on, and heads must not share it. A call returns `ACTQ_SCRATCH_TAKEN` if another head was
+/// initialized over the first word of this head's memory; other overlaps are not noticed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_head_init(
     head: *mut ActqHead,

@@ -36,10 +36,11 @@ fn limit_clipped(description: &mut Description, facts: &mut Facts) {
         let target = &description.targets[i];
         let value = description.values.iter().find(|value| value.name == target.value);
         let Some(Op::Clip(limits)) = value.and_then(|value| value.ops.last()) else { continue };
+        let of = |list: &Vec<f64>| if let [one] = list[..] { Numbers::All(one) } else { Numbers::Each(list.clone()) };
         let numbers = |limit: &Operand| match limit {
             Operand::Number(number) => Some(Numbers::All(*number)),
-            Operand::List(list) => Some(Numbers::Each(list.clone())),
-            Operand::Name(name) => description.constants.get(name).map(|list| Numbers::Each(list.clone())),
+            Operand::List(list) => Some(of(list)),
+            Operand::Name(name) => description.constants.get(name).map(of),
         };
         if let ([Some(low), Some(high)], None) = (limits.each_ref().map(numbers), &target.limits) {
             facts.note("limits", facts.source(&target.value));

@@ -158,8 +158,9 @@ impl Deployment {
         let Ok(image) = rounded.whole_image() else { return Ok(()) };
         let raw = &raw[..raw.len().min(MOST_TICKS)];
         let mut found = in_f32(&rounded, &image, raw).context("compare an image with the description")?;
-        // An image gives no action that is not finite.
-        found.truncate(found.iter().take_while(|target| target.iter().all(|x| x.is_finite())).count());
+        // An image gives no action that is not finite, and starts anew after it.
+        let end = found.iter().position(|target| target.iter().any(|x| !x.is_finite())).map_or(found.len(), |t| t + 1);
+        found.truncate(end);
         if let Some(Difference { tick, what, got, expected, .. }) =
             runner.difference(&raw[..found.len()], &found, ROUNDING)
         {

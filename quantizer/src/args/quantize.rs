@@ -133,7 +133,8 @@ pub(crate) struct TuneArgs {
 pub(crate) struct LearnArgs {
     #[command(flatten)]
     pub(crate) distill: DistillArgs,
-    /// The most minutes of distillation, instead of the default steps; the image then depends on the machine's speed
+    /// The most minutes of distillation, instead of the default steps; half of them measure the error if no recording is
+    /// held out. The image then depends on the machine's speed
     #[arg(long, value_name = "X", value_parser = minutes, conflicts_with = "effort")]
     pub(crate) minutes: Option<f64>,
 }

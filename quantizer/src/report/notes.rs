@@ -112,11 +112,13 @@ pub fn of_check(check: &Check, options: &Options) -> Vec<String> {
 /// Returns a note if no frames could be held out to measure the error.
 fn not_held_out(check: &Check, options: &Options) -> Option<String> {
     let calib = check.calib.as_ref().filter(|_| check.learned && check.heldout.is_none())?;
+    let enough = HELD_OUT_FROM * options.method.least_frames() / 4;
+    let why = match calib.recorded < enough {
+        true => format!("{} are too few to hold some out; record {enough} or more", count(calib.recorded, "frame")),
+        false => "no part of them could be held out within the budget; pass another recording by --heldout".to_owned(),
+    };
     Some(format!(
-        "the error is that of the frames that the image learned from: {} are too few to hold some out, and the error on others \
-         may be much larger; record {} or more",
-        count(calib.recorded, "frame"),
-        HELD_OUT_FROM * options.method.least_frames() / 4
+        "the error is that of the frames that the image learned from, and on others it may be much larger: {why}"
     ))
 }
 

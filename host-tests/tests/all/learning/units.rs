@@ -129,12 +129,12 @@ fn recorded(seed: u64, units: &Units, graph: &Graph) -> Dataset {
     dataset
 }
 
-/// The held-out error at 3 bits per weight, everything counted.
+/// The held-out error at 3 bits per weight, with scales and padding.
 fn error(build: Build, units: &Units, steps: usize) -> Result<f64> {
     error_of(build(units)?, units, 3.0, steps)
 }
 
-/// The held-out error of a network at a budget of bits per weight, everything counted.
+/// The held-out error of a network at a budget of bits per weight, with scales and padding.
 fn error_of(graph: Graph, units: &Units, bits: f64, steps: usize) -> Result<f64> {
     let policy = Policy::of("units", graph);
     let recordings = Recordings { calib: Some(recorded(1, units, &policy.graph)), heldout: None };

@@ -8,8 +8,8 @@
 //! is the mean square of the element, and `a_c` the sum of the squared weights of its column, each row in units of its
 //! own output: `a_c = sum_r w_rc^2 / e_r` with `e_r = sum_c w_rc^2 h_c`. So `d` cancels whatever units the network had.
 //! Factors are not rounded to whole powers of two, which would leave up to a sixth more error, and another one for every
-//! unit: `2^u` and `2^-u` have the mean product 1.17 for u between -1/2 and 1/2. The function stays the same but for f32's
-//! last digits.
+//! unit: the means of `2^2u` and `2^-2u` for u between -1/2 and 1/2 have the product 1.17. The function stays the same
+//! but for f32's last digits.
 
 use std::borrow::Cow;
 use std::ops::Range;

@@ -29,8 +29,8 @@ impl Dataset {
     /// from; there are none if that cannot be.
     pub fn parts(&self, graph: &Graph, least: usize) -> Vec<Part> {
         let frames = self.frames();
-        let divisor = if frames < SHORT && frames - frames / 5 >= least { 5 } else { 10 };
-        let count = (HELD_OUT_FRAMES * divisor).div_ceil(frames.max(1)).clamp(LEAST_PARTS, divisor);
+        let divisor = if frames < SHORT && frames - frames.div_ceil(5) >= least { 5 } else { 10 };
+        let count = (HELD_OUT_FRAMES * divisor).div_ceil(frames.max(1)).clamp(LEAST_PARTS, 5);
         let parts = (0..count).map(|i| self.part(graph, (2 * i + 1) * divisor / (2 * count), divisor));
         parts.filter(|part| part.learned.frames() >= least && part.held_out.frames() > 0).collect()
     }

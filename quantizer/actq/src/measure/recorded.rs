@@ -314,7 +314,7 @@ fn variance(values: &[f64]) -> f64 {
 
 /// Returns `part / whole`, 0 without a whole.
 fn share(part: f64, whole: f64) -> f64 {
-    if whole > 1e-12 { part / whole } else { 0.0 }
+    if whole > f64::MIN_POSITIVE { part / whole } else { 0.0 }
 }
 
 fn steps(count: isize) -> String {
@@ -384,9 +384,7 @@ mod tests {
     fn causes_of_other_actions_are_named() {
         let graph = layers(&[5, 16, 3]);
         type Change<'a> = &'a dyn Fn(&[Vec<f32>], &mut Random) -> Vec<Vec<f32>>;
-        let said = |change: Change<'_>| {
-            recorded(&graph, change).expect("they differ").causes.join(", ")
-        };
+        let said = |change: Change<'_>| recorded(&graph, change).expect("they differ").causes.join(", ");
         assert_eq!(said(&|rows, _| each(rows, |_, v| 0.25 * v)), "0.25 times the policy's");
         assert_eq!(said(&|rows, _| each(rows, |_, v| v + 0.5)), "with an offset of 0.5");
         assert_eq!(said(&|rows, _| each(rows, |i, v| [0.5, 1.0, 2.0][i] * v)), "0.5, 1, 2 by axis times the policy's");

@@ -138,7 +138,7 @@ class Image:
         """SHA-256 of the policy that the image was made from, as hexadecimal digits."""
     @property
     def bits_per_weight(self) -> float:
-        """Bits per weight of the original network, everything counted."""
+        """Bits per weight of the original network, with scales and padding; biases and header do not count."""
     @property
     def scratch_bytes(self) -> int:
         """Bytes of scratch memory that a head needs."""
