@@ -44,6 +44,7 @@ fn gptq_beats_rounding_at_low_bits() -> Result<()> {
         Ok(eval::evaluate(image, &eval::heldout(&dir, &image)?)?.nmse)
     };
     let (gptq, plain) = (nmse(Method::Gptq)?, nmse(Method::Rtn)?);
-    assert!(gptq < plain / 2.0, "{gptq} against {plain}");
+    // Equal units of hidden elements help rounding (9.2e-2 without them) more than gptq (4.5e-2).
+    assert!(gptq < 4.5e-2 && gptq < plain / 1.8, "{gptq} against {plain}");
     Ok(())
 }

@@ -36,7 +36,7 @@ fn images_are(policy_dir: &Path, expected: [(usize, u32); 4]) -> Result<()> {
 
 #[test]
 fn images_of_ur3_stay_the_same() -> Result<()> {
-    images_are(&ur3(), [(362292, 0x47f57b5b), (195892, 0x4f0603a2), (154292, 0x3119d2df), (112692, 0xe7a74185)])
+    images_are(&ur3(), [(362292, 0x8cf8b4fb), (195892, 0x03af1203), (154292, 0xf2e78373), (112692, 0x4e539db9)])
 }
 
 #[test]
@@ -56,6 +56,6 @@ fn images_of_shared_policies_stay_the_same() -> Result<()> {
     )?;
     images_are(
         &policies.join("fetch_pickplace"),
-        [(149952, 0x19533019), (79808, 0x99eabdcc), (62272, 0x15889e24), (44736, 0x84119337)],
+        [(149952, 0xfbbfe830), (79808, 0x4669b77b), (62272, 0x3e6d4afe), (44736, 0xe8de9c0f)],
     )
 }

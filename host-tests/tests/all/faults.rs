@@ -2,11 +2,12 @@
 
 use std::task::Poll;
 
-use actq::budget::{Budget, Rate};
+use actq::budget::Budget;
 use actq::contract::ActionContract;
 use actq::graph::ops::{LayerNorm, Linear, Normalize, Pointwise, RmsNorm};
 use actq::graph::{Graph, NodeKind, WeightMatrix};
-use actq::methods::{Method, Options, quantize};
+use actq::methods::scale::round_to_nearest;
+use actq::methods::{Method, Options, Outcome};
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_kernels::math::Function;
@@ -29,8 +30,10 @@ fn image(gain: f32, factor: f32, nodes: Vec<NodeKind>, contract: ActionContract)
     for (input, kind) in first.into_iter().chain(nodes).enumerate() {
         graph.add(kind, &[input]).expect("it fits");
     }
-    let options = Options::new(Method::Rtn, Budget::Width(Width::W8));
-    let (_, outcomes) = quantize(&graph, None, Rate::Width(Width::W8), &options).expect("the graph is valid");
+    // Not by a method, which would move the factors to where nothing overflows.
+    let (options, matrix) = (Options::new(Method::Rtn, Budget::Width(Width::W8)), &graph.matrices[0]);
+    let quantized = round_to_nearest(matrix, Width::W8, options.group);
+    let outcomes = [Outcome::new(matrix, quantized, None, options.activations).expect("the matrix is finite")];
     let policy = Policy { contract, ..Policy::of("faults", graph) };
     ImageBuffer::new(&actq::emit::image(&policy, &outcomes).expect("the policy fits the format"))
 }

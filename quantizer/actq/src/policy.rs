@@ -7,7 +7,7 @@ use actq_kernels::image::Kind;
 use crate::around::Around;
 use crate::contract::ActionContract;
 use crate::error::{Result, ensure};
-use crate::graph::{Graph, without_ignored};
+use crate::graph::Graph;
 use crate::text::count;
 
 /// Control steps a second of a policy that states no rate.
@@ -32,7 +32,7 @@ pub struct Policy {
     pub rate_hz: f32,
     /// Action contract.
     pub contract: ActionContract,
-    /// The network, without what it ignores ([`without_ignored`]).
+    /// The network; a policy of a folder is read without what it ignores ([`without_ignored`](crate::graph::without_ignored)).
     pub graph: Graph,
     /// Operations around the network in an image; the network's observations and actions then differ from the image's.
     pub around: Option<Around>,
@@ -59,7 +59,7 @@ impl Policy {
             contract: ActionContract::default(),
             weights: graph.weights(),
             parameters: graph.parameters(),
-            graph: without_ignored(&graph),
+            graph,
             around: None,
             digest: [0; 32],
         }

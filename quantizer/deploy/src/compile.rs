@@ -11,6 +11,7 @@ mod operations;
 
 use actq::contract::ActionContract;
 use actq::error::{Context as _, Result, ensure};
+use actq::graph::without_ignored;
 use actq::policy::Policy;
 
 use crate::plan::Plan;
@@ -34,7 +35,7 @@ impl Deployment {
     /// If an image has no operations for a part of it; the error names the value and the operation.
     pub fn new(name: &str, rate_hz: f32, plan: &Plan) -> Result<Self> {
         let joined = Joined::of(plan)?;
-        let mut policy = Policy::of(name, joined.graph.clone());
+        let mut policy = Policy::of(name, without_ignored(&joined.graph));
         policy.around = Some(around::around(plan, &joined)?);
         policy.rate_hz = rate_hz;
         policy.contract = ActionContract::default();

@@ -144,7 +144,17 @@ impl Deployment {
     /// Draws raw inputs of some ticks: numbers from -1 to 1 in the inputs' ranges, quaternions of length 1, zeros.
     pub fn draws(&self, plan: &Plan, random: &mut Random, ticks: usize) -> Vec<Raw> {
         let around = self.policy.around.iter();
-        around.flat_map(|around| raw_values(around, random, ticks, true)).map(|raw| plan.split(&raw)).collect()
+        let mut draws: Vec<Raw> =
+            around.flat_map(|around| raw_values(around, random, ticks, true)).map(|raw| plan.split(&raw)).collect();
+        // A quaternion that no target depends on is in the description only.
+        let free = plan.ranges.iter().map(Option::is_none);
+        for (values, _) in draws.iter_mut().flat_map(|raw| raw.iter_mut().zip(free.clone())).filter(|(_, free)| *free) {
+            let norm = values.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if values.len() == 4 && norm <= 2.0 {
+                values.iter_mut().for_each(|x| *x = if norm > 0.0 { f64::from((*x / norm) as f32) } else { 0.5 });
+            }
+        }
+        draws
     }
 
     /// Compares an image of this description in f32 with the description itself.

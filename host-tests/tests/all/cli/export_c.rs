@@ -41,7 +41,8 @@ fn exported_sources_have_the_hosts_image_and_actions() -> Result<()> {
     fs::write(at("made.actq"), &bytes)?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(&at("made.actq"))?;
-    let observations = Array3::from_shape_fn((1, 9, image.obs_len()), |(_, i, k)| ((i + 2 * k) as f32 / 7.0).sin());
+    let raw: Vec<Vec<f64>> = Made::raw(9).iter().map(|raw| raw.concat()).collect();
+    let observations = Array3::from_shape_fn((1, 9, image.obs_len()), |(_, i, k)| raw[i][k] as f32);
     write_observations(&at("runs.npz"), &observations)?;
     let [from, recording, out] = ["made.actq", "runs.npz", "new/folder"].map(|name| text(&at(name)));
     let options = ["--golden", &recording, "--steps", "5", "--name", "walker"];

@@ -158,8 +158,8 @@ mod tests {
 
     fn image(graph: &Graph, width: Width, activations: Activations) -> (Vec<Outcome>, ImageBuffer) {
         let options = Options { group: 32, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
-        let (_, outcomes) = quantize(graph, None, Rate::Width(width), &options).expect("outcomes");
-        let bytes = emit::image(&Policy::of("all", graph.clone()), &outcomes).expect("an image");
+        let (graph, outcomes) = quantize(graph, None, Rate::Width(width), &options).expect("outcomes");
+        let bytes = emit::image(&Policy::of("all", graph), &outcomes).expect("an image");
         (outcomes, ImageBuffer::new(&bytes))
     }
 
