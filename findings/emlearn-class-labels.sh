@@ -1,6 +1,6 @@
 #!/bin/sh
-# emlearn 0.23.2, scikit-learn 1.9.1: predict() of a converted MLPClassifier or GaussianNB gives the index of the class, not its label: with the labels 5, 6, 7 it
-# predicts 0, 1, 2, and with names it predicts numbers. The C code that it saves does not hold the names either.
+# emlearn 0.23.2, scikit-learn 1.9.1: predict() of a converted MLPClassifier or GaussianNB gives the index of the class, not its label: with the labels 5, 6, 7
+# it predicts 0, 1, 2, and with names it predicts numbers. The C code that it saves does not hold the names either.
 # Seen on 2026-11-28:  MLPClassifier, labels 5 6 7: 0 1 2   labels left right straight: 0 1 2   GaussianNB, labels 5 6 7: 0 1 2   the same names: 0 1 2
 set -eu
 dir=$(mktemp -d); trap 'rm -rf "$dir"' EXIT; cd "$dir"

@@ -17,6 +17,7 @@ onnx.checker.check_model(model, full_check=True)
 after, ok = onnxsim.simplify(model)
 keys = [entry.key for entry in after.metadata_props]
 own = [key for key in keys if key.startswith("onnxsim.")]
-print(f"before: {len(model.metadata_props)} entry, {model.ByteSize()} bytes   after: {len(keys)} entries, {len(own)} of them onnxsim.*, {after.ByteSize()} bytes")
+print(f"before: {len(model.metadata_props)} entry, {model.ByteSize()} bytes", end="   ")
+print(f"after: {len(keys)} entries, {len(own)} of them onnxsim.*, {after.ByteSize()} bytes")
 assert ok and after.graph == model.graph and len(own) == 19 and set(keys) - set(own) == {"joint_names"}, keys
 PY

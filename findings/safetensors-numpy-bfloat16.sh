@@ -1,6 +1,6 @@
 #!/bin/sh
-# safetensors 0.8.0, ml_dtypes 0.6.0, numpy 2.4.6: safetensors.numpy.save takes bfloat16 and eight-bit floats, but load does not read what save gave: it raises a
-# bare KeyError. load_file of the same bytes in a file reads bfloat16 but not the eight-bit floats (numpy has no attribute of that name).
+# safetensors 0.8.0, ml_dtypes 0.6.0, numpy 2.4.6: safetensors.numpy.save takes bfloat16 and eight-bit floats, but load does not read what save gave: it raises
+# a bare KeyError. load_file of the same bytes in a file reads bfloat16 but not the eight-bit floats (numpy has no attribute of that name).
 # Seen on 2026-11-28:  float16: load reads, load_file reads   bfloat16: load KeyError, load_file reads   float8_e4m3fn: load KeyError, load_file AttributeError
 set -eu
 dir=$(mktemp -d); trap 'rm -rf "$dir"' EXIT; cd "$dir"
