@@ -7,9 +7,13 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use actq::emit;
+use actq::graph::ops::Pointwise;
+use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
-use actq_bench::networks::Draw;
+use actq_bench::networks::{Builder, Draw};
 use actq_bench::root;
+use actq_kernels::Width;
+use actq_kernels::math::Function;
 use anyhow::{Result, ensure};
 use tempfile::TempDir;
 
@@ -41,7 +45,11 @@ fn images_without_their_features_do_not_compile() -> Result<()> {
     )?;
     fs::copy(root().join("Cargo.lock"), folder.join("Cargo.lock"))?;
     let (policy, outcomes) = Draw::new(1).network(37)?;
+    let mut silu = Builder::new(8);
+    let last = silu.linear((8, 8), Activations::Int8, |_| Some(Width::W2), 0, true)?;
+    silu.node(Pointwise(Function::Silu), &[last])?;
     let mut images = vec![
+        silu.image("silu")?,
         fs::read(root().join("kernels/tests/valid.actq"))?,
         emit::image(&policy, &outcomes)?,
         Made::deployment()?.1.four_bits()?,

@@ -41,6 +41,7 @@ pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Se
     }
 
     /// Computes `sigmoid(self) * tanh(x)` with one division.
+    #[cfg_attr(actq_fpu, allow(dead_code, reason = "with an FPU, cells are in assembler"))]
     #[inline(always)]
     fn gate(self, x: Self) -> Self {
         let (on, off) = exp_fraction(self);
@@ -49,6 +50,7 @@ pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Se
     }
 
     /// Rounds `self * factor`, of finite numbers, to an integer of 16 bits; the result's other bits have no meaning.
+    #[cfg_attr(actq_fpu, allow(dead_code, reason = "with an FPU, vectors are quantized in assembler"))]
     fn rounded(self, factor: f32) -> u32;
 
     /// Adds `sum * (scale * x_scale)` to y, for a scale that is a bf16.

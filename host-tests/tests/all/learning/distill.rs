@@ -99,8 +99,10 @@ fn a_forced_width_reaches_every_row() -> Result<()> {
 #[test]
 fn another_seed_gives_another_image() -> Result<()> {
     let quantizer = quantizer()?;
-    let options = distill(2.0, 5);
-    assert_ne!(image(&quantizer, &options)?, image(&quantizer, &Options { seed: 2, ..options.clone() })?);
+    // As many steps as learning needs to be kept.
+    let options = distill(2.0, 200);
+    let other = Options { seed: 2, ..options.clone() };
+    assert!(image(&quantizer, &options)? != image(&quantizer, &other)?, "the seed changes nothing");
     Ok(())
 }
 

@@ -156,11 +156,12 @@ mod tests {
         graph
     }
 
-    fn image(graph: &Graph, width: Width, activations: Activations) -> (Vec<Outcome>, ImageBuffer) {
+    /// Returns the network that is quantized, with equalized elements, its outcomes and its image.
+    fn image(graph: &Graph, width: Width, activations: Activations) -> (Graph, Vec<Outcome>, ImageBuffer) {
         let options = Options { group: 32, activations, ..Options::new(Method::Rtn, Budget::Width(width)) };
         let (graph, outcomes) = quantize(graph, None, Rate::Width(width), &options).expect("outcomes");
-        let bytes = emit::image(&Policy::of("all", graph), &outcomes).expect("an image");
-        (outcomes, ImageBuffer::new(&bytes))
+        let bytes = emit::image(&Policy::of("all", graph.clone()), &outcomes).expect("an image");
+        (graph, outcomes, ImageBuffer::new(&bytes))
     }
 
     fn distance(a: &[f32], b: &[f32]) -> f32 {
@@ -169,10 +170,8 @@ mod tests {
 
     #[test]
     fn unrounded_equals_the_f32_network_of_dequantized_weights() {
-        let graph = graph();
-        let (outcomes, buffer) = image(&graph, Width::W3, Activations::Int8);
+        let (mut dequantized, outcomes, buffer) = image(&graph(), Width::W3, Activations::Int8);
         let image = buffer.image(Path::new("memory")).expect("an image");
-        let mut dequantized = graph.clone();
         for (matrix, outcome) in dequantized.matrices.iter_mut().zip(&outcomes) {
             matrix.data = outcome.quantized.dequantized();
         }
@@ -199,7 +198,7 @@ mod tests {
     fn states_have_one_order() {
         let graph = graph();
         assert_eq!(graph.state_len(), 3 * HIDDEN);
-        let (_, buffer) = image(&graph, Width::W8, Activations::Int16);
+        let (_, _, buffer) = image(&graph, Width::W8, Activations::Int16);
         let image = buffer.image(Path::new("memory")).expect("an image");
         let mut random = Random::new(5);
         let state: Vec<f32> = (0..3 * HIDDEN).map(|_| random.unit()).collect();
