@@ -10,6 +10,7 @@ use std::fs;
 use std::path::Path;
 
 use actq::budget::Budget;
+use actq::calibrate::equalize::equalized;
 use actq::data::Recordings;
 use actq::methods::{Method, Options};
 use actq::pipeline::quantize;
@@ -36,13 +37,13 @@ fn statistics_sum_to_the_image_and_explain_widths() -> Result<()> {
     let image = fixture.path("ur3.actq");
     let (image, file) = (image.display().to_string(), fixture.path("ur3.json"));
     let policy = ur3().display().to_string();
-    let options = ["--bpw", "2", "--steps", "2", "--seed", "7"];
+    let options = ["--bpw", "2", "--steps", "200", "--seed", "7"];
     let mut command = actq(&["quantize", &policy, "--out", &image, "--save-stats", &file.display().to_string()]);
     command.args(options);
     let printed = succeeded(&run(command, b"")?)?;
     let stats = parsed(&serde_json::from_slice(&fs::read(&file)?)?)?;
     assert_eq!((stats.policy.as_str(), stats.method.as_str()), ("ur3_reach", "distill"));
-    assert_eq!((stats.seed, stats.steps, stats.bytes as u64), (7, 2, fs::metadata(&image)?.len()));
+    assert_eq!((stats.seed, stats.steps, stats.bytes as u64), (7, 200, fs::metadata(&image)?.len()));
     let weights: usize = stats.matrices.iter().map(|m| m.rows * m.cols).sum();
     let bytes: usize = stats.matrices.iter().map(|m| m.bytes).sum();
     assert!((stats.bpw - 8.0 * (bytes + stats.balance) as f64 / weights as f64).abs() < 1e-9);
@@ -84,9 +85,10 @@ fn image_rows_map_to_policy_rows() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = Policy::load(&fixture.policy())?;
     let options = Options { steps: Some(2), ..Options::new(Method::Distill, Budget::BitsPerWeight(4.0)) };
-    let outcomes = quantize(&policy, &Recordings::load(&policy)?, &options, ())?.outcomes;
+    let recordings = Recordings::load(&policy)?;
+    let outcomes = quantize(&policy, &recordings, &options, ())?.outcomes;
     let mut removed = Vec::new();
-    for (source, outcome) in policy.graph.matrices.iter().zip(&outcomes) {
+    for (source, outcome) in equalized(&policy.graph, recordings.calib.as_ref()).matrices.iter().zip(&outcomes) {
         let allocation = outcome.allocation.as_ref().context("an allocation")?;
         let values = outcome.quantized.dequantized();
         for (row, &from) in values.chunks_exact(outcome.quantized.cols).zip(&allocation.rows) {

@@ -61,6 +61,12 @@ impl Case {
         reference
     }
 
+    /// `false` if the policy has lost what the network ignores: its matrices are not those of the case then.
+    pub(super) fn has_all_of(&self, policy: &Policy) -> bool {
+        let tensors = self.reference().tensors;
+        policy.graph.matrices.iter().all(|m| tensors.get(&m.name).is_some_and(|tensor| tensor.len() == m.data.len()))
+    }
+
     pub(super) fn observations(&self) -> Vec<Vec<f32>> {
         let mut random = Random::new(2);
         let len = self.json["obs_dim"].as_u64().unwrap_or(0);

@@ -49,7 +49,7 @@ fn a_sweep_stores_allocations_and_scores() -> Result<()> {
     ensure!(fs::read_to_string(fixture.path("s.svg"))?.matches("<polyline").count() >= 8);
     let seed = |n: u32| -> Result<Value> {
         succeeded(
-            &fixture.actq(&format!("sweep policy --bpw 4 --methods distill --steps 3 --seed {n} --json t.json"))?,
+            &fixture.actq(&format!("sweep policy --bpw 4 --methods distill --steps 200 --seed {n} --json t.json"))?,
         )?;
         let value: Value = serde_json::from_slice(&fs::read(fixture.path("t.json"))?)?;
         Ok(value["policies"][0]["images"][0]["made"]["image"]["image"].clone())
