@@ -84,7 +84,7 @@ fn statistics_sum_to_the_image_and_explain_widths() -> Result<()> {
 fn image_rows_map_to_policy_rows() -> Result<()> {
     let fixture = Fixture::new()?;
     let policy = Policy::load(&fixture.policy())?;
-    let options = Options { steps: Some(2), ..Options::new(Method::Distill, Budget::BitsPerWeight(4.0)) };
+    let options = Options { steps: Some(200), ..Options::new(Method::Distill, Budget::BitsPerWeight(4.0)) };
     let recordings = Recordings::load(&policy)?;
     let outcomes = quantize(&policy, &recordings, &options, ())?.outcomes;
     let mut removed = Vec::new();
