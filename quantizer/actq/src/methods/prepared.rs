@@ -73,7 +73,8 @@ impl<'a> PreparedMethod<'a> {
         minutes: Option<f64>,
         mut progress: impl FnMut(f64),
     ) -> Result<Self> {
-        let equalized = equalized(graph, calib);
+        // Rounding takes nothing from a recording: its image is the same with and without one.
+        let equalized = equalized(graph, calib.filter(|_| !matches!(method, Method::Rtn)));
         let graph = &*equalized;
         let steps = graph.denoising_steps();
         let time = minutes.filter(|_| steps > 1).map(|minutes| Duration::from_secs_f64(60.0 * minutes));
