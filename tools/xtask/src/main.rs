@@ -6,11 +6,9 @@
 //! `actq-research` measure.
 #![forbid(unsafe_code)]
 
-mod cost;
 mod firmware;
 mod limits;
 mod python;
-mod relay;
 mod setup;
 mod verify;
 

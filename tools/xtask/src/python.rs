@@ -83,14 +83,14 @@ pub(crate) fn interpreter() -> Result<PathBuf, String> {
 fn test(optional: bool, pytest: &[String]) -> Result<()> {
     let package = root().join(PACKAGE);
     let python = environment(&package, optional)?;
-    // The features of the extension, so that both share what is built.
-    let command = ["build", "--profile", PROFILE, "--package", "actq-cli", "--package", "actq-python", "--bin", "actq"];
+    // With the measuring library, both share what the tests have built.
+    let command = ["build", "--profile", PROFILE, "--package", "actq-cli", "--package", "actq-bench", "--bin", "actq"];
     run(cargo().current_dir(root()).args(command))?;
     let wheels = target_dir().join("python/wheels");
     if wheels.exists() {
         fs::remove_dir_all(&wheels).context("cannot remove the old wheels")?;
     }
-    let build = ["-m", "maturin", "build", "--profile", PROFILE, "--locked", "--out"];
+    let build = ["-m", "maturin", "build", "--profile", PROFILE, "--features", "checks", "--locked", "--out"];
     run(Command::new(&python).current_dir(&package).args(build).arg(&wheels))?;
     let install = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps", "--no-index", "--find-links"];
     run(Command::new(&python).args(install).arg(&wheels).arg("actq"))?;

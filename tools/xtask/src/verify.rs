@@ -2,15 +2,16 @@
 
 mod steps;
 
-use std::fs;
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+use std::{fs, thread};
 
 use actq_boards::Target;
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Error, Result, anyhow, bail};
 
 use self::steps::{Installed, Step};
-use crate::cost::{Clock, Cost};
-use crate::{relay, setup};
+use crate::setup;
 
 const USAGE: &str = "\
 Usage: cargo verify [--all]
@@ -84,7 +85,7 @@ enum Outcome {
 struct Done {
     name: String,
     outcome: Outcome,
-    cost: Cost,
+    seconds: f64,
 }
 
 fn setup(targets: &[Target], expected: &Expected) -> Result<()> {
@@ -95,39 +96,77 @@ fn setup(targets: &[Target], expected: &Expected) -> Result<()> {
 
 /// Runs the steps; an error names the failed ones.
 fn verify(steps: Vec<Step>, expected: &Expected) -> Result<()> {
-    let clock = Clock::start();
+    let start = Instant::now();
     // Tests write the names of skipped tests to this file.
     let skipped = std::env::temp_dir().join(format!("actq-skipped-{}", std::process::id()));
     let count = steps.len();
-    let mut done = Vec::new();
-    for (i, mut step) in steps.into_iter().enumerate() {
-        if let Ok(command) = &mut step.command {
-            command.env("ACTQ_SKIPPED", &skipped);
+    let mut done = thread::scope(|scope| {
+        let (beside, others) = mpsc::channel::<(Step, String)>();
+        let others = scope.spawn(move || {
+            others.into_iter().map(|(step, number)| run(step, &number, start)).collect::<Result<Vec<_>>>()
+        });
+        let mut done = Vec::new();
+        for (i, mut step) in steps.into_iter().enumerate() {
+            if let Ok(command) = &mut step.command {
+                command.env("ACTQ_SKIPPED", &skipped);
+            }
+            let number = format!("{}/{count}", i + 1);
+            match step.is_beside {
+                true => beside.send((step, number)).context("the thread of other steps has ended")?,
+                false => done.push(run(step, &number, start)?),
+            }
         }
-        done.push(run(step, &format!("{}/{count}", i + 1), &clock)?);
-    }
+        drop(beside);
+        done.extend(others.join().map_err(|_| anyhow!("the thread of other steps panicked"))??);
+        Ok::<_, Error>(done)
+    })?;
+    done.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
     let tests = fs::read_to_string(&skipped).unwrap_or_default();
     let _ = fs::remove_file(&skipped);
-    summary(&done, &tests, clock.cost(), expected)
+    summary(&done, &tests, start, expected)
 }
 
-fn run(Step { name, command }: Step, number: &str, clock: &Clock) -> Result<Done> {
-    let step = Clock::start();
+/// Time between lines about a running step.
+const REPORT: Duration = Duration::from_secs(30);
+
+fn run(Step { name, command, is_beside }: Step, number: &str, start: Instant) -> Result<Done> {
+    let begun = Instant::now();
     let outcome = match command {
         Ok(mut command) => {
             println!("\n== {number} {name}: {}", text(&command));
-            if relay::run(&mut command, &name)? { Outcome::Ok } else { Outcome::Failed }
+            // The output of a step beside others comes as a whole, at its end.
+            let path = std::env::temp_dir().join(format!("actq-output-{}", std::process::id()));
+            if is_beside {
+                let file = fs::File::create(&path)?;
+                command.stdout(file.try_clone()?).stderr(file);
+            }
+            let mut child = command.stdin(Stdio::null()).spawn().context("cannot start the step's program")?;
+            let mut reported = begun;
+            let status = loop {
+                if let Some(status) = child.try_wait()? {
+                    break status;
+                }
+                if !is_beside && reported.elapsed() > REPORT {
+                    println!("   {name}: still running after {} s", begun.elapsed().as_secs());
+                    reported = Instant::now();
+                }
+                thread::sleep(Duration::from_millis(100));
+            };
+            if is_beside {
+                println!("\n== {number} {name}:\n{}", String::from_utf8_lossy(&fs::read(&path)?));
+                fs::remove_file(&path)?;
+            }
+            if status.success() { Outcome::Ok } else { Outcome::Failed }
         }
         Err(why) => Outcome::Skipped(why),
     };
-    let cost = step.cost();
-    let (seconds, so_far) = (cost.wall.as_secs_f64(), clock.cost().wall.as_secs_f64() / 60.0);
+    let (seconds, so_far) = (begun.elapsed().as_secs_f64(), start.elapsed().as_secs_f64() / 60.0);
     match &outcome {
         Outcome::Ok => println!("== {name}: ok in {seconds:.0} s, {so_far:.1} min so far"),
         Outcome::Failed => println!("== {name}: FAILED in {seconds:.0} s, {so_far:.1} min so far"),
         Outcome::Skipped(why) => println!("\n== {number} {name}: SKIPPED: {why}"),
     }
-    Ok(Done { name, outcome, cost })
+    Ok(Done { name, outcome, seconds })
 }
 
 /// Formats the command as a user would type it.
@@ -138,23 +177,27 @@ fn text(command: &Command) -> String {
     format!("{name} {}", arguments.join(" "))
 }
 
-/// Prints the results; an error if a step failed.
-fn summary(all: &[Done], tests: &str, cost: Cost, expected: &Expected) -> Result<()> {
-    let seconds = |cost: Cost| {
-        let cpu = cost.cpu.map_or_else(|| "-".to_owned(), |cpu| format!("{:.1}", cpu.as_secs_f64()));
-        format!("{:8.1} {cpu:>8}", cost.wall.as_secs_f64())
-    };
+/// Returns the CPU minutes of all ended child processes and of their children, from fields 16 and 17 of
+/// `/proc/self/stat` in hundredths of a second (proc(5): cutime, cstime); `None` without a /proc.
+fn cpu_minutes() -> Option<f64> {
+    let stat = fs::read_to_string("/proc/self/stat").ok()?;
+    // The second field is a name in parentheses, with any content.
+    let fields = stat.rsplit_once(')')?.1.split_whitespace().skip(13).take(2);
+    Some(fields.flat_map(str::parse::<f64>).sum::<f64>() / 6000.0)
+}
+
+/// Prints the results, the longest step first; an error if a step failed.
+fn summary(all: &[Done], tests: &str, start: Instant, expected: &Expected) -> Result<()> {
     let name_width = all.iter().map(|done| done.name.len()).max().unwrap_or(0);
-    println!("\n{:name_width$}  result   seconds      CPU", "step");
-    for Done { name, outcome, cost } in all {
+    println!("\n{:name_width$}  result   seconds", "step");
+    for Done { name, outcome, seconds } in all {
         let (result, why) = match outcome {
             Outcome::Ok => ("ok", ""),
             Outcome::Failed => ("FAILED", ""),
             Outcome::Skipped(why) => ("SKIPPED", why.as_str()),
         };
-        println!("{name:name_width$}  {result:7} {} {why}", seconds(*cost));
+        println!("{name:name_width$}  {result:7} {seconds:8.1} {why}");
     }
-    println!("{:name_width$}          {}", "all", seconds(cost));
 
     let mut tests: Vec<&str> = tests.lines().collect();
     tests.sort_unstable();
@@ -165,8 +208,8 @@ fn summary(all: &[Done], tests: &str, cost: Cost, expected: &Expected) -> Result
     }
     println!("\nskipped: {steps_skipped} steps, {} tests or parts of tests", tests.len());
     let Expected { wall, cpu } = expected;
-    let minutes = cost.wall.as_secs_f64() / 60.0;
-    let cpu_minutes = cost.cpu.map_or_else(|| "-".to_owned(), |cpu| format!("{:.1}", cpu.as_secs_f64() / 60.0));
+    let minutes = start.elapsed().as_secs_f64() / 60.0;
+    let cpu_minutes = cpu_minutes().map_or_else(|| "-".to_owned(), |minutes| format!("{minutes:.1}"));
     println!("took {minutes:.1} minutes and {cpu_minutes} of CPU; expected from a fresh clone: {wall} and {cpu}");
     let failed: Vec<&str> =
         all.iter().filter(|d| matches!(d.outcome, Outcome::Failed)).map(|d| d.name.as_str()).collect();

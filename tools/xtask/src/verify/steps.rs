@@ -24,15 +24,18 @@ const ONNX_TESTS: &str = "actq-onnx-tests";
 /// The check of the C header, whose generator takes long to build, too.
 const C_HEADER: &str = "actq-capi-header";
 
-/// The tests that only `cargo verify --all` runs, modules of `host-tests/tests/all`: those in QEMU beyond the smoke
-/// run, and those that learn for long.
-const SKIPPED_TESTS: [&str; 4] = ["--skip", "on_target::", "--skip", "learning::"];
+/// The tests in QEMU beyond the smoke run, a module of `host-tests/tests/all`.
+const ON_TARGET: &str = "on_target::";
+/// The tests that only `cargo verify --all` runs: these, and those that learn for long.
+const SKIPPED_TESTS: [&str; 4] = ["--skip", ON_TARGET, "--skip", "learning::"];
 
 /// A command with a name.
 pub(super) struct Step {
     pub(super) name: String,
     /// The command, or why it cannot run.
     pub(super) command: Result<Command, String>,
+    /// Runs beside the steps after it: most of its time only one core is busy, with the linker or QEMU.
+    pub(super) is_beside: bool,
 }
 
 /// Requirements besides targets and QEMU: for each, why it is missing.
@@ -68,15 +71,16 @@ pub(super) fn short() -> Vec<Step> {
 pub(super) fn all(installed: Installed) -> Vec<Step> {
     let mut steps = Steps::default();
     steps.format_and_lints();
-    steps.add("tests", &TESTS);
+    let tests = tests();
+    steps.add("build of the tests", &[&tests[..], &["--no-run"]].concat());
+    steps.add_beside("tests on the boards", &[&tests[..], &["--test", "all", "--", ON_TARGET]].concat());
+    steps.add_beside("budgets", &["run", "--profile", PROFILE, "--package", "actq-bench", "--", "budgets"]);
+    steps.add_beside("faults on the line", &["run", "--profile", PROFILE, "--package", "actq-bench", "--", "faults"]);
+    steps.add("tests", &[&tests[..], &["--", "--skip", ON_TARGET]].concat());
     steps.least_kernels();
     steps.board_lints();
     steps.application_lints();
     steps.documentation();
-    steps.add("budgets", &["run", "--profile", PROFILE, "--package", "actq-bench", "--", "budgets"]);
-    steps.add("faults on the line", &["run", "--profile", PROFILE, "--package", "actq-bench", "--", "faults"]);
-    steps.add("ONNX files against tract", &["test", "--profile", PROFILE, "--package", ONNX_TESTS]);
-    steps.add("C header", &["test", "--profile", PROFILE, "--package", C_HEADER]);
     let publish = ["publish", "--workspace", "--dry-run", "--no-verify", "--allow-dirty", "--locked"];
     steps.add("crates to publish", &publish);
     let python = ["run", "--profile", PROFILE, "--package", "xtask", "--", "python"];
@@ -99,6 +103,13 @@ fn host_packages() -> Vec<&'static str> {
     vec!["--workspace", "--exclude", support, "--exclude", benches, "--exclude", ONNX_TESTS, "--exclude", C_HEADER]
 }
 
+/// Returns the command of all tests: with one selection of packages, cargo builds each crate with one set of features.
+fn tests() -> Vec<&'static str> {
+    let [support, benches] = FIRMWARE;
+    let excluded = ["--exclude", support, "--exclude", benches, "--exclude", STYLES, "--exclude", "actq-python"];
+    [&TESTS[..], &["--workspace"], &excluded].concat()
+}
+
 fn build_for(target: Target) -> [&'static str; 4] {
     ["--target", target.triple(), "--profile", target.profile()]
 }
@@ -111,11 +122,16 @@ impl Steps {
     fn add_with(&mut self, name: &str, arguments: &[&str], environment: &[(&str, &str)]) {
         let mut command = cargo();
         command.current_dir(root()).args(arguments).envs(environment.iter().copied());
-        self.0.push(Step { name: name.to_owned(), command: Ok(command) });
+        self.0.push(Step { name: name.to_owned(), command: Ok(command), is_beside: false });
     }
 
     fn add(&mut self, name: &str, arguments: &[&str]) {
         self.add_with(name, arguments, &[]);
+    }
+
+    fn add_beside(&mut self, name: &str, arguments: &[&str]) {
+        self.add(name, arguments);
+        self.0.last_mut().expect("the added step").is_beside = true;
     }
 
     /// Adds a command that reads the firmware without running it, with a valid image for it to include.
@@ -131,7 +147,7 @@ impl Steps {
             command.current_dir(root()).args(arguments);
             command
         });
-        self.0.push(Step { name: name.to_owned(), command });
+        self.0.push(Step { name: name.to_owned(), command, is_beside: false });
     }
 
     /// Adds lints and a test of the kernels with the features that every build has.
