@@ -13,43 +13,6 @@ pub fn weights(inputs: usize, outputs: usize) -> Vec<f32> {
     (0..inputs * outputs).map(|i| 0.01 * (1 + i % 7) as f32).collect()
 }
 
-/// An LSTM with the weights and biases 0.1 that tests write, in f64.
-pub struct Lstm {
-    inputs: usize,
-    h: Vec<f64>,
-    c: Vec<f64>,
-}
-
-impl Lstm {
-    /// Starts with a state of zeros.
-    pub fn new(inputs: usize, hidden: usize) -> Self {
-        Self { inputs, h: vec![0.0; hidden], c: vec![0.0; hidden] }
-    }
-
-    /// Returns the hidden values of the next step.
-    pub fn step(&mut self, q: &[f64]) -> Vec<f64> {
-        let hidden = self.h.len();
-        let (w, r) = (weights(4 * hidden, self.inputs), weights(4 * hidden, hidden));
-        let (h, c) = (&self.h, &self.c);
-        // ONNX has the gates in the order input, output, forget, cell, each with a row for each hidden value.
-        let gate = |gate: usize, k: usize| {
-            let row = gate * hidden + k;
-            let of_q: f64 = q.iter().zip(&w[self.inputs * row..]).map(|(q, w)| q * f64::from(*w)).sum();
-            let of_h: f64 = h.iter().zip(&r[hidden * row..]).map(|(h, r)| h * f64::from(*r)).sum();
-            of_q + of_h + 0.2
-        };
-        let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
-        let next: Vec<(f64, f64)> = (0..hidden)
-            .map(|k| {
-                let c = sigmoid(gate(2, k)) * c[k] + sigmoid(gate(0, k)) * gate(3, k).tanh();
-                (sigmoid(gate(1, k)) * c.tanh(), c)
-            })
-            .collect();
-        (self.h, self.c) = next.into_iter().unzip();
-        self.h.clone()
-    }
-}
-
 /// A node: operator, inputs, outputs, and attributes that are integers.
 pub type Node<'a> = (&'a str, &'a [&'a str], &'a [&'a str], &'a [(&'a str, usize)]);
 

@@ -1,7 +1,6 @@
 //! What several families' tests share.
 
-pub(crate) mod isaaclab;
-pub(crate) mod leapp;
-pub(crate) mod lerobot;
+pub(crate) mod difference;
 pub(crate) mod made;
+mod network;
 pub(crate) use actq_testkit::onnx;
