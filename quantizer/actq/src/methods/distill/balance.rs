@@ -1,4 +1,5 @@
-//! Balances columns: scales the observation values that matrices read, so that no column's weights or values dominate.
+//! Balances columns: scales the values that matrices read, so that no column's weights or values dominate: those of the
+//! observation, and hidden ones whose units a function such as tanh fixes.
 //!
 //! Users choose the units of observations. A row has one scale, so rounding errors of its weights have the same size in
 //! every column. In a column of small weights, a weight is rounded to zero or to much more than its value. In a column

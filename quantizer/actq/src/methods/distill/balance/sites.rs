@@ -1,15 +1,18 @@
-//! Values that are computed from the observation without a matrix, and the columns of matrices that read them.
+//! Values whose units the network fixes, and the columns of matrices that read them: those computed from the observation
+//! without a matrix, and hidden ones that functions such as tanh tie to their units. Other hidden values are equalized
+//! (`calibrate/equalize.rs`).
 
+use crate::calibrate::equalize::fixed_values;
 use crate::graph::operation::Operand;
 use crate::graph::ops::{Concat, Span};
 use crate::graph::{Graph, NodeKind, ValueId};
 
-/// A value computed from the observation without a matrix, and the columns that read it.
+/// A value whose units the network fixes, and the columns that read it.
 #[derive(Clone, Debug)]
 pub(super) struct Site {
     /// Identifier of the value.
     pub(super) value: ValueId,
-    /// `true` if the policy normalizes all of it.
+    /// `true` if the policy normalizes all of it, or a matrix made it: its units are those of the training.
     pub(super) is_normalized: bool,
     /// Nodes that read the value only through these columns.
     pub(super) readers: Vec<usize>,
@@ -55,9 +58,17 @@ pub(super) fn sites(graph: &Graph) -> Vec<Site> {
         let (readers, mut readings) = keep_consistent(graph, readers(graph, &observed, value));
         readings.sort_unstable();
         readings.dedup();
-        (!readings.is_empty()).then_some(Site { value, is_normalized: normalized[value], readers, readings })
+        (!readings.is_empty()).then_some(Site {
+            value,
+            is_normalized: normalized[value] || !observed[value],
+            readers,
+            readings,
+        })
     };
-    (0..observed.len()).filter(|&value| observed[value]).filter_map(site).collect()
+    let fixed = fixed_values(graph);
+    let is_joined = |value: usize| value > 0 && matches!(graph.nodes[value - 1].kind, NodeKind::Concat(_));
+    let has_site = |&value: &usize| observed[value] || fixed[value] && !is_joined(value);
+    (0..observed.len()).filter(has_site).filter_map(site).collect()
 }
 
 /// Finds the nodes that read a value only through columns of matrices.

@@ -181,15 +181,20 @@ fn small_matrix_is_balanced_if_units_ruin_it() {
         let hidden = graph.add(Linear { matrix: 0, bias: vec![0.0; FEW] }, &[0]).expect("it fits");
         let hidden = graph.add(Pointwise(Function::Tanh), &[hidden]).expect("it fits");
         graph.add(Linear { matrix: large, bias: vec![0.0; 3000] }, &[hidden]).expect("it fits");
-        added(&balanced(&graph).0)
+        balanced(&graph)
+            .0
+            .nodes
+            .iter()
+            .filter(|node| matches!(node.kind, NodeKind::Balance(_)) && node.inputs == [0])
+            .count()
     };
     assert_eq!([small(1.0), small(1e4)], [0, 1]);
 }
 
-/// Builds [observation, tanh of its product] -> product, and the nodes that `others` adds.
+/// Builds [observation, relu of its product] -> product, and the nodes that `others` adds.
 fn beside_a_hidden_vector(others: impl FnOnce(&mut Graph, ValueId)) -> Graph {
     let mut graph = linear(|_| 0);
-    let hidden = graph.add(Pointwise(Function::Tanh), &[1]).expect("it fits");
+    let hidden = graph.add(Pointwise(Function::Relu), &[1]).expect("it fits");
     let spans = vec![Span { from: 0, len: COLS }, Span { from: 0, len: ROWS }];
     let both = graph.add(Concat(spans), &[0, hidden]).expect("it fits");
     let data = (0..7 * (COLS + ROWS)).map(|i| (0.7 * i as f32).sin()).collect();
@@ -208,6 +213,29 @@ fn one_operation_balances_all_readers_of_the_observation() {
     let read = |graph: &mut Graph, both| _ = graph.add(Add, &[both, both]).expect("it fits");
     let (part, _) = balanced(&beside_a_hidden_vector(read));
     assert_eq!((added(&part), &part.nodes[1].inputs[..], &part.nodes[3].inputs[..]), (1, &[1][..], &[0, 3][..]));
+}
+
+#[test]
+fn a_hidden_vector_is_balanced_if_a_function_fixes_its_units() {
+    let balances = |function: Function, factor: f32| {
+        let mut graph = linear(|_| 0);
+        let hidden = graph.add(Pointwise(function), &[1]).expect("it fits");
+        let data = (0..200 * ROWS)
+            .map(|i| (0.7 * i as f32).sin() * if i % ROWS < 9 { factor } else { 1.0 } / ROWS as f32)
+            .collect();
+        let second = WeightMatrix { name: "second".into(), rows: 200, cols: ROWS, data };
+        let second = graph.add_matrix(second).expect("a matrix");
+        graph.add(Linear { matrix: second, bias: vec![0.1; 200] }, &[hidden]).expect("it fits");
+        let outputs: Vec<Vec<f64>> = graph.matrices.iter().map(|m| vec![1.0; m.rows]).collect();
+        let balanced = balance(&graph, &mut moments(&graph, &observations(400)), &outputs).expect("balanced");
+        let read = balanced.nodes.last().expect("a node").inputs[0];
+        matches!(balanced.nodes[read - 1].kind, NodeKind::Balance(_))
+    };
+    for function in [Function::Elu, Function::Tanh, Function::Silu] {
+        assert!(balances(function, 1e3), "{function:?}");
+    }
+    // Equalization has the same effect at no cost.
+    assert!(!balances(Function::Relu, 1e3));
 }
 
 #[test]
