@@ -199,12 +199,53 @@ class Cell(Net):
         return self.net(self.h)
 
 
+class CellAndFilter(Cell):
+    def __init__(self):
+        super().__init__()
+        self.register_buffer("low_pass", torch.zeros(1, 3))
+
+    def forward(self, x):
+        self.low_pass.mul_(0.8).add_(0.2 * super().forward(x))
+        return self.low_pass.clone()
+
+
+class Lstm(Net):
+    """Keeps the states of a layer, as a tuple that does not exist at first."""
+
+    def __init__(self):
+        super().__init__()
+        self.lstm, self.states = nn.LSTM(6, 6), None
+
+    def forward(self, x):
+        hidden, self.states = self.lstm(x[None], self.states)
+        return self.net(hidden[0])
+
+
 @pytest.mark.parametrize(
-    ("make", "kept"), [(History, "frames"), (Filter, "low_pass"), (LastAction, "last"), (Late, "steps"), (Cell, "h")]
+    ("make", "kept"), [(History, "frames"), (Filter, "low_pass"), (LastAction, "last"), (Late, "steps"), (CellAndFilter, "h, low_pass")]
 )
 def test_memory_of_a_module_is_refused(make, kept):
     with pytest.raises(actq.Error, match=f"{make.__name__}: the action depends on values that .* from step to step: {kept};"):
         actq.import_policy(make(), torch.zeros(1, 6))
+
+
+@pytest.mark.parametrize(("make", "state_len"), [(Cell, 6), (Lstm, 12)])
+def test_states_that_a_module_keeps_by_itself_are_states(make, state_len):
+    policy = actq.import_policy(make(), torch.zeros(1, 6))
+    assert policy.state_len == state_len
+    head = actq.Head(actq.quantize(policy, bits=8, method="rtn", activations=16, progress=False))
+    module, rows = make().eval(), np.random.default_rng(1).standard_normal((50, 6), dtype=np.float32)
+    for row in rows:
+        with torch.no_grad():
+            expected = module(torch.from_numpy(row[None])).numpy()[0]
+        assert np.abs(head(row) - expected).max() < 0.02
+
+
+def test_a_first_state_that_is_not_zero_is_refused():
+    module = Cell()
+    module.h += 1
+    with pytest.raises(actq.Error, match="from step to step: h;"):
+        actq.import_policy(module, torch.zeros(1, 6))
 
 
 def test_memory_of_a_torchscript_file_is_refused(tmp_path):

@@ -22,6 +22,24 @@ def changed_values(fresh: Any, used: Any) -> List[str]:
     return [name for name in after if name not in before or not _same(before[name][2], after[name][2], depth=4)]
 
 
+def kept_tensors(module: Any, changed: Sequence[str]) -> Dict[str, List[torch.Tensor]]:
+    """Returns the floating-point tensors of changed values by name; a tuple or list has several."""
+    found = {}
+    for name in changed:
+        part, attribute = owner(module, name)
+        value = getattr(part, attribute)
+        values = list(value) if isinstance(value, (tuple, list)) else [value]
+        if values and all(isinstance(item, torch.Tensor) and item.is_floating_point() for item in values):
+            found[name] = values
+    return found
+
+
+def owner(module: Any, name: str) -> Tuple[Any, str]:
+    """Returns the submodule that has a value, and the value's name there."""
+    at, _, attribute = name.rpartition(".")
+    return module.get_submodule(at), attribute
+
+
 def depends_on(
     used: Any, changed: Sequence[str], run: Callable[[], Array], expected: Array, share: Callable[[Array, Array], float]
 ) -> bool:

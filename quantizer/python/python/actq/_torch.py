@@ -16,7 +16,7 @@ import torch
 
 from . import _actq, _sb3
 from ._actq import Error, Policy
-from ._memory import changed_values, depends_on
+from ._memory import changed_values, depends_on, kept_tensors, owner
 from ._typing import Array
 
 if TYPE_CHECKING:
@@ -32,6 +32,8 @@ OPSET = 17
 TOLERANCE = 1e-5
 #: Largest error of a correct policy, as a multiple of what roundings of the weights change.
 ROUNDINGS = 8.0
+#: Names of the states that a module keeps by itself, each with a number.
+STATE = "kept_state_"
 #: Longest observation that is tried to find the one that a module takes.
 LONGEST = 2048
 
@@ -57,20 +59,24 @@ def import_module(
     inputs = tuple(tensor.to(device) for tensor in inputs)
     with torch.random.fork_rng([device] if device.type == "cuda" else []), torch.no_grad():
         source = Source(module, inputs, name, input_names, output_names)
-        with warnings.catch_warnings(record=True) as caught, silenced():
-            # A filter of the caller must not turn them into exceptions.
-            warnings.simplefilter("always")
-            content = source.onnx_bytes()
-        # Torch exports the name without saying so.
-        tracer: Any = torch.jit
-        branches = [warning for warning in caught if issubclass(warning.category, tracer.TracerWarning)]
         try:
-            policy, plan = _actq.import_onnx(content, name=name, output=output, states=list(states), observe=observe)
-        except Error as error:
-            changed = source.kept_values()
-            raise (Error(f"{name}: {memory(changed)}") if changed else error) from error.__cause__
-        source.compare(plan, branches)
-    return policy
+            return source.policy(output, states, observe)
+        except Memory as error:
+            policy = source.policy_with_states(error.changed, output, states, observe)
+            if policy is None:
+                raise Error(*error.args) from error.__cause__
+            return policy
+
+
+class Memory(Error):
+    """A module keeps values from step to step."""
+
+    def __init__(self, name: str, changed: Sequence[str]) -> None:
+        super().__init__(
+            f"{name}: the action depends on values that forward keeps from step to step: {', '.join(changed)}; take them as "
+            "inputs. States of LSTM and GRU layers are kept, as tensors of a module or with states="
+        )
+        self.changed = changed
 
 
 class Source:
@@ -118,6 +124,54 @@ class Source:
                 return f"the example has {given} values; the module takes {length}" if length != given else None
         return None
 
+    def policy(self, output: Optional[str], states: Sequence[Tuple[str, str]], observe: Sequence[str]) -> Policy:
+        """Imports the module, and compares it with the policy."""
+        with warnings.catch_warnings(record=True) as caught, silenced():
+            # A filter of the caller must not turn them into exceptions.
+            warnings.simplefilter("always")
+            content = self.onnx_bytes()
+        # Torch exports the name without saying so.
+        tracer: Any = torch.jit
+        branches = [warning for warning in caught if issubclass(warning.category, tracer.TracerWarning)]
+        try:
+            policy, self.plan = _actq.import_onnx(
+                content, name=self.name, output=output, states=list(states), observe=observe
+            )
+        except Error as error:
+            changed = self.kept_values()
+            raise (Memory(self.name, changed) if changed else error) from error.__cause__
+        self.compare(self.plan, branches)
+        return policy
+
+    def policy_with_states(
+        self, changed: Sequence[str], output: Optional[str], states: Sequence[Tuple[str, str]], observe: Sequence[str]
+    ) -> Optional[Policy]:
+        """Imports a module that keeps the states of its cells by itself, if these are all that it keeps."""
+        used = self.copied()
+        found = list(tensors(used(*self.inputs), "output", self.name))
+        kept = kept_tensors(used, changed)
+        if not kept or isinstance(used, _sb3.Deterministic):
+            return None
+        held = tuple(torch.zeros_like(value) for values in kept.values() for value in values)
+        inputs = self.input_names or ["input_0"]
+        outputs = self.output_names or [name for name, _ in found]
+        pairs = [(f"{STATE}{i}", f"next_{STATE}{i}") for i in range(len(held))]
+        module = Stateless(used, {name: len(values) for name, values in kept.items()}, self.name)
+        carried = Source(
+            module,
+            (*self.inputs, *held),
+            self.name,
+            [*inputs, *(before for before, _ in pairs)],
+            [*outputs, *(after for _, after in pairs)],
+        )
+        try:
+            policy = carried.policy(output, [*states, *pairs], observe)
+        except Error:
+            return None
+        # The module itself, from its own first states.
+        found = self.run(self.copied(), carried.plan, carried.plan["probes"])
+        return policy if share(carried.plan["actions"] - found, found) <= TOLERANCE else None
+
     def onnx_bytes(self) -> bytes:
         """Exports by the tracing exporter, which needs only torch, else by that of torch.export, which knows more
         operators."""
@@ -143,7 +197,8 @@ class Source:
         positions = {name: i for i, name in enumerate(self.input_names)}
         observed = [(positions.get(name, 0), length) for name, length in plan["inputs"]]
         which = self.output_names.index(plan["output"]) if self.output_names else 0
-        carried = [(positions[of], self.output_names.index(to)) for of, to in plan["states"]]
+        # A module that keeps its states by itself has no inputs for them.
+        carried = [(positions[of], self.output_names.index(to)) for of, to in plan["states"] if of in positions]
         held = list(self.inputs)
         for i, _ in carried:
             held[i] = torch.zeros_like(held[i])
@@ -178,9 +233,9 @@ class Source:
         error = share(actions - found, found)
         traced = [warning for warning in branches if f"{torch.__path__[0]}/" not in warning.filename]
         if error > TOLERANCE and not self._is_rounding(plan, found):
-            raise Error(f"{self.name}: {self._cause(plan, found, error, changed, traced)}")
+            raise Memory(self.name, changed) if changed else Error(f"{self.name}: {self._cause(plan, found, error, traced)}")
         if changed and depends_on(used, changed, lambda: self.run(used, plan, probes[:1]), found[:1], share):
-            raise Error(f"{self.name}: {memory(changed)}")
+            raise Memory(self.name, changed)
         for text in dict.fromkeys(map(branch, traced)):
             log.warning("%s: %s; no drawn observation shows a difference", self.name, text)
         still = [i for i in range(found.shape[-1]) if np.ptp(found[..., i]) == 0]
@@ -212,11 +267,7 @@ class Source:
             return False
         return bool((policy <= np.maximum(TOLERANCE * scale(found)[:, 0], ROUNDINGS * own)).all())
 
-    def _cause(
-        self, plan: Dict[str, Any], found: Array, error: float, changed: Sequence[str], traced: Sequence[warnings.WarningMessage]
-    ) -> str:
-        if changed:
-            return memory(changed)
+    def _cause(self, plan: Dict[str, Any], found: Array, error: float, traced: Sequence[warnings.WarningMessage]) -> str:
         if share(self.run(self.copied(), plan, plan["probes"]) - found, found) > 0:
             return (
                 "two runs of the module on the same observations differ, so it draws random numbers, or keeps values outside "
@@ -226,14 +277,6 @@ class Source:
         if traced:
             return f"{off}: {branch(traced[0])}; choose by torch.where, or pass a module of one branch"
         return f"{off}; forward computes outside of torch, or reads values from elsewhere, which an import makes constants"
-
-
-def memory(changed: Sequence[str]) -> str:
-    """Says where a module keeps values from step to step."""
-    return (
-        f"the action depends on values that forward keeps from step to step: {', '.join(changed)}; take them as inputs. States of "
-        "LSTM and GRU layers, returned as outputs, are kept with states="
-    )
 
 
 def branch(warning: warnings.WarningMessage) -> str:
@@ -274,6 +317,27 @@ COPIED_LEAF: Any = torch.Tensor.__deepcopy__
 def copied_tensor(tensor: torch.Tensor, memo: Dict[int, Any]) -> Any:
     """Copies a tensor. Those that forward has computed have a history of gradients, which torch's own method refuses."""
     return COPIED_LEAF(tensor, memo) if tensor.is_leaf else tensor.detach().clone()
+
+
+class Stateless(torch.nn.Module):
+    """A module that takes the tensors that it keeps as its last inputs, and returns them after its outputs."""
+
+    def __init__(self, module: Any, kept: Mapping[str, int], name: str) -> None:
+        super().__init__()
+        self.module, self.kept, self.name = module, kept, name
+
+    def forward(self, *inputs: torch.Tensor) -> Tensors:
+        at = len(inputs) - sum(self.kept.values())
+        given, held = inputs[:at], iter(inputs[at:])
+        for name, count in self.kept.items():
+            # The module may change them in place.
+            values = [next(held).clone() for _ in range(count)]
+            part, attribute = owner(self.module, name)
+            before = getattr(part, attribute)
+            setattr(part, attribute, type(before)(values) if isinstance(before, (tuple, list)) else values[0])
+        outputs = tuple(tensor for _, tensor in tensors(self.module(*given), "output", self.name))
+        after = kept_tensors(self.module, list(self.kept)).values()
+        return outputs + tuple(value for values in after for value in values)
 
 
 class Flat(torch.nn.Module):
