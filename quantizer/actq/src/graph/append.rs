@@ -24,10 +24,7 @@ impl Graph {
             let mut kind = node.kind.clone();
             kind.matrices_mut().into_iter().for_each(|matrix| *matrix = matrices[*matrix]);
             let inputs: Vec<ValueId> = node.inputs.iter().map(|value| values[*value]).collect();
-            // The debug text has every digit of every number.
-            let text = format!("{kind:?}");
-            let known =
-                self.nodes.iter().position(|known| known.inputs == inputs && format!("{:?}", known.kind) == text);
+            let known = self.nodes.iter().position(|known| known.inputs == inputs && known.kind == kind);
             values.push(match known {
                 Some(node) => node + 1,
                 None => self.add(kind, &inputs)?,

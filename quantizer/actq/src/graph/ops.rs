@@ -47,7 +47,7 @@ use crate::error::Result;
 macro_rules! operations {
     ($($(#[$doc:meta])* $name:ident),* $(,)?) => {
         /// Operation of a node; dereferences to its [`Operation`].
-        #[derive(Clone, Debug)]
+        #[derive(Clone, Debug, PartialEq)]
         pub enum NodeKind {
             $($(#[$doc])* $name($name),)*
         }

@@ -7,7 +7,7 @@ use crate::graph::operation::{Backward, Elements, Forward, NodeState, Operation,
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// A range of an input's elements.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
     /// First element.
     pub from: usize,
@@ -16,7 +16,7 @@ pub struct Span {
 }
 
 /// A part of each input, concatenated.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Concat(pub Vec<Span>);
 
 impl Operation for Concat {

@@ -11,7 +11,7 @@ use crate::graph::values::{ValueId, WeightMatrix};
 use crate::simd::wide;
 
 /// A function of every element.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pointwise(pub Function);
 
 impl Operation for Pointwise {

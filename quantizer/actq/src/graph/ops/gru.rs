@@ -15,7 +15,7 @@ use crate::graph::units::keep;
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// torch's GRU of one layer, one step; gates `[r z n]`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Gru {
     /// Length of the state.
     pub hidden: usize,

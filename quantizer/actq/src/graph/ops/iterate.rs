@@ -6,7 +6,7 @@ use crate::graph::operation::{Backward, Elements, Forward, NodeState, Operation,
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// The value that the network reads of the iterate of a flow or a diffusion process: noise at first.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Iterate {
     /// Values.
     pub len: usize,

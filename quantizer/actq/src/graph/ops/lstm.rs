@@ -16,7 +16,7 @@ use crate::graph::values::{ValueId, WeightMatrix};
 use crate::simd::wide;
 
 /// torch's LSTM of one layer, one step; gates `[i f g o]`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Lstm {
     /// Length of the state.
     pub hidden: usize,

@@ -11,7 +11,7 @@ use crate::numbers::positive;
 use crate::simd::wide;
 
 /// torch's LayerNorm: `(x - mean(x)) / sqrt(var(x) + eps) * weight + bias`
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LayerNorm {
     /// Weights.
     pub weight: Vec<f32>,
@@ -22,7 +22,7 @@ pub struct LayerNorm {
 }
 
 /// `x / sqrt(mean(x^2) + eps) * weight`
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RmsNorm {
     /// Weights.
     pub weight: Vec<f32>,

@@ -12,7 +12,7 @@ use crate::graph::values::{ValueId, WeightMatrix};
 use crate::numbers::limit;
 
 /// `clamp((clamp(x, ±pre_clip) - mean) * scale, ±clip)`
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Normalize {
     /// Means.
     pub mean: Vec<f32>,
@@ -97,7 +97,7 @@ impl Normalize {
 
 /// `(x - mean) * scale` of all values or of runs of them; the quantizer adds it before matrices whose columns it has
 /// scaled. The other values stay as they are.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Balance {
     /// Of the other values, the mean is 0 and the scale 1.
     normalize: Normalize,

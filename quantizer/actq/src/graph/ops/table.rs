@@ -8,7 +8,7 @@ use crate::graph::units::keep;
 use crate::graph::values::{ValueId, WeightMatrix};
 
 /// Constants that differ between denoising steps: the network's values of the time.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     /// One row per step, in order.
     pub rows: Vec<f32>,
