@@ -8,4 +8,4 @@ mod numbers;
 mod parts;
 
 pub use parts::Plan;
-pub(crate) use parts::{Arg, Feed, Planned, PlannedTarget, TickStep, ValueIndex, ValueOp, ValueSource};
+pub(crate) use parts::{Arg, Feed, Planned, PlannedOp, PlannedTarget, TickStep, ValueIndex, ValueSource};

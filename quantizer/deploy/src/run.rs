@@ -7,9 +7,9 @@ use actq::random::Random;
 use actq_kernels::math::ORIENTATION;
 
 use crate::clock::Phases;
-use crate::description::{End, Orientation, TargetKind};
+use crate::description::{End, Op, Orientation, TargetKind};
 use crate::history::Frames;
-use crate::plan::{Arg, Feed, Plan, PlannedTarget, TickStep, ValueOp, ValueSource};
+use crate::plan::{Arg, Feed, Plan, PlannedOp, PlannedTarget, TickStep, ValueSource};
 
 /// Values of a tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +64,7 @@ impl Runner {
         let clock = |source: &ValueSource| {
             if let ValueSource::Clock(clock, _) = source { Some(Phases::new(clock.clone())) } else { None }
         };
-        let frames = |step: &ValueOp| if let ValueOp::History(spec) = step { Some(Frames::new(*spec)) } else { None };
+        let frames = |step: &PlannedOp| if let Op::History(spec) = step { Some(Frames::new(*spec)) } else { None };
         let histories = |source: &ValueSource| match source {
             ValueSource::Value(_, steps) => steps.iter().map(frames).collect(),
             _ => Vec::new(),
@@ -226,7 +226,7 @@ fn norm(value: &[f64]) -> f64 {
 }
 
 /// Applies an operation that keeps no state.
-fn apply(step: &ValueOp, mut value: Vec<f64>, values: &[Vec<f64>]) -> Result<Vec<f64>> {
+fn apply(step: &PlannedOp, mut value: Vec<f64>, values: &[Vec<f64>]) -> Result<Vec<f64>> {
     let mut with = |arg: &Arg, f: fn(f64, f64) -> f64| {
         let other = match arg {
             Arg::Numbers(numbers) => numbers,
@@ -237,27 +237,27 @@ fn apply(step: &ValueOp, mut value: Vec<f64>, values: &[Vec<f64>]) -> Result<Vec
         }
     };
     match step {
-        ValueOp::Select(places) => return Ok(places.iter().map(|place| value[*place]).collect()),
-        ValueOp::Place(places) => {
+        Op::Select(places) => return Ok(places.iter().map(|place| value[*place]).collect()),
+        Op::Place(places) => {
             let mut placed = vec![0.0; value.len()];
             places.iter().zip(&value).for_each(|(place, x)| placed[*place] = *x);
             return Ok(placed);
         }
-        ValueOp::Add(arg) => with(arg, |x, y| x + y),
-        ValueOp::Subtract(arg) => with(arg, |x, y| x - y),
-        ValueOp::Scale(arg) => with(arg, |x, y| x * y),
-        ValueOp::Divide(arg) => with(arg, |x, y| x / y),
-        ValueOp::Clip([low, high]) => {
+        Op::Add(arg) => with(arg, |x, y| x + y),
+        Op::Subtract(arg) => with(arg, |x, y| x - y),
+        Op::Scale(arg) => with(arg, |x, y| x * y),
+        Op::Divide(arg) => with(arg, |x, y| x / y),
+        Op::Clip([low, high]) => {
             with(low, |x, y| if x < y { y } else { x });
             with(high, |x, y| if x > y { y } else { x });
         }
-        ValueOp::Wrap => value.iter_mut().for_each(|x| *x = (*x + PI).rem_euclid(2.0 * PI) - PI),
-        ValueOp::Sin => value.iter_mut().for_each(|x| *x = x.sin()),
-        ValueOp::Cos => value.iter_mut().for_each(|x| *x = x.cos()),
-        ValueOp::Norm => return Ok(vec![norm(&value)]),
-        ValueOp::Gravity(orientation) => return gravity(*orientation, &value),
+        Op::Wrap => value.iter_mut().for_each(|x| *x = (*x + PI).rem_euclid(2.0 * PI) - PI),
+        Op::Sin => value.iter_mut().for_each(|x| *x = x.sin()),
+        Op::Cos => value.iter_mut().for_each(|x| *x = x.cos()),
+        Op::Norm => return Ok(vec![norm(&value)]),
+        Op::Gravity(orientation) => return gravity(*orientation, &value),
         // A history has a state.
-        ValueOp::History(_) => {}
+        Op::History(_) => {}
     }
     Ok(value)
 }

@@ -11,7 +11,7 @@ use super::clock;
 use super::joined::{Joined, Output, Source, has_weights, part};
 use super::operations::{Operations, Phase, words};
 use crate::description::{Clock, End, TargetKind, When};
-use crate::plan::{Feed, Plan, PlannedTarget, ValueIndex, ValueOp, ValueSource};
+use crate::plan::{Feed, Plan, PlannedOp, PlannedTarget, ValueIndex, ValueSource};
 use crate::sources::Array;
 
 /// Makes the operations.
@@ -278,7 +278,7 @@ impl Compiler<'_> {
     }
 
     /// Returns the values that a step reads beside its own, each with `len` numbers.
-    fn operands(&mut self, step: &ValueOp, len: usize) -> Result<Vec<Slice>> {
+    fn operands(&mut self, step: &PlannedOp, len: usize) -> Result<Vec<Slice>> {
         let mut operands = Vec::new();
         for index in step.read_values() {
             let place = self.place(index)?;

@@ -8,8 +8,8 @@ use actq_kernels::image::OpKind;
 use actq_kernels::math::Function;
 
 use super::operations::{Operations, words};
-use crate::description::{Fill, First, History, Orientation};
-use crate::plan::{Arg, ValueOp};
+use crate::description::{Fill, First, History, Op, Orientation};
+use crate::plan::{Arg, PlannedOp};
 
 /// Adding this to a number below 2^22 and subtracting it again rounds to an integer.
 const ROUND: f32 = 12_582_912.0;
@@ -53,42 +53,42 @@ impl Chain {
     }
 
     /// Emits or notes an operation; `operands` are the values that it reads beside this one.
-    pub(super) fn step(&mut self, to: &mut Operations, step: &ValueOp, operands: &[Slice]) -> Result<()> {
+    pub(super) fn step(&mut self, to: &mut Operations, step: &PlannedOp, operands: &[Slice]) -> Result<()> {
         let len = self.len();
         match (step, operands) {
-            (ValueOp::Add(Arg::Numbers(numbers)), _) => {
+            (Op::Add(Arg::Numbers(numbers)), _) => {
                 self.shift(to, &numbers.iter().map(|number| -number).collect::<Vec<_>>());
             }
-            (ValueOp::Subtract(Arg::Numbers(numbers)), _) => self.shift(to, numbers),
-            (ValueOp::Scale(Arg::Numbers(numbers)), _) => self.scale(numbers),
-            (ValueOp::Divide(Arg::Numbers(numbers)), _) => {
+            (Op::Subtract(Arg::Numbers(numbers)), _) => self.shift(to, numbers),
+            (Op::Scale(Arg::Numbers(numbers)), _) => self.scale(numbers),
+            (Op::Divide(Arg::Numbers(numbers)), _) => {
                 self.scale(&numbers.iter().map(|number| 1.0 / number).collect::<Vec<_>>());
             }
-            (ValueOp::Add(_), [other]) => {
+            (Op::Add(_), [other]) => {
                 let value = self.make_writable(to);
                 to.with(OpKind::Add, value, *other);
             }
-            (ValueOp::Subtract(_), [other]) => {
+            (Op::Subtract(_), [other]) => {
                 let negative = to.times(*other, -1.0);
                 let value = self.make_writable(to);
                 to.with(OpKind::Add, value, negative);
             }
-            (ValueOp::Scale(_), [other]) => {
+            (Op::Scale(_), [other]) => {
                 let value = self.make_writable(to);
                 to.with(OpKind::Mul, value, *other);
             }
-            (ValueOp::Clip(limits), _) => self.clip(to, limits, operands),
-            (ValueOp::Select(places), _) => {
+            (Op::Clip(limits), _) => self.clip(to, limits, operands),
+            (Op::Select(places), _) => {
                 let value = self.flush(to);
                 self.replace(to.select(value, places));
             }
-            (ValueOp::Place(places), _) => {
+            (Op::Place(places), _) => {
                 let value = self.flush(to);
                 let mut from = vec![0; len];
                 places.iter().enumerate().for_each(|(i, place)| from[*place] = i);
                 self.replace(to.select(value, &from));
             }
-            (ValueOp::Wrap, _) => {
+            (Op::Wrap, _) => {
                 // x - tau * round(x / tau)
                 let (zero, one) = (vec![0.0; len], vec![1.0; len]);
                 let value = self.make_writable(to);
@@ -97,9 +97,9 @@ impl Chain {
                 let turns = to.normalize(turns, &vec![ROUND; len], &vec![-TAU; len], f32::INFINITY);
                 to.with(OpKind::Add, value, turns);
             }
-            (ValueOp::Sin, _) => self.function(to, Function::Sin),
-            (ValueOp::Cos, _) => self.function(to, Function::Cos),
-            (ValueOp::Norm, _) => {
+            (Op::Sin, _) => self.function(to, Function::Sin),
+            (Op::Cos, _) => self.function(to, Function::Cos),
+            (Op::Norm, _) => {
                 // The sum of x * x / |x|.
                 let value = self.flush(to);
                 let copy = to.writable_copy(value);
@@ -111,18 +111,18 @@ impl Chain {
                 }
                 self.replace(sum);
             }
-            (ValueOp::Gravity(orientation), _) => {
+            (Op::Gravity(orientation), _) => {
                 let value = self.flush(to);
                 let gravity = gravity(to, *orientation, value);
                 self.replace(gravity);
             }
-            (ValueOp::History(history), _) => {
+            (Op::History(history), _) => {
                 let value = self.flush(to);
                 let frames = frames(to, history, value);
                 self.replace(frames);
             }
-            (ValueOp::Divide(_), _) => bail!("an image cannot divide by a value; compute it in the application"),
-            (ValueOp::Add(_) | ValueOp::Subtract(_) | ValueOp::Scale(_), _) => bail!("an operand is missing"),
+            (Op::Divide(_), _) => bail!("an image cannot divide by a value; compute it in the application"),
+            (Op::Add(_) | Op::Subtract(_) | Op::Scale(_), _) => bail!("an operand is missing"),
         }
         Ok(())
     }

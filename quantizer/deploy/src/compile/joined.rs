@@ -5,7 +5,7 @@ use actq::graph::ops::{Concat, Span};
 use actq::graph::{Graph, ValueId};
 use actq_kernels::Kind;
 
-use crate::plan::{Feed, Plan, Planned, TickStep, ValueIndex, ValueOp, ValueSource};
+use crate::plan::{Feed, Plan, Planned, PlannedOp, TickStep, ValueIndex, ValueSource};
 use crate::sources::Part;
 
 /// An output: its network, and its number there.
@@ -126,7 +126,7 @@ fn depends(plan: &Plan) -> Result<Vec<bool>> {
             ValueSource::Input(_) | ValueSource::State(_) | ValueSource::Motion { .. } => false,
             ValueSource::Clock(_, of) => of.iter().any(|value| depends[*value]),
             ValueSource::Value(from, steps) => {
-                from.iter().copied().chain(steps.iter().flat_map(ValueOp::read_values)).any(|value| depends[value])
+                from.iter().copied().chain(steps.iter().flat_map(PlannedOp::read_values)).any(|value| depends[value])
             }
             ValueSource::Output(network, output) => {
                 let part = part(plan, (*network, *output))?;
@@ -176,7 +176,7 @@ impl Builder<'_> {
                 }
                 ValueSource::Clock(_, of) => read.extend(of),
                 ValueSource::Value(from, steps) => {
-                    read.extend(from.iter().copied().chain(steps.iter().flat_map(ValueOp::read_values)))
+                    read.extend(from.iter().copied().chain(steps.iter().flat_map(PlannedOp::read_values)))
                 }
                 _ => {}
             }

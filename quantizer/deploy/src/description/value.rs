@@ -49,24 +49,24 @@ pub enum Operand {
     Name(String),
 }
 
-/// An operation on a value.
+/// An operation on a value. A plan has places and operands that are looked up instead of named ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Op {
+pub enum Op<P = Order, A = Operand> {
     /// Takes the values of these joints, or at these places, in this order.
-    Select(Order),
+    Select(P),
     /// Puts the values where these joints, or places, are: the reverse of `select`.
-    Place(Order),
+    Place(P),
     /// Adds.
-    Add(Operand),
+    Add(A),
     /// Subtracts.
-    Subtract(Operand),
+    Subtract(A),
     /// Multiplies.
-    Scale(Operand),
+    Scale(A),
     /// Divides.
-    Divide(Operand),
+    Divide(A),
     /// Raises to the first operand, then lowers to the second, as `numpy.clip`.
-    Clip([Operand; 2]),
+    Clip([A; 2]),
     /// Wraps angles in rad to the interval from -pi to below pi.
     Wrap,
     /// Makes the direction of gravity in the body's frame of its orientation.

@@ -4,7 +4,7 @@ use actq::error::{Context as _, Result, bail, ensure};
 
 use super::builder::{Builder, MOST};
 use super::numbers::finite;
-use super::parts::{Arg, ValueIndex, ValueOp, ValueSource};
+use super::parts::{Arg, PlannedOp, ValueIndex, ValueSource};
 use crate::description::{Op, Operand, Order, Orientation, Value};
 use crate::label::Label;
 
@@ -40,7 +40,7 @@ impl Builder<'_> {
         self.add(&value.name, ValueSource::Value(from, steps), chain.labels, chain.joints)
     }
 
-    fn op(&mut self, op: &Op, chain: &mut Chain, name: &str, key: &str) -> Result<ValueOp> {
+    fn op(&mut self, op: &Op, chain: &mut Chain, name: &str, key: &str) -> Result<PlannedOp> {
         let len = chain.labels.len();
         let fresh = |len| crate::label::labels(name, len, None);
         Ok(match op {
@@ -48,7 +48,7 @@ impl Builder<'_> {
                 let places = self.places(order, chain.joints.as_deref(), len, key)?;
                 chain.labels = places.iter().map(|place| chain.labels[*place].clone()).collect();
                 chain.joints = if let Order::Joints(order) = order { Some(order.clone()) } else { None };
-                ValueOp::Select(places)
+                Op::Select(places)
             }
             Op::Place(order) => {
                 let places = match order {
@@ -70,17 +70,17 @@ impl Builder<'_> {
                 }
                 chain.labels = labels.into_iter().flatten().collect();
                 chain.joints = if let Order::Joints(order) = order { Some(order.clone()) } else { None };
-                ValueOp::Place(places)
+                Op::Place(places)
             }
-            Op::Add(operand) => ValueOp::Add(self.operand(operand, len, key)?),
-            Op::Subtract(operand) => ValueOp::Subtract(self.operand(operand, len, key)?),
-            Op::Scale(operand) => ValueOp::Scale(self.operand(operand, len, key)?),
+            Op::Add(operand) => Op::Add(self.operand(operand, len, key)?),
+            Op::Subtract(operand) => Op::Subtract(self.operand(operand, len, key)?),
+            Op::Scale(operand) => Op::Scale(self.operand(operand, len, key)?),
             Op::Divide(operand) => {
                 let arg = self.operand(operand, len, key)?;
                 if let Arg::Numbers(numbers) = &arg {
                     ensure!(!numbers.contains(&0.0), "{key}: it divides by 0");
                 }
-                ValueOp::Divide(arg)
+                Op::Divide(arg)
             }
             Op::Clip([low, high]) => {
                 let both = [self.operand(low, len, key)?, self.operand(high, len, key)?];
@@ -90,20 +90,20 @@ impl Builder<'_> {
                         bail!("{key}: clip = [{}, {}]; give the lowest number first", at(low, i), at(high, i));
                     }
                 }
-                ValueOp::Clip(both)
+                Op::Clip(both)
             }
-            Op::Wrap => ValueOp::Wrap,
-            Op::Sin => ValueOp::Sin,
-            Op::Cos => ValueOp::Cos,
+            Op::Wrap => Op::Wrap,
+            Op::Sin => Op::Sin,
+            Op::Cos => Op::Cos,
             Op::Norm => {
                 *chain = Chain { labels: fresh(1), joints: None };
-                ValueOp::Norm
+                Op::Norm
             }
             Op::Gravity(orientation) => {
                 let needed = if *orientation == Orientation::Rpy { 3 } else { 4 };
                 ensure!(len == needed, "{key}: an orientation has {needed} values; this value has {len}");
                 *chain = Chain { labels: fresh(3), joints: None };
-                ValueOp::Gravity(*orientation)
+                Op::Gravity(*orientation)
             }
             Op::History(history) => {
                 ensure!(history.length > 0 && history.stride > 0, "{key}: length and stride must be at least 1");
@@ -112,7 +112,7 @@ impl Builder<'_> {
                 let ages = crate::history::ages(history);
                 let aged = |age: &usize| chain.labels.iter().map(|label| label.older(*age)).collect::<Vec<_>>();
                 *chain = Chain { labels: ages.iter().flat_map(aged).collect(), joints: None };
-                ValueOp::History(*history)
+                Op::History(*history)
             }
         })
     }

@@ -1,6 +1,6 @@
 //! The parts of a plan.
 
-use crate::description::{Clock, End, History, Orientation, TargetKind};
+use crate::description::{Clock, End, Op, TargetKind};
 use crate::label::{Label, labels};
 use crate::sources::{Array, Compute};
 
@@ -18,7 +18,7 @@ pub(crate) enum ValueSource {
     /// A row of a table.
     Motion { rows: Array, lag: usize, end: End },
     /// Operations on these values, one after the other.
-    Value(Vec<ValueIndex>, Vec<ValueOp>),
+    Value(Vec<ValueIndex>, Vec<PlannedOp>),
     /// Output `1` of network `0`.
     Output(usize, usize),
 }
@@ -126,24 +126,10 @@ pub(crate) enum Arg {
     Value(ValueIndex),
 }
 
-/// An operation on a value.
-pub(crate) enum ValueOp {
-    Select(Vec<usize>),
-    Place(Vec<usize>),
-    Add(Arg),
-    Subtract(Arg),
-    Scale(Arg),
-    Divide(Arg),
-    Clip([Arg; 2]),
-    Wrap,
-    Gravity(Orientation),
-    Sin,
-    Cos,
-    Norm,
-    History(History),
-}
+/// An operation with its places and operands looked up.
+pub(crate) type PlannedOp = Op<Vec<usize>, Arg>;
 
-impl ValueOp {
+impl PlannedOp {
     /// Returns the values that it reads beside the one that it changes.
     pub(crate) fn read_values(&self) -> Vec<ValueIndex> {
         let args: &[Arg] = match self {
