@@ -8,6 +8,7 @@ use std::rc::Rc;
 
 use actq::data::arrays;
 use actq::error::{Context as _, Result, bail, ensure};
+use actq_onnx::{OnnxFile, Signature};
 
 use crate::archive::Archive;
 use crate::description::Network;
@@ -29,6 +30,8 @@ pub struct Bundle {
     files: Vec<String>,
     /// Archives, whose files have their paths in front.
     archives: Rc<BTreeMap<String, Archive>>,
+    /// Parsed ONNX files: several readers and each output of a network need the same one.
+    parsed: RefCell<BTreeMap<String, Rc<OnnxFile>>>,
     /// Networks by file and outputs, since reading one takes longer than running it.
     opened: RefCell<BTreeMap<(String, Vec<String>), OnnxNetwork>>,
 }
@@ -81,7 +84,13 @@ impl Bundle {
             }
         }
         files.sort();
-        Ok(Self { root: root.to_owned(), files, archives: Rc::new(archives), opened: RefCell::default() })
+        Ok(Self {
+            root: root.to_owned(),
+            files,
+            archives: Rc::new(archives),
+            parsed: RefCell::default(),
+            opened: RefCell::default(),
+        })
     }
 
     /// Returns the folder that paths start at.
@@ -144,6 +153,30 @@ impl Bundle {
         Ok(packed.unwrap_or_else(|| self.root.join(file)))
     }
 
+    /// Returns an ONNX file, which is parsed once.
+    ///
+    /// # Errors
+    ///
+    /// If it is missing, or is not ONNX.
+    pub fn onnx(&self, file: &str) -> Result<Rc<OnnxFile>> {
+        let path = self.path(file)?;
+        if let Some(parsed) = self.parsed.borrow().get(file) {
+            return Ok(parsed.clone());
+        }
+        let parsed = Rc::new(OnnxFile::read(&path)?);
+        self.parsed.borrow_mut().insert(file.to_owned(), parsed.clone());
+        Ok(parsed)
+    }
+
+    /// Returns the inputs, outputs and metadata of an ONNX file.
+    ///
+    /// # Errors
+    ///
+    /// If it is missing, or is not ONNX.
+    pub fn signature(&self, file: &str) -> Result<Signature> {
+        Ok(self.onnx(file)?.signature())
+    }
+
     /// Reads a text file.
     ///
     /// # Errors
@@ -171,7 +204,8 @@ impl Sources for Bundle {
         if let Some(opened) = self.opened.borrow().get(&key) {
             return Ok(Box::new(opened.clone()));
         }
-        let opened = OnnxNetwork::open(&self.path(&network.file)?, outputs)?;
+        let file = self.onnx(&network.file)?;
+        let opened = OnnxNetwork::open(&file, outputs)?;
         self.opened.borrow_mut().insert(key, opened.clone());
         Ok(Box::new(opened))
     }

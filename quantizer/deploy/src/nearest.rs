@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use actq_onnx::Signature;
-
 use crate::bundle::Bundle;
 use crate::document::Document;
 use crate::facts::Profile;
@@ -53,7 +51,7 @@ fn read(bundle: &Bundle, ending: &str) -> Vec<Document> {
     let files = endings.iter().flat_map(|ending| bundle.with_ending(ending)).take(MOST_FILES);
     let document = |file: &str| {
         if ending == "onnx" {
-            let signature = Signature::read(&bundle.path(file).ok()?).ok()?;
+            let signature = bundle.signature(file).ok()?;
             return Some(metadata_document(file, &signature.metadata));
         }
         Some(Document::of(file, Node::parse(&bundle.text(file).ok()?).ok()?.numbered()))

@@ -1,14 +1,13 @@
 //! Networks of ONNX files, in f32.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 use std::rc::Rc;
 
 use actq::contract::ActionContract;
 use actq::error::{Context as _, Result, ensure};
 use actq::graph::{Network, State, Weights, zero_state};
 use actq::policy::Policy;
-use actq_onnx::{Choice, Signature, import};
+use actq_onnx::{Choice, OnnxFile};
 
 use crate::sources::{Compute, Part};
 
@@ -38,15 +37,16 @@ struct Output {
 
 impl OnnxNetwork {
     /// Opens a file for these outputs.
-    pub(crate) fn open(path: &Path, outputs: &[String]) -> Result<Self> {
+    pub(crate) fn open(file: &OnnxFile, outputs: &[String]) -> Result<Self> {
+        let path = file.path();
         ensure!(!outputs.is_empty(), "nothing reads an output of it; remove it");
-        let signature = Signature::read(path)?;
+        let signature = file.signature();
         let mut lens = vec![None; signature.inputs.len()];
         let (mut opened, mut kept, mut guards) = (Vec::new(), Vec::new(), BTreeSet::new());
         for name in outputs {
             let read = |is_inner| -> Result<_> {
                 let choice = Choice { output: Some(name.clone()), is_fed: true, is_inner, ..Choice::default() };
-                let imported = import(path, &choice)?;
+                let imported = file.import(&choice)?;
                 let policy = Policy::of_files(path, [path, path], &imported.json, &imported.weights)?;
                 Ok((imported, Rc::new(policy)))
             };

@@ -17,5 +17,5 @@ mod states;
 mod values;
 
 pub use file::proto;
-pub use network::{Choice, Imported, Onnx, constant, data_files, import, import_bytes};
+pub use network::{Choice, Imported, Onnx, OnnxFile, data_files, import, import_bytes};
 pub use signature::Signature;

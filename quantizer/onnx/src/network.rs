@@ -26,6 +26,7 @@ use crate::file::model::Model;
 use crate::lower::lower;
 use crate::nodes::follow::Follower;
 use crate::patterns::simplify::simplify;
+use crate::signature::Signature;
 use crate::states::{Cells, Chosen, Output};
 use crate::values::elements::value;
 use crate::values::expr::{Exprs, Id};
@@ -68,26 +69,59 @@ pub struct Imported {
     pub faults: Vec<String>,
 }
 
-/// Imports an ONNX file. An error names the file, and the node if known.
-pub fn import(path: &Path, choice: &Choice) -> Result<Imported> {
-    let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let imported = Model::read(path).and_then(|model| import_model(&model, &name, choice));
-    imported.with_context(|| path.display().to_string())
+/// A parsed ONNX file. Its errors name the file.
+#[derive(Debug)]
+pub struct OnnxFile {
+    path: PathBuf,
+    model: Model,
 }
 
-/// Returns the values of an output that depends on no input; `None` if it depends on one.
-///
-/// # Errors
-///
-/// If the file cannot be read, or has no such output.
-pub fn constant(path: &Path, output: &str) -> Result<Option<Vec<f64>>> {
-    let value = || -> Result<Tensor> {
-        let model = Model::read(path)?;
-        Follower::new(&model).value(output)
-    };
-    let value = value().with_context(|| path.display().to_string())?;
-    let known = |element| if let Element::Known(number) = element { Some(number) } else { None };
-    Ok(value.elements().into_iter().map(known).collect())
+impl OnnxFile {
+    /// Reads and parses a file.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be read, or is not ONNX.
+    pub fn read(path: &Path) -> Result<Self> {
+        let model = Model::read(path).with_context(|| path.display().to_string())?;
+        Ok(Self { path: path.to_owned(), model })
+    }
+
+    /// Returns the path that it was read from.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Returns its inputs, outputs and metadata.
+    pub fn signature(&self) -> Signature {
+        Signature::of(&self.model)
+    }
+
+    /// Imports its network.
+    ///
+    /// # Errors
+    ///
+    /// If a part of it is not supported; names the node if known.
+    pub fn import(&self, choice: &Choice) -> Result<Imported> {
+        let name = self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        import_model(&self.model, &name, choice).with_context(|| self.path.display().to_string())
+    }
+
+    /// Returns the values of an output that depends on no input; `None` if it depends on one.
+    ///
+    /// # Errors
+    ///
+    /// If the file has no such output.
+    pub fn constant(&self, output: &str) -> Result<Option<Vec<f64>>> {
+        let value = Follower::new(&self.model).value(output).with_context(|| self.path.display().to_string())?;
+        let known = |element| if let Element::Known(number) = element { Some(number) } else { None };
+        Ok(value.elements().into_iter().map(known).collect())
+    }
+}
+
+/// Imports an ONNX file. An error names the file, and the node if known.
+pub fn import(path: &Path, choice: &Choice) -> Result<Imported> {
+    OnnxFile::read(path)?.import(choice)
 }
 
 /// Imports a file's bytes as [`import`] does, with external tensors from `folder`.

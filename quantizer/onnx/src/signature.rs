@@ -1,9 +1,6 @@
 //! The signature of a file: inputs, outputs and metadata of its graph.
 
 use std::collections::BTreeMap;
-use std::path::Path;
-
-use actq::error::{Context as _, Result};
 
 use crate::file::model::{Model, Port};
 
@@ -19,19 +16,13 @@ pub struct Signature {
 }
 
 impl Signature {
-    /// Reads a file.
-    ///
-    /// # Errors
-    ///
-    /// If it cannot be read, or is not ONNX.
-    pub fn read(path: &Path) -> Result<Self> {
-        let model = Model::read(path).with_context(|| path.display().to_string())?;
+    pub(crate) fn of(model: &Model) -> Self {
         let given = |port: &&Port| !model.graph.initializers.contains_key(&port.name);
-        Ok(Self {
+        Self {
             inputs: model.graph.inputs.iter().filter(given).map(named).collect(),
             outputs: model.graph.outputs.iter().map(named).collect(),
-            metadata: model.metadata,
-        })
+            metadata: model.metadata.clone(),
+        }
     }
 }
 

@@ -62,7 +62,7 @@ impl Family for Holosoma {
         let (mut networks, mut documents) = (Vec::new(), Vec::new());
         for file in bundle.with_ending("onnx") {
             // A file that is not ONNX decides nothing.
-            let Ok(Signature { metadata, .. }) = Signature::read(&bundle.path(file)?) else { continue };
+            let Ok(Signature { metadata, .. }) = bundle.signature(file) else { continue };
             if KEYS.iter().all(|key| metadata.contains_key(*key)) {
                 networks.push(file.to_owned());
                 documents.push(Document::of(&format!("{file} metadata"), Node { line: 1, data: parsed(metadata) }));
@@ -75,7 +75,7 @@ impl Family for Holosoma {
     fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
         let file = found.networks.first().context("there is no ONNX file")?;
         let metadata = found.documents.first().context("there are no metadata")?;
-        let signature = Signature::read(&bundle.path(file)?)?;
+        let signature = bundle.signature(file)?;
         let joints = joint_names(metadata)?;
         let gains = gains(metadata, joints.len())?;
         let n = joints.len();

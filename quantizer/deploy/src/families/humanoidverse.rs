@@ -12,7 +12,6 @@ mod terms;
 use std::path::Path;
 
 use actq::error::{Context as _, Result, bail, ensure};
-use actq_onnx::Signature;
 
 use self::reader::Reader;
 use self::robot::Robot;
@@ -102,7 +101,7 @@ impl Family for Humanoidverse {
 
 /// Reads the observation's input and the action's output of a network.
 fn ports(bundle: &Bundle, file: &str) -> Result<Ports> {
-    let signature = Signature::read(&bundle.path(file)?)?;
+    let signature = bundle.signature(file)?;
     let input = match &signature.inputs[..] {
         [one] => Some(one),
         several => several.iter().find(|(name, _)| name == "actor_obs"),

@@ -13,7 +13,6 @@ use std::collections::BTreeMap;
 
 use actq::error::{Context as _, Result, bail};
 use actq::text::printable;
-use actq_onnx::Signature;
 
 use self::agent::Agent;
 use self::describe::Builder;
@@ -84,7 +83,7 @@ impl Family for IsaacLab {
                 several => bail!("{}: which of {} is its policy? Call it policy.onnx", first.file, several.join(", ")),
             },
         };
-        let signature = Signature::read(&bundle.path(network)?)?;
+        let signature = bundle.signature(network)?;
         if signature.metadata.contains_key(JOINT_NAMES) {
             documents.push(metadata_document(network, &signature.metadata));
         }
@@ -97,7 +96,7 @@ impl Family for IsaacLab {
 
     fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
         let file = &found.networks[0];
-        let signature = Signature::read(&bundle.path(file)?)?;
+        let signature = bundle.signature(file)?;
         let graph = Graph::of(file, &signature)?;
         let find = |is_one: fn(&Document) -> bool| found.documents.iter().find(|document| is_one(document));
         let (exported, environment) = (find(descriptors::is_one), find(environment::is_one));

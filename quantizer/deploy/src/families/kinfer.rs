@@ -11,7 +11,6 @@ use std::collections::BTreeMap;
 
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
-use actq_onnx::Signature;
 
 use self::graph::{Graph, Outputs};
 use self::inputs::inputs;
@@ -44,7 +43,7 @@ impl Family for Kinfer {
         if files.is_empty() {
             // Files of other families that cannot be read are their readers' concern.
             let of_family = |file: &&str| {
-                let signature = bundle.path(file).and_then(|path| Signature::read(&path));
+                let signature = bundle.signature(file);
                 signature.is_ok_and(|signature| signature.metadata.contains_key(KEY))
             };
             files = bundle.with_ending("onnx").filter(of_family).collect();
@@ -57,7 +56,7 @@ impl Family for Kinfer {
         if let Some(found) = packed::recognize(bundle, file)? {
             return Ok(Some(found));
         }
-        let signature = Signature::read(&bundle.path(file)?)?;
+        let signature = bundle.signature(file)?;
         let mut others = Vec::new();
         for file in bundle.with_ending("xml") {
             if Robot::is_one(&bundle.text(file)?) {
@@ -73,7 +72,7 @@ impl Family for Kinfer {
         if file.ends_with(packed::STEP) {
             return packed::read(bundle, found, facts);
         }
-        let graph = Graph::of(file, Signature::read(&bundle.path(file)?)?)?;
+        let graph = Graph::of(file, bundle.signature(file)?)?;
         graph.check_names(meta)?;
         let (dt, decimation) = (meta.number("sim_dt")?, meta.number("sim_decimation")?);
         let period = dt * decimation;

@@ -1,7 +1,6 @@
 //! LimX's point-foot robots: `params.yaml`, an encoder of the history and a policy.
 
 use actq::error::{Context as _, Result, bail, ensure};
-use actq_onnx::Signature;
 
 use super::common::action::clip_to;
 use super::common::{Histories, Parts, count, given_gravity};
@@ -239,7 +238,7 @@ fn variant(networks: &[String], facts: &mut Facts) -> Result<String> {
 
 /// Returns the only input and output of a file.
 fn port(bundle: &Bundle, file: &str) -> Result<(String, String)> {
-    let signature = Signature::read(&bundle.path(file)?)?;
+    let signature = bundle.signature(file)?;
     match (&signature.inputs[..], &signature.outputs[..]) {
         ([(input, _)], [(output, _)]) => Ok((input.clone(), output.clone())),
         (inputs, outputs) => {

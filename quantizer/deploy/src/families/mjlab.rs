@@ -11,7 +11,6 @@ mod terms;
 
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
-use actq_onnx::Signature;
 
 use self::robot::Robot;
 use self::ros::{ROS_KEY, Ros, RosNode};
@@ -40,7 +39,7 @@ impl Family for Mjlab {
         let mut networks = Vec::new();
         for file in bundle.with_ending("onnx") {
             // A file that cannot be read is of no family, or its reader says why.
-            let Ok(signature) = Signature::read(&bundle.path(file)?) else { continue };
+            let Ok(signature) = bundle.signature(file) else { continue };
             if KEYS.iter().all(|key| signature.metadata.contains_key(*key)) {
                 networks.push((file, signature.metadata));
             }
@@ -85,7 +84,7 @@ impl Family for Mjlab {
 
     fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
         let (meta, file) = (&found.documents[0], &found.networks[0]);
-        let graph = Graph::of(file, &Signature::read(&bundle.path(file)?)?)?;
+        let graph = Graph::of(file, &bundle.signature(file)?)?;
         let node = match found.documents.get(1) {
             None => None,
             Some(yaml) => {

@@ -11,7 +11,6 @@ use std::path::Path;
 
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::{printable, quoted};
-use actq_onnx::Signature;
 
 use self::config::{Config, Section};
 use self::joints::Joints;
@@ -163,7 +162,7 @@ fn network(
 ) -> Result<()> {
     let (file, given) = config.model()?;
     require_network(bundle, config, &file, &given, observation)?;
-    let signature = Signature::read(&bundle.path(&file)?)?;
+    let signature = bundle.signature(&file)?;
     let [(input, takes)] = &signature.inputs[..] else {
         bail!("{file}: it has {} inputs, and the deploy code gives one", signature.inputs.len());
     };

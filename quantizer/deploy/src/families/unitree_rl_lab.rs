@@ -1,7 +1,6 @@
 //! unitree_rl_lab: `params/deploy.yaml` beside `exported/policy.onnx`.
 
 use actq::error::{Context as _, Result, bail, ensure};
-use actq_onnx::Signature;
 
 use super::common::{Histories, Parts, count, gravity};
 use crate::bundle::Bundle;
@@ -41,7 +40,7 @@ impl Family for UnitreeRlLab {
 
     fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
         let (yaml, file) = (&found.documents[0], &found.networks[0]);
-        let signature = Signature::read(&bundle.path(file)?)?;
+        let signature = bundle.signature(file)?;
         let mut parts = Parts::new("policy", 1.0 / yaml.number("step_dt")?);
         facts.note("rate_hz", yaml.location("step_dt"));
 

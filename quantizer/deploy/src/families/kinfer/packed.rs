@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
-use actq_onnx::{Signature, constant};
 
 use super::super::common::{Parts, check_names, counts, known, listed};
 use crate::bundle::Bundle;
@@ -39,7 +38,7 @@ pub(super) fn recognize(bundle: &Bundle, file: &str) -> Result<Option<Found>> {
 /// Makes the description.
 pub(super) fn read(bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
     let (meta, file) = (&found.documents[0], &found.networks[0]);
-    let signature = Signature::read(&bundle.path(file)?)?;
+    let signature = bundle.signature(file)?;
     let (inputs, outputs) = (known(file, &signature.inputs)?, known(file, &signature.outputs)?);
     let joints = meta.texts("joint_names")?;
     check_names(&joints, &meta.location("joint_names"))?;
@@ -113,12 +112,12 @@ fn expected(meta: &Document, input: &str, joints: usize) -> Result<usize> {
 
 /// Returns the first carry, which the other graph computes of nothing.
 fn initial(bundle: &Bundle, file: &str, len: usize) -> Result<Vec<f64>> {
-    let path = bundle.path(file)?;
-    let signature = Signature::read(&path)?;
+    let onnx = bundle.onnx(file)?;
+    let signature = onnx.signature();
     let ([], [(output, _)]) = (&signature.inputs[..], &signature.outputs[..]) else {
         bail!("{file}: it must have no input and one output, the first carry");
     };
-    let values = constant(&path, output)?.with_context(|| format!("{file}: its output is not constant"))?;
+    let values = onnx.constant(output)?.with_context(|| format!("{file}: its output is not constant"))?;
     ensure!(values.len() == len, "{file}: it gives {} values, and the carry has {len}", values.len());
     Ok(values)
 }

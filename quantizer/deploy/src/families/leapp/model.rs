@@ -4,7 +4,6 @@ use std::fs;
 
 use actq::error::{Context as _, Result, ensure};
 use actq::text::printable;
-use actq_onnx::Signature;
 use sha2::{Digest as _, Sha256};
 
 use crate::bundle::{Bundle, beside};
@@ -64,7 +63,7 @@ pub(super) fn models(bundle: &Bundle, yaml: &Document) -> Result<Vec<Model>> {
 fn model(bundle: &Bundle, yaml: &Document, name: String) -> Result<Model> {
     let path = format!("models.{name}");
     let file = network(bundle, yaml, &format!("{path}.parameters"))?;
-    let signature = Signature::read(&bundle.path(&file)?)?;
+    let signature = bundle.signature(&file)?;
     let ports = |what: &str, graph: &[(String, Option<usize>)]| -> Result<Vec<Port>> {
         let path = format!("{path}.{what}");
         let mut ports: Vec<Port> =

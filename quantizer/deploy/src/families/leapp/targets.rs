@@ -78,7 +78,7 @@ pub(super) fn gains(bundle: &Bundle, models: &[Model], pipeline: &Pipeline) -> R
             if port.kind != kind {
                 continue;
             }
-            let values = actq_onnx::constant(&bundle.path(&model.file)?, &port.graph);
+            let values = bundle.onnx(&model.file)?.constant(&port.graph);
             let values = values.with_context(|| port.at.clone())?.with_context(|| {
                 format!("{}: the policy computes this gain, and an image has fixed gains; export fixed ones", port.at)
             })?;

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::graph::NodeKind;
 use actq::text::printable;
-use actq_onnx::Signature;
 
 use super::super::common::{known, listed};
 use super::feature::Feature;
@@ -37,7 +36,7 @@ impl Graph {
             }
             _ => facts.choose_one_of("network", &files.iter().map(String::as_str).collect::<Vec<_>>())?,
         };
-        let signature = Signature::read(&bundle.path(&file)?)?;
+        let signature = bundle.signature(&file)?;
         let (inputs, outputs) = (known(&file, &signature.inputs)?, known(&file, &signature.outputs)?);
         let output = match &outputs[..] {
             [only] => Some(only),
