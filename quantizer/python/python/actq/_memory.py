@@ -37,7 +37,7 @@ def kept_tensors(module: Any, changed: Sequence[str]) -> Dict[str, List[torch.Te
 def owner(module: Any, name: str) -> Tuple[Any, str]:
     """Returns the submodule that has a value, and the value's name there."""
     at, _, attribute = name.rpartition(".")
-    return module.get_submodule(at), attribute
+    return dict(module.named_modules())[at], attribute
 
 
 def depends_on(

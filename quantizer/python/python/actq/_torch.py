@@ -150,7 +150,7 @@ class Source:
         used = self.copied()
         found = list(tensors(used(*self.inputs), "output", self.name))
         kept = kept_tensors(used, changed)
-        if not kept or isinstance(used, _sb3.Deterministic):
+        if not kept or isinstance(used, (_sb3.Deterministic, torch.jit.ScriptModule)):
             return None
         held = tuple(torch.zeros_like(value) for values in kept.values() for value in values)
         inputs = self.input_names or ["input_0"]
@@ -169,8 +169,8 @@ class Source:
         except Error:
             return None
         # The module itself, from its own first states.
-        found = self.run(self.copied(), carried.plan, carried.plan["probes"])
-        return policy if share(carried.plan["actions"] - found, found) <= TOLERANCE else None
+        actions = self.run(self.copied(), carried.plan, carried.plan["probes"])
+        return policy if share(carried.plan["actions"] - actions, actions) <= TOLERANCE else None
 
     def onnx_bytes(self) -> bytes:
         """Exports by the tracing exporter, which needs only torch, else by that of torch.export, which knows more
