@@ -8,99 +8,69 @@ use actq_boards::{Application, Target, root, target_dir};
 use actq_controller::Limits;
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, bail, ensure};
+use clap::Args;
 
 use crate::setup::{self, cargo};
 use crate::{PROFILE, limits};
 
-const USAGE: &str = "\
-Usage: cargo xtask firmware --board NAME [--image FILE.actq] [--limits LIMITS] [--features LIST] [--key HEX]
-                             --out FILE.elf
-       cargo xtask firmware --list
-
-  --board NAME       The board; --list shows them
-  --image FILE.actq  The image to build in; by default that of the UR3 policy at 3 bits
-  --limits LIMITS    The range of every axis, LOW:HIGH or LOW:HIGH:RATE (change in a second), or a file with a line for
-                     each axis. The stricter of these and the image's own limits hold; without either no axis may move
-  --features LIST    Features of firmware-demo: tick-8khz, foc, defmt-rtt, defmt-semihosting
-  --key HEX          The public key, as `actq keygen` prints it, that signs images; others are refused (feature signed)
-  --out FILE.elf     The ELF file, written whole or not at all";
-
 /// The request.
-#[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Options {
-    Help,
-    List,
-    Build {
-        target: Target,
-        image: Option<PathBuf>,
-        limits: Option<String>,
-        features: Option<String>,
-        key: Option<String>,
-        out: PathBuf,
-    },
+#[derive(Args, Debug, Default)]
+pub(crate) struct Options {
+    /// Show the boards
+    #[arg(long, exclusive = true)]
+    pub(crate) list: bool,
+    /// The board; --list shows them
+    #[arg(long, value_name = "NAME", value_parser = board, required_unless_present = "list")]
+    pub(crate) board: Option<Target>,
+    /// The image to build in; by default that of the UR3 policy at 3 bits
+    #[arg(long, value_name = "FILE.actq")]
+    pub(crate) image: Option<PathBuf>,
+    /// The range of every axis, LOW:HIGH or LOW:HIGH:RATE (change in a second), or a file with a line for each axis
+    ///
+    /// The stricter of these and the image's own limits hold; without either no axis may move.
+    #[arg(long)]
+    pub(crate) limits: Option<String>,
+    /// Features of firmware-demo: tick-8khz, foc, defmt-rtt, defmt-semihosting
+    #[arg(long, value_name = "LIST")]
+    pub(crate) features: Option<String>,
+    /// The public key, as `actq keygen` prints it, that signs images; others are refused (feature signed)
+    #[arg(long, value_name = "HEX", value_parser = key)]
+    pub(crate) key: Option<String>,
+    /// The ELF file, written whole or not at all
+    #[arg(long, value_name = "FILE.elf", required_unless_present = "list")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+fn board(name: &str) -> Result<Target, String> {
+    let known = || boards().map(|(target, _)| target.board().name).collect::<Vec<_>>().join(", ");
+    let target = boards().map(|(target, _)| target).find(|target| target.board().name == name);
+    target.ok_or_else(|| format!("unknown board; use one of {}", known()))
+}
+
+fn key(text: &str) -> Result<String, &'static str> {
+    let is_key = text.len() == 64 && text.bytes().all(|digit| digit.is_ascii_hexdigit());
+    is_key.then(|| text.to_owned()).ok_or("a key has the 64 hexadecimal digits that `actq keygen` prints")
 }
 
 impl Options {
-    /// Parses the words after `firmware`; an error is the text for the user.
-    pub(crate) fn parse(words: &[&str]) -> Result<Self, String> {
-        match words {
-            ["--help" | "-h"] => return Ok(Self::Help),
-            ["--list"] => return Ok(Self::List),
-            _ => {}
-        }
-        let wrong = |what: String| format!("error: {what}\n\n{USAGE}");
-        let (mut board, mut image, mut limits, mut features, mut key, mut out) = (None, None, None, None, None, None);
-        let mut words = words.iter();
-        while let Some(option) = words.next() {
-            let value = match *option {
-                "--board" => &mut board,
-                "--image" => &mut image,
-                "--limits" => &mut limits,
-                "--features" => &mut features,
-                "--key" => &mut key,
-                "--out" => &mut out,
-                other => return Err(wrong(format!("unknown option {other:?}"))),
-            };
-            let word = words.next().ok_or_else(|| wrong(format!("{option} needs a value")))?;
-            if value.replace(*word).is_some() {
-                return Err(wrong(format!("{option} is given twice")));
-            }
-        }
-        let board = board.ok_or_else(|| wrong("--board is missing".to_owned()))?;
-        let out = out.ok_or_else(|| wrong("--out is missing".to_owned()))?.into();
-        let known = || boards().map(|(target, _)| target.board().name).collect::<Vec<_>>().join(", ");
-        let target = boards().map(|(target, _)| target).find(|target| target.board().name == board);
-        let target = target.ok_or_else(|| format!("error: unknown board {board:?}; use one of {}", known()))?;
-        let is_key = |key: &str| key.len() == 64 && key.bytes().all(|digit| digit.is_ascii_hexdigit());
-        if key.is_some_and(|key| !is_key(key)) {
-            return Err(wrong("--key takes the 64 hexadecimal digits that `actq keygen` prints".to_owned()));
-        }
-        let [limits, features, key] = [limits, features, key].map(|value| value.map(str::to_owned));
-        Ok(Self::Build { target, image: image.map(PathBuf::from), limits, features, key, out })
-    }
-
     pub(crate) fn run(self) -> Result<()> {
-        match self {
-            Self::Help => println!("{USAGE}"),
-            Self::List => {
-                for (target, application) in boards() {
-                    println!("{:12} {:27} {}", target.board().name, target.triple(), application.about);
-                }
+        let Self { board: Some(target), image, limits, features, key, out: Some(out), .. } = self else {
+            for (target, application) in boards() {
+                println!("{:12} {:27} {}", target.board().name, target.triple(), application.about);
             }
-            Self::Build { target, image, limits, features, key, out } => {
-                let application = target.board().application.context("the board has no application")?;
-                check_out(&out, image.as_deref())?;
-                let limits = limits.as_deref().map_or(Ok(Vec::new()), limits::read)?;
-                let check = |image: &Path| check(image, &limits, application, target);
-                let given = image.as_deref().map(check).transpose()?;
-                setup::rust_target(target.triple())?;
-                let (image, has_around) = given.map_or_else(|| check(&example()?), Ok)?;
-                let features = [features.as_deref(), has_around.then_some("around")];
-                let elf = build(target, &image, &limits, &features, key.as_deref())?;
-                write(&out, &elf)?;
-                println!("{}: {} with {}", out.display(), target.board().name, image.display());
-            }
-        }
+            return Ok(());
+        };
+        let application = target.board().application.context("the board has no application")?;
+        check_out(&out, image.as_deref())?;
+        let limits = limits.as_deref().map_or(Ok(Vec::new()), limits::read)?;
+        let check = |image: &Path| check(image, &limits, application, target);
+        let given = image.as_deref().map(check).transpose()?;
+        setup::rust_target(target.triple())?;
+        let (image, has_around) = given.map_or_else(|| check(&example()?), Ok)?;
+        let features = [features.as_deref(), has_around.then_some("around")];
+        let elf = build(target, &image, &limits, &features, key.as_deref())?;
+        write(&out, &elf)?;
+        println!("{}: {} with {}", out.display(), target.board().name, image.display());
         Ok(())
     }
 }
@@ -236,33 +206,6 @@ fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn options_are_read_or_refused() {
-        let out = PathBuf::from("f.elf");
-        let build = |target, image: Option<&str>| {
-            let image = image.map(PathBuf::from);
-            Ok(Options::Build { target, image, limits: None, features: None, key: None, out: out.clone() })
-        };
-        assert_eq!(Options::parse(&["--list"]), Ok(Options::List));
-        assert_eq!(Options::parse(&["--board", "stm32f405", "--out", "f.elf"]), build(Target::F405, None));
-        let words = ["--out", "f.elf", "--image", "i.actq", "--board", "mps2-an386"];
-        assert_eq!(Options::parse(&words), build(Target::Fpu, Some("i.actq")));
-        for (words, expected) in [
-            (&["--board", "stm32f4", "--out", "f.elf"][..], "use one of mps2-an386, mps2-an505, mps2-an500, stm32f405"),
-            (&["--board", "microbit", "--out", "f.elf"], "unknown board \"microbit\""),
-            (&["--board", "stm32f405"], "--out is missing"),
-            (&["--out", "f.elf"], "--board is missing"),
-            (&["--board", "stm32f405", "--out", "f.elf", "--key", "12"], "--key takes the 64 hexadecimal digits"),
-            (&["--board"], "--board needs a value"),
-            (&["--limits", "-1:1", "--limits", "-1:1"], "--limits is given twice"),
-            (&["--board", "a", "--board", "b"], "--board is given twice"),
-            (&["--bord", "a"], "unknown option \"--bord\""),
-        ] {
-            let wrong = Options::parse(words).expect_err("refused");
-            assert!(wrong.contains(expected), "{words:?}: {wrong}");
-        }
-    }
 
     #[test]
     fn invalid_images_are_refused_by_name() {

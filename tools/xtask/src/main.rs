@@ -16,82 +16,142 @@ use std::process::ExitCode;
 
 use actq_boards::Target;
 use anyhow::{Context as _, Result, ensure};
+use clap::{Args, Parser, Subcommand};
 
 /// The profile of what these commands build for the host (see `Cargo.toml`).
 const PROFILE: &str = "checks";
 
-const USAGE: &str = "\
-Commands of the actq workspace. Usage: cargo xtask COMMAND
+/// Commands of the actq workspace
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
 
-  demo     Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show cost and success
-  bench    Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
-  budgets  Measure instructions, code, scratch and stack, and compare them with budgets.json
-  compare  Compare the quantizer's methods: held-out error, true bits, closed-loop success
-  descriptions
-           Compare the executions of random descriptions: in f64, as images in f32 and at 8 bits, in QEMU
-  firmware Build the motor controller for a board: --board NAME [--image F.actq] --out FILE.elf; --list shows the boards
-  faults   Drive an arm through the serial port of the controller in QEMU, with faults on the line
-  stack    Compute the maximum stack of the controller from the calls in its ELF file: --board NAME, or --elf FILE
-  fit      Measure the cost model's rates again (after every change of the kernels)
-  verify   Format, lints, tests, a smoke run in QEMU; with --all everything that CI checks
-  capi     Package the C interface: --target CORE --out DIR [--image F.actq] [--compact]
-  python   Build and test the Python package in a virtual environment; --optional with torch
-  doctor   Check and install the other commands' requirements: Rust targets and QEMU
+#[derive(Subcommand)]
+enum Command {
+    /// Format, lints, tests, a smoke run in QEMU
+    ///
+    /// Tests on policies outside this repository run if ACTQ_SHARED names their folder.
+    Verify {
+        /// Everything that CI checks: also the tests on every board in QEMU, those that learn for long, lints for every board,
+        /// documentation, budgets, faults on the line, ONNX files against tract, the Python package, 32-bit words, the
+        /// oldest compiler
+        #[arg(long)]
+        all: bool,
+    },
+    /// Check and install the other commands' requirements: Rust targets and QEMU
+    Doctor,
+    /// Build the motor controller for a board
+    Firmware(firmware::Options),
+    /// Build and test the Python package in a virtual environment below the target directory
+    ///
+    /// Runs its tests and checks its types. Needs Python 3.9 or later with venv: python3, or the interpreter that ACTQ_PYTHON
+    /// names.
+    Python(python::Options),
+    /// Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show cost and success
+    #[command(disable_help_flag = true)]
+    Demo(Words),
+    /// Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
+    #[command(disable_help_flag = true)]
+    Bench(Words),
+    /// Measure instructions, code, scratch and stack, and compare them with budgets.json
+    #[command(disable_help_flag = true)]
+    Budgets(Words),
+    /// Compare the quantizer's methods: held-out error, true bits, closed-loop success
+    #[command(disable_help_flag = true)]
+    Compare(Words),
+    /// Compare the executions of random descriptions: in f64, as images in f32 and at 8 bits, in QEMU
+    #[command(disable_help_flag = true)]
+    Descriptions(Words),
+    /// Drive an arm through the serial port of the controller in QEMU, with faults on the line
+    #[command(disable_help_flag = true)]
+    Faults(Words),
+    /// Compute the maximum stack of the controller from the calls in its ELF file
+    #[command(disable_help_flag = true)]
+    Stack(Words),
+    /// Measure the cost model's rates again (after every change of the kernels)
+    #[command(disable_help_flag = true)]
+    Fit(Words),
+    /// Package the C interface for a core
+    #[command(disable_help_flag = true)]
+    Capi(Words),
+}
 
-demo, verify, bench, budgets, capi, compare, descriptions, faults, fit, firmware, python and stack show their options with --help.";
+/// Arguments for the measuring program, which shows them with --help.
+#[derive(Args)]
+struct Words {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "OPTIONS")]
+    words: Vec<String>,
+}
 
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    // An error of the outer result is of the command line, one of the inner result of the work.
-    let outcome = match &words[..] {
-        ["verify", options @ ..] => verify::Options::parse(options).map(|options| options.run()),
-        ["doctor"] => Ok(setup::ensure(&Target::ALL).map(|()| println!("nothing is missing"))),
-        ["firmware", options @ ..] => firmware::Options::parse(options).map(|options| options.run()),
-        ["python", options @ ..] => python::Options::parse(options).map(|options| options.run()),
-        ["compare", ..] => Ok(measuring("actq-research", &words)),
-        ["capi", ..] => Ok(measure_for(Target::ALL.iter().copied(), &words)),
-        ["stack", ..] => Ok(measure_for(firmware::boards().map(|(target, _)| target), &words)),
-        ["demo" | "bench" | "descriptions" | "faults" | "fit", ..] => Ok(measure(&words, &[Target::Fpu])),
-        ["budgets", ..] => Ok(measure(&words, &[Target::Fpu, Target::M33])),
-        ["help" | "-h" | "--help"] => {
-            println!("{USAGE}");
-            Ok(Ok(()))
-        }
-        _ => Err(USAGE.to_owned()),
+    let outcome = match Cli::parse().command {
+        Command::Verify { all } => verify::run(all),
+        Command::Doctor => setup::ensure(&Target::ALL).map(|()| println!("nothing is missing")),
+        Command::Firmware(options) => options.run(),
+        Command::Python(options) => python::test(options),
+        Command::Compare(options) => measuring("actq-research", "compare", options),
+        Command::Capi(options) => measure_for(Target::ALL.iter().copied(), "capi", options),
+        Command::Stack(options) => measure_for(firmware::boards().map(|(target, _)| target), "stack", options),
+        Command::Demo(options) => measure(&[Target::Fpu], "demo", options),
+        Command::Bench(options) => measure(&[Target::Fpu], "bench", options),
+        Command::Descriptions(options) => measure(&[Target::Fpu], "descriptions", options),
+        Command::Faults(options) => measure(&[Target::Fpu], "faults", options),
+        Command::Fit(options) => measure(&[Target::Fpu], "fit", options),
+        Command::Budgets(options) => measure(&[Target::Fpu, Target::M33], "budgets", options),
     };
     match outcome {
-        Ok(Ok(())) => ExitCode::SUCCESS,
-        Ok(Err(error)) => {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
             eprintln!("\nerror: {error:#}");
             ExitCode::FAILURE
-        }
-        Err(wrong) => {
-            eprintln!("{wrong}");
-            ExitCode::from(2)
         }
     }
 }
 
 /// Installs the compiler's part for these targets, and runs a command of `actq-bench`.
-fn measure_for(mut targets: impl Iterator<Item = Target>, arguments: &[&str]) -> Result<()> {
+fn measure_for(mut targets: impl Iterator<Item = Target>, command: &str, options: Words) -> Result<()> {
     targets.try_for_each(|target| setup::rust_target(target.triple()))?;
-    measuring("actq-bench", arguments)
+    measuring("actq-bench", command, options)
 }
 
 /// Installs the requirements of these targets, and runs a command of `actq-bench` in QEMU.
-fn measure(arguments: &[&str], targets: &[Target]) -> Result<()> {
+fn measure(targets: &[Target], command: &str, options: Words) -> Result<()> {
     let boards: Vec<&str> = targets.iter().map(|target| target.board().name).collect();
-    println!("{}: on {} in QEMU", arguments[0], boards.join(" and "));
+    println!("{command}: on {} in QEMU", boards.join(" and "));
     setup::ensure(targets)?;
-    measuring("actq-bench", arguments)
+    measuring("actq-bench", command, options)
 }
 
 /// Builds the binary of a package and runs one of its commands.
-fn measuring(package: &str, arguments: &[&str]) -> Result<()> {
-    let mut command = setup::cargo();
-    command.args(["run", "--profile", PROFILE, "--package", package, "--"]).args(arguments);
+fn measuring(package: &str, command: &str, Words { words }: Words) -> Result<()> {
+    let mut cargo = setup::cargo();
+    cargo.args(["run", "--profile", PROFILE, "--package", package, "--", command]).args(words);
     println!("building {package}");
-    ensure!(command.status().context("cannot start cargo")?.success(), "{} failed", arguments[0]);
+    ensure!(cargo.status().context("cannot start cargo")?.success(), "{command} failed");
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_are_read_or_refused() {
+        let parse = |line: &str| Cli::try_parse_from(line.split(' ')).map(|_| ()).map_err(|error| error.to_string());
+        assert_eq!(parse("xtask demo --help"), Ok(()));
+        assert_eq!(parse("xtask firmware --list"), Ok(()));
+        assert_eq!(parse("xtask python --optional -- -k head"), Ok(()));
+        for (line, expected) in [
+            ("xtask firmware --board microbit --out f.elf", "use one of mps2-an386, mps2-an505, mps2-an500, stm32f405"),
+            ("xtask firmware --board stm32f405", "--out <FILE.elf>"),
+            ("xtask firmware --board stm32f405 --out f.elf --key 12", "64 hexadecimal digits"),
+            ("xtask verify --al", "--all"),
+        ] {
+            let error = parse(line).expect_err(line);
+            assert!(error.contains(expected), "{line}: {error}");
+        }
+    }
 }

@@ -6,18 +6,10 @@ use std::process::{Command, Stdio};
 
 use actq_boards::{Clock, Target, root, target_dir, version};
 use anyhow::{Context as _, Result, ensure};
+use clap::Args;
 
 use crate::setup::cargo;
 use crate::{PROFILE, firmware};
-
-const USAGE: &str = "\
-Usage: cargo xtask python [--optional] [-- PYTEST...]
-
-Makes a virtual environment below the target directory, builds and installs the Python package, runs its tests, and checks
-its types. Needs Python 3.9 or later with venv: python3, or the interpreter that ACTQ_PYTHON names.
-
-  --optional  Also install torch, Stable-Baselines3 and Ray, and run the tests that need them
-  PYTEST...   Arguments for pytest, as -k head";
 
 /// The oldest supported version of Python.
 const OLDEST: [u32; 2] = [3, 9];
@@ -31,37 +23,14 @@ const BOARD: &str = "mps2-an386";
 const LIMITS: &str = "-3:3";
 
 /// The request.
-#[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Options {
-    Help,
-    Test { optional: bool, pytest: Vec<String> },
-}
-
-impl Options {
-    /// Parses the words after `python`; an error is the text for the user.
-    pub(crate) fn parse(words: &[&str]) -> Result<Self, String> {
-        let (own, pytest) = match words.iter().position(|word| *word == "--") {
-            Some(at) => (&words[..at], &words[at + 1..]),
-            None => (words, &[][..]),
-        };
-        let pytest = pytest.iter().map(|word| (*word).to_owned()).collect();
-        match own {
-            [] => Ok(Self::Test { optional: false, pytest }),
-            ["--optional"] => Ok(Self::Test { optional: true, pytest }),
-            ["--help" | "-h"] => Ok(Self::Help),
-            _ => Err(format!("error: unknown options {}\n\n{USAGE}", own.join(" "))),
-        }
-    }
-
-    pub(crate) fn run(self) -> Result<()> {
-        match self {
-            Self::Help => {
-                println!("{USAGE}");
-                Ok(())
-            }
-            Self::Test { optional, pytest } => test(optional, &pytest),
-        }
-    }
+#[derive(Args)]
+pub(crate) struct Options {
+    /// Also install torch, Stable-Baselines3 and Ray, and run the tests that need them
+    #[arg(long)]
+    optional: bool,
+    /// Arguments for pytest, as -k head
+    #[arg(last = true)]
+    pytest: Vec<String>,
 }
 
 /// Returns the interpreter; an error tells why there is none.
@@ -80,7 +49,8 @@ pub(crate) fn interpreter() -> Result<PathBuf, String> {
     }
 }
 
-fn test(optional: bool, pytest: &[String]) -> Result<()> {
+/// Installs and tests the package.
+pub(crate) fn test(Options { optional, pytest }: Options) -> Result<()> {
     let package = root().join(PACKAGE);
     let python = environment(&package, optional)?;
     // With the measuring library, both share what the tests have built.
@@ -108,9 +78,8 @@ fn controller() -> Result<Option<String>> {
         return Ok(None);
     };
     let elf = target_dir().join("python/controller.elf");
-    let out = elf.display().to_string();
-    let words = ["--board", BOARD, "--limits", LIMITS, "--out", &out];
-    firmware::Options::parse(&words).map_err(anyhow::Error::msg)?.run()?;
+    let (limits, out) = (Some(LIMITS.to_owned()), Some(elf.clone()));
+    firmware::Options { board: Some(board), limits, out, ..firmware::Options::default() }.run()?;
     let command = board.run_with_serial(&elf, "unix:{socket},server=on,wait=off", Clock::Host);
     let words = [command.get_program()].into_iter().chain(command.get_args());
     Ok(Some(words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join("\n")))
@@ -145,20 +114,4 @@ fn run(command: &mut Command) -> Result<()> {
     let status = command.stdin(Stdio::null()).status().with_context(|| format!("cannot start {text}"))?;
     ensure!(status.success(), "failed: {text}");
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn options_are_read_or_refused() {
-        assert_eq!(Options::parse(&[]), Ok(Options::Test { optional: false, pytest: Vec::new() }));
-        let pytest = vec!["-k".to_owned(), "head".to_owned()];
-        assert_eq!(Options::parse(&["--optional", "--", "-k", "head"]), Ok(Options::Test { optional: true, pytest }));
-        assert_eq!(Options::parse(&["-h"]), Ok(Options::Help));
-        assert!(
-            Options::parse(&["-k"]).is_err_and(|text| text.contains("unknown options -k") && text.contains("Usage"))
-        );
-    }
 }

@@ -13,17 +13,6 @@ use anyhow::{Context as _, Error, Result, anyhow, bail};
 use self::steps::{Installed, Step};
 use crate::setup;
 
-const USAGE: &str = "\
-Usage: cargo verify [--all]
-
-Checks formatting and lints, runs the host tests, and runs a policy and the motor controller on a Cortex-M4 in QEMU.
-
-  --all  Everything that CI checks: also the tests on every board in QEMU, those that learn for long, lints for every board,
-         documentation, budgets, faults on the line, ONNX files against tract, the Python package, 32-bit words,
-         the oldest compiler
-
-Tests on policies outside this repository run if ACTQ_SHARED names their folder.";
-
 /// Expected minutes from a fresh clone with an empty target directory on two idle cores, by
 /// `docs/records/2026-11-26-verify.md`, on a slow machine. No check fails when a run takes longer.
 struct Expected {
@@ -34,45 +23,16 @@ struct Expected {
 const SHORT: Expected = Expected { wall: 10.0, cpu: 17.0 };
 const ALL: Expected = Expected { wall: 30.0, cpu: 46.0 };
 
-/// The extent of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Options {
-    Help,
-    Short,
-    All,
-}
-
-impl Options {
-    /// Parses the words after `verify`; an error is the text for the user.
-    pub(crate) fn parse(words: &[&str]) -> Result<Self, String> {
-        match words {
-            [] => Ok(Self::Short),
-            ["--all"] => Ok(Self::All),
-            ["--help" | "-h"] => Ok(Self::Help),
-            _ => Err(format!("error: unknown options {}\n\n{USAGE}", words.join(" "))),
-        }
-    }
-
-    pub(crate) fn run(self) -> Result<()> {
-        match self {
-            Self::Help => {
-                println!("{USAGE}");
-                Ok(())
-            }
-            Self::Short => {
-                setup(&[Target::Fpu], &SHORT)?;
-                verify(steps::short(), &SHORT)?;
-                println!("all checks passed; `cargo verify --all` runs the rest of what CI checks");
-                Ok(())
-            }
-            Self::All => {
-                setup(&Target::ALL, &ALL)?;
-                verify(steps::all(Installed::ensure()), &ALL)?;
-                println!("all checks passed");
-                Ok(())
-            }
-        }
-    }
+/// Runs the checks: those of every change, or all.
+pub(crate) fn run(all: bool) -> Result<()> {
+    let (targets, expected) = if all { (&Target::ALL[..], ALL) } else { (&[Target::Fpu][..], SHORT) };
+    println!("verify: about {} minutes from a fresh clone on two idle cores", expected.wall);
+    setup::components()?;
+    setup::ensure(targets)?;
+    let steps = if all { steps::all(Installed::ensure()) } else { steps::short() };
+    run_all(steps, &expected)?;
+    println!("all checks passed{}", if all { "" } else { "; `cargo verify --all` runs the rest of what CI checks" });
+    Ok(())
 }
 
 enum Outcome {
@@ -88,14 +48,8 @@ struct Done {
     seconds: f64,
 }
 
-fn setup(targets: &[Target], expected: &Expected) -> Result<()> {
-    println!("verify: about {} minutes from a fresh clone on two idle cores", expected.wall);
-    setup::components()?;
-    setup::ensure(targets)
-}
-
 /// Runs the steps; an error names the failed ones.
-fn verify(steps: Vec<Step>, expected: &Expected) -> Result<()> {
+fn run_all(steps: Vec<Step>, expected: &Expected) -> Result<()> {
     let start = Instant::now();
     // Tests write the names of skipped tests to this file.
     let skipped = std::env::temp_dir().join(format!("actq-skipped-{}", std::process::id()));
@@ -103,7 +57,7 @@ fn verify(steps: Vec<Step>, expected: &Expected) -> Result<()> {
     let mut done = thread::scope(|scope| {
         let (beside, others) = mpsc::channel::<(Step, String)>();
         let others = scope.spawn(move || {
-            others.into_iter().map(|(step, number)| run(step, &number, start)).collect::<Result<Vec<_>>>()
+            others.into_iter().map(|(step, number)| run_step(step, &number, start)).collect::<Result<Vec<_>>>()
         });
         let mut done = Vec::new();
         for (i, mut step) in steps.into_iter().enumerate() {
@@ -113,7 +67,7 @@ fn verify(steps: Vec<Step>, expected: &Expected) -> Result<()> {
             let number = format!("{}/{count}", i + 1);
             match step.is_beside {
                 true => beside.send((step, number)).context("the thread of other steps has ended")?,
-                false => done.push(run(step, &number, start)?),
+                false => done.push(run_step(step, &number, start)?),
             }
         }
         drop(beside);
@@ -129,7 +83,7 @@ fn verify(steps: Vec<Step>, expected: &Expected) -> Result<()> {
 /// Time between lines about a running step.
 const REPORT: Duration = Duration::from_secs(30);
 
-fn run(Step { name, command, is_beside }: Step, number: &str, start: Instant) -> Result<Done> {
+fn run_step(Step { name, command, is_beside }: Step, number: &str, start: Instant) -> Result<Done> {
     let begun = Instant::now();
     let outcome = match command {
         Ok(mut command) => {
@@ -222,14 +176,6 @@ fn summary(all: &[Done], tests: &str, start: Instant, expected: &Expected) -> Re
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn options_are_read_or_refused() {
-        assert_eq!(Options::parse(&[]), Ok(Options::Short));
-        assert_eq!(Options::parse(&["--all"]), Ok(Options::All));
-        assert_eq!(Options::parse(&["--help"]), Ok(Options::Help));
-        assert!(Options::parse(&["--al"]).is_err_and(|text| text.contains("--al\n") && text.contains("Usage")));
-    }
 
     #[test]
     fn the_short_run_is_part_of_all() {
