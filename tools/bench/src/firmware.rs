@@ -42,19 +42,21 @@ const STYLES: &str = "actq-firmware-styles";
 /// Its binaries: a head in a user's own firmware, each in another style.
 pub const STYLE_NAMES: [&str; 3] = ["bare", "rtic", "embassy"];
 
-/// The folders of the ELF files that this process has built, by name and target. Even with nothing to build, cargo
-/// takes a while to find out.
-static BUILT: Mutex<BTreeMap<(&str, Target), PathBuf>> = Mutex::new(BTreeMap::new());
+/// Packages with their binaries, features and targets.
+type Key = (&'static str, &'static str, &'static str, Target);
 
-/// Builds each name once for a target.
-fn build_once(what: &'static str, target: Target, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathBuf> {
+/// The folders of the ELF files that this process has built. Even with nothing to build, cargo takes a while to find out.
+static BUILT: Mutex<BTreeMap<Key, PathBuf>> = Mutex::new(BTreeMap::new());
+
+/// Builds a binary, or binaries that belong together, once.
+fn build_once(key: Key, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathBuf> {
     // A build that panicked has left nothing in the map.
     let mut built = BUILT.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    if let Some(folder) = built.get(&(what, target)) {
+    if let Some(folder) = built.get(&key) {
         return Ok(folder.clone());
     }
     let folder = build()?;
-    built.insert((what, target), folder.clone());
+    built.insert(key, folder.clone());
     Ok(folder)
 }
 
@@ -62,7 +64,7 @@ fn build_once(what: &'static str, target: Target, build: impl FnOnce() -> Result
 /// the path of the ELF file. Other images run from the slot.
 pub fn harness(target: Target) -> Result<PathBuf> {
     let build = || harness_in_folder(target, built_in()?);
-    Ok(build_once(HARNESS, target, build)?.join(HARNESS))
+    Ok(build_once((BENCH, HARNESS, "", target), build)?.join(HARNESS))
 }
 
 /// Builds the harness with `image` built in.
@@ -73,7 +75,7 @@ pub fn harness_with(target: Target, image: &Path) -> Result<PathBuf> {
 fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
     let image = fs::canonicalize(image).with_context(|| format!("cannot read {}", image.display()))?;
     let image = ("ACTQ_IMAGE", &*image.to_string_lossy());
-    build(BENCH, &[HARNESS], target.feature().unwrap_or_default(), &target_dir(), target, target.profile(), &[image])
+    build(BENCH, &[HARNESS], target.feature().unwrap_or_default(), target, target.profile(), &[image])
 }
 
 /// Builds the application for a target's board, with the image of [`harness`] and with more features, separated by
@@ -85,8 +87,7 @@ pub fn controller(target: Target, features: &'static str) -> Result<PathBuf> {
 /// Does the same as [`controller`] with the feature `signed` and a key's 64 hexadecimal digits, the same in every call.
 pub fn controller_of_key(target: Target, features: &'static str, key: &str) -> Result<PathBuf> {
     let build = || controller_in_folder(target, features, key, built_in()?);
-    let what = if features.is_empty() { CONTROLLER } else { features };
-    Ok(build_once(what, target, build)?.join(CONTROLLER))
+    Ok(build_once((APPLICATION, CONTROLLER, features, target), build)?.join(CONTROLLER))
 }
 
 /// Builds the application with `image` built in.
@@ -99,7 +100,7 @@ fn controller_in_folder(target: Target, features: &str, key: &str, image: &Path)
     let environment = [("ACTQ_IMAGE", &*image.to_string_lossy()), ("ACTQ_PUBLIC_KEY", key), ("DEFMT_LOG", "info")];
     let more = if features.is_empty() { String::new() } else { format!(",{features}") };
     let all = target.board().name.to_owned() + &more;
-    build(APPLICATION, &[CONTROLLER], &all, &target_dir(), target, target.profile(), &environment)
+    build(APPLICATION, &[CONTROLLER], &all, target, target.profile(), &environment)
 }
 
 /// Builds the programs of `firmware/styles` for their board, with the image of [`harness`], and returns the path of
@@ -108,24 +109,23 @@ pub fn style(name: &str) -> Result<PathBuf> {
     let target = Target::Fpu;
     let build = || {
         let image = built_in()?.to_string_lossy();
-        build(STYLES, &STYLE_NAMES, "", &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &image)])
+        build(STYLES, &STYLE_NAMES, "", target, target.profile(), &[("ACTQ_IMAGE", &image)])
     };
-    Ok(build_once(STYLES, target, build)?.join(name))
+    Ok(build_once((STYLES, "", "", target), build)?.join(name))
 }
 
-/// Builds the binaries of `firmware/bench` that run on a target's board, and returns the path of one's ELF file.
-pub fn binary(name: &str, target: Target) -> Result<PathBuf> {
+/// Builds a binary of `firmware/bench` that runs on a target's board, and returns the path of its ELF file.
+pub fn binary(name: &'static str, target: Target) -> Result<PathBuf> {
     let board = target.board();
     ensure!(board.binaries.contains(&name), "firmware {name} does not run on {}", board.name);
-    let features = target.feature().unwrap_or_default();
-    let build = || build(BENCH, board.binaries, features, &target_dir(), target, target.profile(), &[]);
-    Ok(build_once(BENCH, target, build)?.join(name))
+    let build = || build(BENCH, &[name], target.feature().unwrap_or_default(), target, target.profile(), &[]);
+    Ok(build_once((BENCH, name, "", target), build)?.join(name))
 }
 
 /// Does the same as [`binary`] with a profile of `Cargo.toml` that is not the target's own.
 pub fn binary_in(profile: &str, name: &str, target: Target) -> Result<PathBuf> {
     let features = target.feature().unwrap_or_default();
-    Ok(build(BENCH, &[name], features, &target_dir(), target, profile, &[])?.join(name))
+    Ok(build(BENCH, &[name], features, target, profile, &[])?.join(name))
 }
 
 /// Does the same as [`binary`] for a Cortex-M4 with the kernels' feature `compact` and the image of [`harness`].
@@ -134,21 +134,19 @@ pub fn compact_binary(name: &str) -> Result<PathBuf> {
     let build = || {
         let image = built_in()?.to_string_lossy();
         let binaries = ["bench", "golden", HARNESS];
-        build(BENCH, &binaries, "compact", &target_dir(), target, target.profile(), &[("ACTQ_IMAGE", &image)])
+        build(BENCH, &binaries, "compact", target, target.profile(), &[("ACTQ_IMAGE", &image)])
     };
-    Ok(build_once("compact", target, build)?.join(name))
+    Ok(build_once((BENCH, "", "compact", target), build)?.join(name))
 }
 
 /// Does the same as [`binary`] without the assembler (`ACTQ_BACKEND=portable`).
-pub fn portable_binary(name: &str, target: Target) -> Result<PathBuf> {
+pub fn portable_binary(name: &'static str, target: Target) -> Result<PathBuf> {
     if !target.has_assembler() {
         return binary(name, target);
     }
-    // In a folder of its own, so that builds of both kinds stay.
-    let folder = target_dir().join("portable");
+    // A profile that this target's other builds do not use, so that builds of both kinds stay.
     let features = target.feature().unwrap_or_default();
-    Ok(build(BENCH, &[name], features, &folder, target, "firmware-portable", &[("ACTQ_BACKEND", "portable")])?
-        .join(name))
+    Ok(build(BENCH, &[name], features, target, "firmware-portable", &[("ACTQ_BACKEND", "portable")])?.join(name))
 }
 
 /// Builds binaries of a package and returns the folder of their ELF files: a folder of the board and its features,
@@ -157,7 +155,6 @@ fn build(
     package: &str,
     binaries: &[&str],
     features: &str,
-    dir: &Path,
     target: Target,
     profile: &str,
     environment: &[(&str, &str)],
@@ -165,13 +162,11 @@ fn build(
     // Held until the files are where no other build replaces them.
     static BUILDING: Mutex<()> = Mutex::new(());
     let _building = BUILDING.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    let folder = dir.to_string_lossy();
     let mut arguments = vec!["--package", package, "--target", target.triple(), "--profile", profile];
-    arguments.extend(["--target-dir", &folder]);
     arguments.extend(["--features", features]);
     arguments.extend(binaries.iter().flat_map(|binary| ["--bin", binary]));
     cargo_build(&format!("{package} for {}", target.board().name), &arguments, environment)?;
-    let built = dir.join(target.triple()).join(profile);
+    let built = target_dir().join(target.triple()).join(profile);
     let own = built.join(if features.is_empty() { target.board().name } else { features });
     fs::create_dir_all(&own).with_context(|| format!("cannot create {}", own.display()))?;
     for binary in binaries {

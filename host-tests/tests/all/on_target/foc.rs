@@ -12,7 +12,7 @@ use actq_kernels::pace::cost::Cost;
 use anyhow::{Context as _, Result, ensure};
 
 /// The firmware's output, and the cost of its counted regions.
-fn counted(name: &str) -> Result<(String, Vec<Cost>)> {
+fn counted(name: &'static str) -> Result<(String, Vec<Cost>)> {
     let elf = firmware::binary(name, Target::Fpu)?;
     let (text, regions) = Counter::build()?.run(Target::Fpu, &elf, None, &[])?;
     let code = Code::read(&elf)?;
@@ -20,7 +20,7 @@ fn counted(name: &str) -> Result<(String, Vec<Cost>)> {
     Ok((text, regions.into_iter().map(cost).collect::<Result<_>>()?))
 }
 
-fn without_fpu(name: &str) -> Result<String> {
+fn without_fpu(name: &'static str) -> Result<String> {
     let elf = firmware::binary(name, Target::NoFpu)?;
     Ok(String::from_utf8(qemu::run(qemu::command_on(Target::NoFpu, &elf, None, "")?, &[])?.stdout)?)
 }
