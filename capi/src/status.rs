@@ -10,7 +10,8 @@ pub type ActqStatus = i32;
 
 macro_rules! codes {
     ($($(#[$doc:meta])* $name:ident = $code:literal, $text:literal;)*) => {
-        /// The status that a function returns. The numbers of errors stay the same in all versions.
+        /// The status that a function returns, other than an image's error, which has the number and the text of the kernels'
+        /// [`ImageError`]. The numbers of errors stay the same in all versions.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(i32)]
         pub enum Code {
@@ -36,72 +37,6 @@ codes! {
     Ok = 0, c"done";
     /// Not an error: the step is not ready; poll again.
     Pending = -1, c"the step is not ready; poll again";
-    /// The image: image is not aligned to 4 bytes.
-    ImageMisaligned = 1, c"image is not aligned to 4 bytes";
-    /// The image: image is shorter than its header.
-    ImageTooShort = 2, c"image is shorter than its header";
-    /// The image: not an actq image (magic differs).
-    ImageMagic = 3, c"not an actq image (magic differs)";
-    /// The image: image format version is not supported.
-    ImageVersion = 4, c"image format version is not supported";
-    /// The image: image was packed for another kernel layout; quantize again.
-    ImageLayout = 5, c"image was packed for another kernel layout; quantize again";
-    /// The image: image length differs from its header.
-    ImageLength = 6, c"image length differs from its header";
-    /// The image: image checksum differs: the image is damaged.
-    ImageChecksum = 7, c"image checksum differs: the image is damaged";
-    /// The image: a reserved field is not zero.
-    ImageReserved = 8, c"a reserved field is not zero";
-    /// The image: unknown policy kind.
-    ImageKind = 9, c"unknown policy kind";
-    /// The image: chunk and execute lengths disagree.
-    ImageChunk = 10, c"chunk and execute lengths disagree";
-    /// The image: a section lies outside the image, overlaps another or is out of order.
-    ImageSection = 11, c"a section lies outside the image, overlaps another or is out of order";
-    /// The image: regions of the arena do not follow each other, or the work area is too short.
-    ImageArena = 12, c"regions of the arena do not follow each other, or the work area is too short";
-    /// The image: regions of an operation overlap.
-    ImageOverlap = 13, c"regions of an operation overlap";
-    /// The image: an operation reads words that its step has not written.
-    ImageUnwritten = 14, c"an operation reads words that its step has not written";
-    /// The image: unknown operation.
-    ImageOp = 15, c"unknown operation";
-    /// The image: lengths of an operation disagree.
-    ImageShape = 16, c"lengths of an operation disagree";
-    /// The image: an operation names no matrix of the image.
-    ImageMatrix = 17, c"an operation names no matrix of the image";
-    /// The image: weight width is not 2, 3, 4 or 8 bits.
-    ImageWidth = 18, c"weight width is not 2, 3, 4 or 8 bits";
-    /// The image: lanes of a block differ from those of its matrix's activations and group size.
-    ImageLanes = 19, c"lanes of a block differ from those of its matrix's activations and group size";
-    /// The image: group size is not 0, 32, 64 or 128.
-    ImageGroup = 20, c"group size is not 0, 32, 64 or 128";
-    /// The image: the output of a row is out of range or belongs to two rows.
-    ImageIndex = 21, c"the output of a row is out of range or belongs to two rows";
-    /// The image: a constant is not finite or has the wrong sign.
-    ImageConstant = 22, c"a constant is not finite or has the wrong sign";
-    /// The image: a row can overflow its int32 accumulator.
-    ImageOverflow = 23, c"a row can overflow its int32 accumulator";
-    /// The image: action limits are reversed.
-    ImageLimits = 24, c"action limits are reversed";
-    /// The image: policy name is not UTF-8 or holds control characters.
-    ImageName = 25, c"policy name is not UTF-8 or holds control characters";
-    /// The image: the self-test vector has no steps.
-    ImageSelfTest = 26, c"the self-test vector has no steps";
-    /// The image: denoising steps, their operations and their noise disagree.
-    ImageDenoising = 27, c"denoising steps, their operations and their noise disagree";
-    /// The image: horizon, overlap, deadline, chunk and execute lengths disagree.
-    ImagePlayback = 28, c"horizon, overlap, deadline, chunk and execute lengths disagree";
-    /// The image: binarization lacks one of its four arrays, or its thresholds are reversed.
-    ImageBinarise = 29, c"binarization lacks one of its four arrays, or its thresholds are reversed";
-    /// The image: a smoothing coefficient is not above 0 and at most 1.
-    ImageSmoothing = 30, c"a smoothing coefficient is not above 0 and at most 1";
-    /// The image: sizes, indices or limits of an operation around the network do not fit.
-    ImageAround = 31, c"sizes, indices or limits of an operation around the network do not fit";
-    /// The image: raw inputs or targets have impossible lengths, names, kinds or ranges.
-    ImagePorts = 32, c"raw inputs or targets have impossible lengths, names, kinds or ranges";
-    /// The image: it needs a feature of the kernels that this build leaves out.
-    ImageLeftOut = 33, c"the image needs a feature of the kernels that this build leaves out; actq inspect lists them";
     /// Too few words of scratch memory.
     ScratchTooSmall = 64, c"scratch memory is too small for the image";
     /// The length differs from that of the image's state.
@@ -203,9 +138,38 @@ pub(crate) fn status(outcome: Result<(), Failure>) -> ActqStatus {
     outcome.err().map_or(0, |failure| failure.0.get())
 }
 
+/// The texts of the errors of an image, by number, each with a zero at its end.
+static IMAGE_TEXTS: [u8; IMAGE_TEXTS_LEN] = {
+    let (mut texts, mut at, mut i) = ([0; IMAGE_TEXTS_LEN], 0, 0);
+    while i < ImageError::ALL.len() {
+        let text = ImageError::ALL[i].text().as_bytes();
+        let mut j = 0;
+        while j < text.len() {
+            texts[at + j] = text[j];
+            j += 1;
+        }
+        at += text.len() + 1;
+        i += 1;
+    }
+    texts
+};
+const IMAGE_TEXTS_LEN: usize = {
+    let (mut len, mut i) = (0, 0);
+    while i < ImageError::ALL.len() {
+        assert!(ImageError::ALL[i].code() as usize == i + 1, "numbers are successive");
+        len += ImageError::ALL[i].text().len() + 1;
+        i += 1;
+    }
+    len
+};
+
 /// Returns a text for a status, as a string that ends in a zero; "unknown status" for any other number.
 #[unsafe(no_mangle)]
 pub extern "C" fn actq_status_text(status: ActqStatus) -> *const c_char {
+    let index = usize::try_from(status).unwrap_or(0).wrapping_sub(1);
+    if let Some(text) = IMAGE_TEXTS.split_inclusive(|byte| *byte == 0).nth(index) {
+        return text.as_ptr().cast();
+    }
     let known = Code::ALL.iter().find(|code| **code as ActqStatus == status);
     known.map_or(c"unknown status", |code| code.text()).as_ptr()
 }

@@ -4,22 +4,26 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use actq_c::Code;
+use actq_kernels::ImageError;
 
 /// Returns C's enumeration of the codes, which a macro declares: cbindgen does not expand macros.
 fn codes() -> String {
     let mut lines =
         "\n/** The status that a function returns. The numbers stay the same in all versions. */\nenum actq_code {\n"
             .to_owned();
-    for code in Code::ALL {
+    let own = |code: &Code| (format!("{code:?}"), *code as i32, code.text().to_str().expect("text"));
+    let of_image = |error: &ImageError| (format!("Image{error:?}"), error.code().into(), error.text());
+    let (first, others) = Code::ALL.split_at(2);
+    let all = first.iter().map(own).chain(ImageError::ALL.iter().map(of_image)).chain(others.iter().map(own));
+    for (camel, number, text) in all {
         let mut name = String::new();
-        for letter in format!("{code:?}").chars() {
+        for letter in camel.chars() {
             if letter.is_uppercase() {
                 name.push('_');
             }
             name.push(letter.to_ascii_uppercase());
         }
-        let text = code.text().to_str().expect("text");
-        let _ = writeln!(lines, "  /** {text} */\n  ACTQ{name} = {},", *code as i32);
+        let _ = writeln!(lines, "  /** {text} */\n  ACTQ{name} = {number},");
     }
     // Without a comma after the last one, as C90 and C++98 want it.
     lines.truncate(lines.len() - 2);

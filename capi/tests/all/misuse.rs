@@ -7,14 +7,25 @@ use actq_c::{
     actq_image_open_checksummed, actq_image_port, actq_image_sizes, actq_least_budget, actq_pass, actq_play, actq_poll,
     actq_reset, actq_restore, actq_save, actq_saved_bytes, actq_seed, actq_self_test, actq_set_input, actq_step,
 };
+use actq_kernels::ImageError;
 
 use super::{Aligned, BYTES, OK, Program};
 
+/// The number of a code, or of an error of the kernels.
+macro_rules! number {
+    ($code:ident) => {
+        Code::$code as i32
+    };
+    ($error:ident $code:ident) => {
+        i32::from($error::$code.code())
+    };
+}
+
 /// Checks the status of each call.
 macro_rules! gives {
-    ($($call:expr => $code:ident;)*) => {
+    ($($call:expr => $($code:ident)+;)*) => {
         // SAFETY: each pointer is null, or valid for its length.
-        $(assert_eq!(unsafe { $call }, Code::$code as i32, stringify!($call));)*
+        $(assert_eq!(unsafe { $call }, number!($($code)+), stringify!($call));)*
     };
 }
 
@@ -92,7 +103,7 @@ fn unopened_and_copied_structures_are_errors() {
     // A failed open closes what was open; so does a failed init.
     let (image, head) = (program.image(), program.head());
     gives! {
-        actq_image_open(image, BYTES.0.as_ptr(), 8) => ImageTooShort;
+        actq_image_open(image, BYTES.0.as_ptr(), 8) => ImageError TooShort;
         actq_image_cost(image, null_mut()) => NotInitialized;
         actq_head_init(head, image, program.scratch.as_mut_ptr(), program.scratch.len()) => NotInitialized;
         actq_step(head, o, obs, a, act) => NotInitialized;
@@ -234,11 +245,11 @@ fn damaged_images_and_infinite_values_are_errors() {
         actq_step(head, observation.as_ptr(), obs, action.as_mut_ptr(), act) => ObservationNotFinite;
         actq_set_input(image, c"velocity".as_ptr(), observation.as_ptr(), 1, action.as_mut_ptr(), act) => NoSuchPort;
         actq_set_input(image, null(), observation.as_ptr(), 1, action.as_mut_ptr(), act) => Null;
-        actq_image_open(image, damaged.0.as_ptr(), damaged.0.len()) => ImageChecksum;
-        actq_image_open_checksummed(image, damaged.0.as_ptr(), damaged.0.len()) => ImageChecksum;
-        actq_image_open_checksummed(image, BYTES.0.as_ptr(), 4) => ImageTooShort;
-        actq_image_open(image, BYTES.0.as_ptr().wrapping_add(1), BYTES.0.len() - 1) => ImageMisaligned;
-        actq_image_open(image, BYTES.0.as_ptr(), 4) => ImageTooShort;
+        actq_image_open(image, damaged.0.as_ptr(), damaged.0.len()) => ImageError Checksum;
+        actq_image_open_checksummed(image, damaged.0.as_ptr(), damaged.0.len()) => ImageError Checksum;
+        actq_image_open_checksummed(image, BYTES.0.as_ptr(), 4) => ImageError TooShort;
+        actq_image_open(image, BYTES.0.as_ptr().wrapping_add(1), BYTES.0.len() - 1) => ImageError Misaligned;
+        actq_image_open(image, BYTES.0.as_ptr(), 4) => ImageError TooShort;
     }
     assert!(action.iter().all(|value| *value == 7.0));
     // SAFETY: the pointers are valid.
