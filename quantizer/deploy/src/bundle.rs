@@ -32,6 +32,8 @@ pub struct Bundle {
     archives: Rc<BTreeMap<String, Archive>>,
     /// Parsed ONNX files: several readers and each output of a network need the same one.
     parsed: RefCell<BTreeMap<String, Rc<OnnxFile>>>,
+    /// Profile of the stack that it is of, if the user gives one.
+    profile: Option<Rc<str>>,
     /// Networks by file and outputs, since reading one takes longer than running it.
     opened: RefCell<BTreeMap<(String, Vec<String>), OnnxNetwork>>,
 }
@@ -89,8 +91,21 @@ impl Bundle {
             files,
             archives: Rc::new(archives),
             parsed: RefCell::default(),
+            profile: None,
             opened: RefCell::default(),
         })
+    }
+
+    /// Reads it as one of the stack that a profile describes, whose rules hold; see `docs/families/README.md`.
+    #[must_use]
+    pub fn with_profile(mut self, text: &str) -> Self {
+        self.profile = Some(text.into());
+        self
+    }
+
+    /// Returns the profile that the user gives.
+    pub(crate) fn profile(&self) -> Option<&str> {
+        self.profile.as_deref()
     }
 
     /// Returns the folder that paths start at.

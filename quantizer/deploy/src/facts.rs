@@ -9,6 +9,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use crate::document::{Document, fits};
+use crate::families::Schema;
 use crate::yaml::Node;
 
 /// Most places of a key that a question lists.
@@ -20,11 +21,14 @@ const MOST_PLACES: usize = 3;
 pub(crate) struct Profile {
     /// Name of the family.
     pub family: String,
-    /// Repository that the rules were read from.
+    /// Repository that the rules were read from; may be omitted for one's own.
+    #[serde(default)]
     pub upstream: String,
     /// Its commit.
+    #[serde(default)]
     pub commit: String,
     /// Releases that the rules and keys were read in.
+    #[serde(default)]
     pub versions: Vec<String>,
     /// Key of the files that states their version, and its values that were read.
     #[serde(default)]
@@ -34,6 +38,7 @@ pub(crate) struct Profile {
     pub marks: Vec<Mark>,
     /// Keys of the family's files that could change a number, with `*` for any text within a part of a path. One that
     /// nothing reads is a question.
+    #[serde(default = "every_key")]
     pub own: Vec<String>,
     /// Keys of the family's files that no deployment reads, with `*` for any part of a path.
     #[serde(default)]
@@ -41,6 +46,13 @@ pub(crate) struct Profile {
     /// The rules.
     #[serde(default, rename = "rule")]
     pub rules: Vec<Rule>,
+    /// The stack, if its reader is data.
+    #[serde(default)]
+    pub stack: Option<Schema>,
+}
+
+fn every_key() -> Vec<String> {
+    vec!["*".to_owned()]
 }
 
 /// Versions of a family's files.
@@ -85,7 +97,7 @@ impl Profile {
     ///
     /// If it is not one.
     pub(crate) fn parse(text: &str) -> Result<Self> {
-        toml::from_str(text).map_err(Error::other)
+        toml::from_str(text).map_err(|error| Error::input(error.to_string()))
     }
 }
 
@@ -221,6 +233,11 @@ impl Facts {
         }
     }
 
+    /// Returns the profile's value of a rule, which stands for the answer while the rule is a question.
+    pub(crate) fn suggested<T: DeserializeOwned>(&self, key: &str) -> Option<T> {
+        self.profile.rules.iter().find(|rule| rule.key == key)?.value.clone()?.try_into().ok()
+    }
+
     /// Returns `true` if a rule with choices has this one; `false` while it is a question.
     ///
     /// # Errors
@@ -338,7 +355,7 @@ impl Facts {
             let meaning = format!(
                 "nothing reads {}{more}, which could change a number; the family was read in {}. Does the deployment do without (\"unused\")?",
                 places[..places.len().min(MOST_PLACES)].join("; "),
-                profile.versions.join(", ")
+                if profile.versions.is_empty() { profile.family.clone() } else { profile.versions.join(", ") }
             );
             self.confirmed(&format!("unread.{name}"), &meaning, "unused")?;
         }

@@ -1,7 +1,7 @@
-//! The families that this crate reads. To add one, append it to [`FAMILIES`].
+//! The families that this crate reads. To add one, append it to [`FAMILIES`]: the text of a profile with a `[stack]` table,
+//! or a reader in code.
 
 mod common;
-mod holosoma;
 mod humanoidverse;
 mod isaaclab;
 mod kinfer;
@@ -10,19 +10,20 @@ mod lerobot;
 mod limx;
 mod mjlab;
 mod rl_sar;
+mod stack;
 mod tensors;
-mod unitree_rl_lab;
 
 pub(crate) use self::common::metadata_document;
+pub(crate) use self::stack::{Schema, Stack};
 use crate::family::Family;
 
 /// All families; the first that recognizes a bundle reads it.
 pub(crate) static FAMILIES: &[&dyn Family] = &[
     &limx::Limx,
-    &unitree_rl_lab::UnitreeRlLab,
+    &Stack(include_str!("families/unitree_rl_lab.toml")),
     &rl_sar::RlSar,
     &humanoidverse::Humanoidverse,
-    &holosoma::Holosoma,
+    &Stack(include_str!("families/holosoma.toml")),
     &kinfer::Kinfer,
     &leapp::Leapp,
     &isaaclab::IsaacLab,

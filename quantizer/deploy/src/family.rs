@@ -10,7 +10,7 @@ use crate::facts::Facts;
 /// A family: bundles that one exporter writes and one deploy code reads.
 pub(crate) trait Family: Sync {
     /// Returns its profile's text (TOML), whose `family` is its name.
-    fn profile(&self) -> &'static str;
+    fn profile(&self) -> &str;
 
     /// Finds the files that it reads in a bundle; `None` if the bundle is of another family.
     ///

@@ -7,7 +7,8 @@ use actq::error::{Context as _, Result, bail};
 use crate::bundle::Bundle;
 use crate::description::{Description, Numbers, Op, Operand};
 use crate::facts::{Answers, Facts, Profile, Question};
-use crate::families::FAMILIES;
+use crate::families::{FAMILIES, Stack};
+use crate::family::{Family, Found};
 use crate::nearest::nearest;
 
 /// File of a description, in a bundle's folder. Where it is, no reader is needed.
@@ -49,7 +50,20 @@ fn limit_clipped(description: &mut Description, facts: &mut Facts) {
     }
 }
 
-/// Reads a bundle by the first family that recognizes it.
+/// Reads a bundle as one of a family.
+fn read_as(family: &dyn Family, bundle: &Bundle, found: &Found, accepted: bool, answers: Answers) -> Result<Reading> {
+    let profile = Profile::parse(family.profile())?;
+    let (name, upstream) = (profile.family.clone(), [profile.upstream.clone(), profile.commit.clone()]);
+    let upstream = (!profile.upstream.is_empty()).then_some(upstream);
+    let mut facts = Facts::new(profile, accepted, answers);
+    let mut description = family.read(bundle, found, &mut facts).with_context(|| format!("{name} bundle"))?;
+    limit_clipped(&mut description, &mut facts);
+    let unread = facts.unread(&found.documents)?;
+    let (sources, questions) = facts.finish()?;
+    Ok(Reading { family: name, profile: upstream, description, sources, questions, unread })
+}
+
+/// Reads a bundle by its profile, or by the first family that recognizes it.
 ///
 /// `accepted`: the values of the family's profile hold. They are questions otherwise.
 ///
@@ -57,6 +71,16 @@ fn limit_clipped(description: &mut Description, facts: &mut Facts) {
 ///
 /// If no family recognizes it, or its reader fails.
 pub fn read(bundle: &Bundle, accepted: bool, answers: Answers) -> Result<Reading> {
+    if let Some(profile) = bundle.profile() {
+        let stack = Stack(profile);
+        let found = stack.recognize(bundle).context("the profile")?;
+        let found = found.with_context(|| {
+            let near = nearest(bundle, &Profile::parse(profile).into_iter().collect::<Vec<_>>());
+            let near = if near.is_empty() { "no file has its keys".to_owned() } else { near.join("; ") };
+            format!("{}: not a bundle of this profile: {near}", bundle.root().display())
+        })?;
+        return read_as(&stack, bundle, &found, true, answers);
+    }
     if bundle.has(DESCRIPTION) {
         if let Some(key) = answers.keys().next() {
             bail!("answers: nothing asks for {key}: {DESCRIPTION} describes this bundle; change it there");
@@ -66,15 +90,9 @@ pub fn read(bundle: &Bundle, accepted: bool, answers: Answers) -> Result<Reading
         return Ok(Reading { family: DESCRIPTION.to_owned(), profile: None, description, sources, questions, unread });
     }
     for family in FAMILIES {
-        let Some(found) = family.recognize(bundle)? else { continue };
-        let profile = Profile::parse(family.profile())?;
-        let (name, upstream) = (profile.family.clone(), [profile.upstream.clone(), profile.commit.clone()]);
-        let mut facts = Facts::new(profile, accepted, answers);
-        let mut description = family.read(bundle, &found, &mut facts).with_context(|| format!("{name} bundle"))?;
-        limit_clipped(&mut description, &mut facts);
-        let unread = facts.unread(&found.documents)?;
-        let (sources, questions) = facts.finish()?;
-        return Ok(Reading { family: name, profile: Some(upstream), description, sources, questions, unread });
+        if let Some(found) = family.recognize(bundle)? {
+            return read_as(*family, bundle, &found, accepted, answers);
+        }
     }
     let profiles: Vec<Profile> =
         FAMILIES.iter().map(|family| Profile::parse(family.profile())).collect::<Result<_>>()?;

@@ -51,6 +51,9 @@ pub(crate) struct ReadingArgs {
     /// Bundle: accept what the family's deploy code says where the files say nothing
     #[arg(long)]
     pub(crate) accept_profile: bool,
+    /// Bundle: the profile of your own deploy stack, a TOML file of its keys, terms and rules
+    #[arg(long, value_name = "FILE")]
+    pub(crate) profile: Option<PathBuf>,
     /// Bundle: compare with a run of the deploy code, tick by tick, to 1e-5 of the largest value. RAW.npz has the raw
     /// inputs [tick, value] by name, EXPECT.npz the arrays observation, action and target
     #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]

@@ -24,8 +24,8 @@ use crate::terminal::{note, print, reserve};
 
 /// Returns `true` if the arguments name a bundle, or have an option that only bundles take.
 pub(crate) fn is_bundle(args: &ImportArgs) -> bool {
-    let ReadingArgs { answers, ask, accept_profile, reference } = &args.reading;
-    let options = answers.is_some() || *ask || *accept_profile || reference.is_some();
+    let ReadingArgs { answers, ask, accept_profile, profile, reference } = &args.reading;
+    let options = answers.is_some() || *ask || *accept_profile || profile.is_some() || reference.is_some();
     options || args.model.is_dir() || args.model.extension().is_some_and(|ending| ending == "kinfer")
 }
 
@@ -37,7 +37,11 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         !args.check || args.reading.reference.is_some(),
         "--check of a bundle needs --reference RAW.npz:EXPECT.npz"
     );
-    let bundle = Bundle::open(&args.model)?;
+    let mut bundle = Bundle::open(&args.model)?;
+    if let Some(path) = &args.reading.profile {
+        let shown = || format!("{}: cannot read the profile; pass a TOML file to --profile", path.display());
+        bundle = bundle.with_profile(&fs::read_to_string(path).with_context(shown)?);
+    }
     let reading = answered(&bundle, &args.reading)?;
     let plan = Plan::new(&reading.description, &bundle).context(DESCRIPTION)?;
     let checked = match &args.reading.reference {
@@ -49,7 +53,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     note(deployment::guards(&bundle.guards()));
 
     let Gathered { mut files, mut inputs } = Gathered::of(&bundle, &reading)?;
-    inputs.extend(args.calib.iter().chain(&args.reading.answers).cloned());
+    inputs.extend(args.calib.iter().chain(&args.reading.answers).chain(&args.reading.profile).cloned());
     inputs.extend(args.reading.reference.iter().flat_map(|(raw, expect)| [raw, expect]).cloned());
     if let Some(raw) = &args.calib {
         files.push(("calib.npz".to_owned(), calibration(&reading.description, &bundle, raw)?));

@@ -6,7 +6,7 @@ use super::value::Operand;
 
 /// One number for all values, or one for each.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "give a number, or a list of numbers")]
 pub enum Numbers {
     /// For all.
     All(f64),

@@ -31,7 +31,7 @@ pub(super) struct Humanoidverse;
 const KEYS: [&str; 3] = ["DEFAULT_DOF_ANGLES", "obs_scales", "obs_dims"];
 
 impl Family for Humanoidverse {
-    fn profile(&self) -> &'static str {
+    fn profile(&self) -> &str {
         include_str!("humanoidverse/profile.toml")
     }
 

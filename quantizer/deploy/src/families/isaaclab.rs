@@ -40,7 +40,7 @@ const RECURRENT: [(&str, &str); 2] = [("h_in", "h_out"), ("c_in", "c_out")];
 const JOINT_NAMES: &str = "joint_names";
 
 impl Family for IsaacLab {
-    fn profile(&self) -> &'static str {
+    fn profile(&self) -> &str {
         include_str!("isaaclab/profile.toml")
     }
 

@@ -34,7 +34,7 @@ const KEY: &str = "kinfer_metadata";
 const OLD_KEYS: [&str; 3] = ["sim_dt", "sim_decimation", "num_actions"];
 
 impl Family for Kinfer {
-    fn profile(&self) -> &'static str {
+    fn profile(&self) -> &str {
         include_str!("kinfer/profile.toml")
     }
 

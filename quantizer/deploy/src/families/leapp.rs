@@ -25,7 +25,7 @@ pub(super) struct Leapp;
 const KEYS: [&str; 3] = ["models", "pipeline", "system information"];
 
 impl Family for Leapp {
-    fn profile(&self) -> &'static str {
+    fn profile(&self) -> &str {
         include_str!("leapp/profile.toml")
     }
 

@@ -36,7 +36,7 @@ const CONFIG: &str = "config.json";
 const MOST_FRAMES: usize = 1000;
 
 impl Family for Lerobot {
-    fn profile(&self) -> &'static str {
+    fn profile(&self) -> &str {
         include_str!("lerobot/profile.toml")
     }
 

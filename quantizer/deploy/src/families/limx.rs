@@ -18,7 +18,7 @@ pub(super) struct Limx;
 const VARIANTS: [&str; 2] = ["isaaclab", "isaacgym"];
 
 impl Family for Limx {
-    fn profile(&self) -> &'static str {
+    fn profile(&self) -> &str {
         include_str!("limx/profile.toml")
     }
 

@@ -31,7 +31,7 @@ pub(super) struct Mjlab;
 const KEYS: [&str; 4] = ["joint_names", "observation_names", "default_joint_pos", "action_scale"];
 
 impl Family for Mjlab {
-    fn profile(&self) -> &'static str {
+    fn profile(&self) -> &str {
         include_str!("mjlab/profile.toml")
     }
 

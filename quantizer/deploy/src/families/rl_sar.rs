@@ -30,7 +30,7 @@ pub(super) struct RlSar;
 const KEYS: [&str; 4] = ["model_name", "num_of_dofs", "clip_obs", "rl_kp"];
 
 impl Family for RlSar {
-    fn profile(&self) -> &'static str {
+    fn profile(&self) -> &str {
         include_str!("rl_sar/profile.toml")
     }
 

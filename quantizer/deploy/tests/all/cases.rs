@@ -29,6 +29,8 @@ struct Case {
     /// Folder of the bundle.
     #[serde(default = "base")]
     base: String,
+    /// A profile that the user gives, in the family's folder.
+    profile: Option<String>,
     /// The values of the family's profile hold.
     #[serde(default = "yes")]
     accept: bool,
@@ -75,7 +77,8 @@ impl Case {
     /// Returns the lines of the result.
     fn result(&self, folder: &Path) -> Result<Vec<String>> {
         let files = self.files(folder)?;
-        let reading = match files.reading(self.accept, &self.answers) {
+        let profile = self.profile.as_ref().map(|name| fs::read_to_string(folder.join(name))).transpose()?;
+        let reading = match files.reading_by(profile.as_deref(), self.accept, &self.answers) {
             Ok(reading) => reading,
             Err(error) => return Ok(format!("refused: {error:#}").lines().map(str::to_owned).collect()),
         };
@@ -181,6 +184,7 @@ families!(
     leapp,
     lerobot,
     limx,
+    mine,
     mjlab,
     others,
     rl_sar,

@@ -8,12 +8,12 @@ use crate::facts::Facts;
 
 /// Returns the raw input that gives the direction of gravity by a rule, its length, and the operations on it. `open`
 /// stands for the rule while it is a question, and `quaternion` is the family's name of an orientation.
-pub(crate) fn given_gravity(
+pub(crate) fn given_gravity<'a>(
     facts: &mut Facts,
     rule: &str,
     open: &str,
-    quaternion: &'static str,
-) -> Result<(&'static str, usize, Vec<Op>)> {
+    quaternion: &'a str,
+) -> Result<(&'a str, usize, Vec<Op>)> {
     let given: Option<String> = facts.value(rule)?;
     Ok(match given.as_deref().unwrap_or(open) {
         "vector" => ("projected_gravity", 3, Vec::new()),

@@ -117,7 +117,15 @@ impl Files {
     }
 
     pub(crate) fn reading(&self, accepted: bool, answers: &str) -> Result<Reading> {
-        self.written(|bundle| read(bundle, accepted, Answers::parse(answers)?))
+        self.reading_by(None, accepted, answers)
+    }
+
+    /// Reads the bundle by the user's profile, if there is one.
+    pub(crate) fn reading_by(&self, profile: Option<&str>, accepted: bool, answers: &str) -> Result<Reading> {
+        self.written(|bundle| {
+            let bundle = profile.map_or_else(|| bundle.clone(), |text| bundle.clone().with_profile(text));
+            read(&bundle, accepted, Answers::parse(answers)?)
+        })
     }
 
     pub(crate) fn plan(&self, description: &Description) -> Result<Plan> {
