@@ -117,6 +117,6 @@ mod tests {
         assert!(text.contains("at 168 MHz on a Cortex-M4"), "{text}");
         let svg = frontiers::svg(&merged);
         assert!(svg.contains("flash of the image, kB") && svg.contains("knee: 2.5 kB, 1.250 ms"), "{svg}");
-        assert_eq!(svg.matches("<polyline").count(), 2, "a line in two panels");
+        assert_eq!(svg.matches("stroke-width=\"20\" points").count(), 3, "a line in two panels and in the legend");
     }
 }

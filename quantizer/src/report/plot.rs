@@ -1,29 +1,40 @@
-//! SVG pictures: their shared parts, and a line plot of one or more panels with a common vertical axis.
+//! SVG pictures by plotters: their shared parts, and a line plot of one or more panels with a common vertical axis.
 //!
-//! This module writes SVG itself. We tried plotters 0.3.7 with its SVG backend only. Its three dependencies are
-//! acceptable, but its backends take whole pixels. In the strip of [`super::widths`], a row of a layer with 1,024 rows
-//! has a width of 0.6 pixels: rows would merge or vanish. Points of a plot would be up to half a pixel off.
+//! plotters takes whole pixels. A picture is drawn [`SCALE`] times as large as it is shown, since a row of a matrix may
+//! be narrower than a pixel.
 
 mod axis;
-mod drawing;
 
-use std::fmt::Write as _;
+use plotters::coord::Shift;
+use plotters::element::{ComposedElement, DashedPathElement};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use axis::Axis;
 pub use axis::Vertical;
-use drawing::{colour, dashes, marker, ring};
-pub(crate) use drawing::{decade_label, document, text};
+pub(crate) use axis::{Axis, label};
 
-/// Sizes of a plot's parts, in SVG's units (pixels at 96 dpi).
-const HEIGHT: f64 = 480.0;
-const MARGIN_LEFT: f64 = 84.0;
-/// The margin that holds the legend.
-const MARGIN_RIGHT: f64 = 284.0;
-const MARGIN_TOP: f64 = 56.0;
-const MARGIN_BOTTOM: f64 = 64.0;
-const PANEL: f64 = 440.0;
-/// Space between two panels.
-const GAP: f64 = 36.0;
+/// Units of the drawing in a pixel.
+pub(crate) const SCALE: i32 = 10;
+/// Sizes of a plot's parts, in pixels.
+const HEIGHT: i32 = 480;
+const TITLE: i32 = 44;
+const LEGEND: i32 = 290;
+const PANEL: i32 = 520;
+const LABELS: i32 = 56;
+/// Okabe and Ito's colour-blind safe palette, ordered by contrast on white.
+const COLOURS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+];
+pub(crate) const GREY: RGBColor = RGBColor(119, 119, 119);
+pub(crate) const TEXT: RGBColor = RGBColor(51, 51, 51);
+
+pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(crate) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 /// A line with a marker at every point.
 #[derive(Clone, Debug)]
@@ -62,143 +73,139 @@ pub struct Plot {
     pub frontier: Vec<Vec<(f64, f64)>>,
 }
 
-/// Draws plots below each other in one SVG document.
-pub fn stacked(plots: &[Plot]) -> String {
-    let width = plots.iter().map(Plot::width).fold(0.0, f64::max);
-    // Writing to a string can't fail.
-    document(width, HEIGHT * plots.len() as f64, |svg| {
-        for (i, plot) in plots.iter().enumerate() {
-            writeln!(svg, r#"<g transform="translate(0 {})">"#, HEIGHT * i as f64)?;
-            plot.write(svg)?;
-            writeln!(svg, "</g>")?;
-        }
-        Ok(())
-    })
-    .unwrap_or_default()
+/// Draws a picture of this size in pixels.
+pub(crate) fn document(width: i32, height: i32, draw: impl FnOnce(&Area<'_>) -> Drawn) -> String {
+    let [wide, high] = [width, height].map(|pixels| (SCALE * pixels).unsigned_abs());
+    let mut svg = String::new();
+    let area = SVGBackend::with_string(&mut svg, (wide, high)).into_drawing_area();
+    let drawn = area.fill(&WHITE).and_then(|()| draw(&area)).and_then(|()| area.present());
+    drop(area);
+    if drawn.is_err() {
+        // Nothing fails in memory.
+        svg.clear();
+    }
+    let shown = format!(r#"width="{width}" height="{height}""#);
+    svg.replacen(&format!(r#"width="{wide}" height="{high}""#), &shown, 1)
 }
 
-/// Returns the left and right edges of a panel.
-fn edges(panel: usize) -> (f64, f64) {
-    let left = MARGIN_LEFT + (PANEL + GAP) * panel as f64;
-    (left, left + PANEL)
+/// Returns a style of text of this size in pixels, at a place of this side of it.
+pub(crate) fn font(pixels: f64, side: HPos) -> TextStyle<'static> {
+    // plotters divides the size by this factor.
+    let size = 1.24 * pixels * f64::from(SCALE);
+    ("Helvetica, Arial, sans-serif", size).into_font().color(&TEXT).pos(Pos::new(side, VPos::Center))
+}
+
+/// Returns a line of this width in tenths of a pixel.
+pub(crate) fn stroke(colour: RGBColor, width: u32) -> ShapeStyle {
+    colour.stroke_width(width)
+}
+
+/// Returns a point of the picture from pixels.
+pub(crate) fn pixels(x: f64, y: f64) -> (i32, i32) {
+    let unit = |pixels: f64| (f64::from(SCALE) * pixels).round() as i32;
+    (unit(x), unit(y))
+}
+
+/// Draws plots below each other in one SVG document.
+pub fn stacked(plots: &[Plot]) -> String {
+    let width = plots.iter().map(|plot| PANEL * plot.x_labels.len() as i32).max().unwrap_or(0) + LEGEND;
+    document(width, HEIGHT * plots.len() as i32, |area| {
+        let areas = area.split_evenly((plots.len().max(1), 1));
+        plots.iter().zip(&areas).try_for_each(|(plot, area)| plot.draw(area))
+    })
 }
 
 impl Plot {
-    /// Returns the right edge of the last panel.
-    fn right(&self) -> f64 {
-        edges(self.x_labels.len().saturating_sub(1)).1
+    fn draw(&self, area: &Area<'_>) -> Drawn {
+        let (panels, legend) = area.split_horizontally(SCALE * PANEL * self.x_labels.len() as i32);
+        let middle = 0.5 * f64::from(PANEL) * self.x_labels.len() as f64;
+        panels.draw(&Text::new(self.title.as_str(), pixels(middle, 24.0), font(17.0, HPos::Center)))?;
+        let panels = panels.margin(SCALE * TITLE, 0, 0, 0).split_evenly((1, self.x_labels.len().max(1)));
+        (0..self.x_labels.len()).try_for_each(|panel| self.panel(&panels[panel], panel))?;
+        self.legend(&legend)
     }
 
-    fn width(&self) -> f64 {
-        self.right() + MARGIN_RIGHT
-    }
-
-    /// Returns the axes of a panel.
-    fn axes(&self, panel: usize) -> (Axis, Axis) {
+    fn panel(&self, area: &Area<'_>, panel: usize) -> Drawn {
         let points = |panel: usize| self.series.iter().filter_map(move |s| s.points.get(panel)).flatten();
-        let all = (0..self.x_labels.len()).flat_map(points);
-        let x = Axis::horizontal(points(panel).map(|p| p.0), edges(panel));
-        (x, Axis::vertical(self.vertical, all.map(|p| p.1), (HEIGHT - MARGIN_BOTTOM, MARGIN_TOP)))
-    }
-
-    fn write(&self, svg: &mut String) -> std::fmt::Result {
-        let middle = 0.5 * (MARGIN_LEFT + self.right());
-        text(svg, middle, 30.0, r#"text-anchor="middle" font-size="17" font-weight="bold""#, &self.title)?;
-        let beside = 0.5 * (MARGIN_TOP + HEIGHT - MARGIN_BOTTOM);
-        let turned = format!(r#"text-anchor="middle" font-size="14" transform="rotate(-90 24 {beside})""#);
-        text(svg, 24.0, beside, &turned, &self.y_label)?;
-        for panel in 0..self.x_labels.len() {
-            self.write_panel(svg, panel)?;
-        }
-        self.legend(svg)
-    }
-
-    fn write_panel(&self, svg: &mut String, panel: usize) -> std::fmt::Result {
-        let (x, y) = &self.axes(panel);
-        let (left, right) = edges(panel);
-        let middle = r#"text-anchor="middle" font-size="14""#;
-        text(svg, 0.5 * (left + right), HEIGHT - 18.0, middle, &self.x_labels[panel])?;
-        grid(svg, (x, y), panel)?;
+        let x = Axis::horizontal(points(panel).map(|p| p.0));
+        let y = Axis::vertical(self.vertical, (0..self.x_labels.len()).flat_map(points).map(|p| p.1));
+        let is_first = panel == 0;
+        let mut chart = ChartBuilder::on(area)
+            .margin_left(SCALE * 6)
+            .margin_right(SCALE * 8)
+            .x_label_area_size(SCALE * LABELS)
+            .y_label_area_size(SCALE * if is_first { LABELS + 24 } else { LABELS - 24 })
+            .build_cartesian_2d(x, y)?;
+        chart
+            .configure_mesh()
+            .x_desc(self.x_labels[panel].as_str())
+            .y_desc(if is_first { self.y_label.as_str() } else { "" })
+            .x_label_formatter(&label)
+            .y_label_formatter(&|value| if is_first { label(value) } else { String::new() })
+            .label_style(font(13.0, HPos::Center))
+            .axis_desc_style(font(14.0, HPos::Center))
+            .axis_style(stroke(GREY, 10))
+            .set_all_tick_mark_size(4 * SCALE)
+            .bold_line_style(stroke(RGBColor(208, 208, 208), 10))
+            .light_line_style(stroke(RGBColor(240, 240, 240), 10))
+            .draw()?;
         if let Some((first, rest)) = self.frontier.get(panel).and_then(|corners| corners.split_first()) {
-            let mut path = format!("M{:.1} {:.1}", x.at(first.0), y.at(first.1));
-            rest.iter().try_for_each(|corner| write!(path, "H{:.1}V{:.1}", x.at(corner.0), y.at(corner.1)))?;
-            writeln!(svg, "{}", dashes(&path))?;
+            let mut corners = vec![*first];
+            for corner in rest {
+                corners.extend([(corner.0, corners[corners.len() - 1].1), *corner]);
+            }
+            chart.draw_series(DashedLineSeries::new(corners, 50, 40, stroke(GREY, 15)))?;
         }
         for (index, series) in self.series.iter().enumerate() {
-            if let Some(points) = series.points.get(panel) {
-                line(svg, (x, y), index, points)?;
-            }
+            let points = || series.points.get(panel).into_iter().flatten().copied();
+            chart.draw_series(LineSeries::new(points(), stroke(COLOURS[index % COLOURS.len()], 20)))?;
+            chart.draw_series(points().map(|point| marker(index, point)))?;
         }
-        if let Some((at_x, at_y)) = self.mark.as_ref().and_then(|mark| mark.at.get(panel)) {
-            writeln!(svg, "{}", ring(x.at(*at_x), y.at(*at_y), 10.0))?;
-        }
+        let mark = self.mark.iter().filter_map(|mark| mark.at.get(panel));
+        chart.draw_series(mark.map(|place| Circle::new(*place, 10 * SCALE, stroke(TEXT, 15))))?;
         Ok(())
     }
 
-    fn legend(&self, svg: &mut String) -> std::fmt::Result {
-        let frontier = if self.frontier.is_empty() { None } else { Some("frontier of all methods") };
-        let series = self.series.iter().map(|s| s.name.as_str());
-        let names: Vec<&str> = series.chain(self.mark.as_ref().map(|m| m.label.as_str())).chain(frontier).collect();
-        let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0) as f64;
-        let (width, height) = (62.0 + 7.0 * longest, 12.0 + 20.0 * names.len() as f64);
-        let (left, top) = (self.right() + 14.0, MARGIN_TOP);
-        writeln!(
-            svg,
-            r##"<rect x="{left:.1}" y="{top:.1}" width="{width:.1}" height="{height:.1}" rx="3" fill="#fff" fill-opacity="0.9" stroke="#ccc"/>"##
-        )?;
-        let (from, to) = (left + 10.0, left + 42.0);
-        for (index, name) in names.iter().enumerate() {
-            let y = top + 16.0 + 20.0 * index as f64;
-            if index < self.series.len() {
-                writeln!(svg, r#"<path d="M{from:.1} {y:.1}H{to:.1}" stroke="{}" stroke-width="2"/>"#, colour(index))?;
-                writeln!(svg, "{}", marker(index, 0.5 * (from + to), y))?;
-            } else if frontier == Some(*name) {
-                writeln!(svg, "{}", dashes(&format!("M{from:.1} {y:.1}H{to:.1}")))?;
-            } else {
-                writeln!(svg, "{}", ring(0.5 * (from + to), y, 7.0))?;
-            }
-            text(svg, left + 50.0, y + 4.5, "", name)?;
+    fn legend(&self, area: &Area<'_>) -> Drawn {
+        let mut row = 0;
+        let mut next = |name: &str| {
+            row += 1;
+            let y = f64::from(TITLE + 20 * row);
+            area.draw(&Text::new(name.to_owned(), pixels(60.0, y), font(13.0, HPos::Left)))?;
+            Ok(y)
+        };
+        let line = |y: f64| vec![pixels(18.0, y), pixels(50.0, y)];
+        for (index, series) in self.series.iter().enumerate() {
+            let y = next(&series.name)?;
+            area.draw(&PathElement::new(line(y), stroke(COLOURS[index % COLOURS.len()], 20)))?;
+            area.draw(&marker(index, pixels(34.0, y)))?;
+        }
+        if let Some(mark) = &self.mark {
+            let y = next(&mark.label)?;
+            area.draw(&Circle::new(pixels(34.0, y), 7 * SCALE, stroke(TEXT, 15)))?;
+        }
+        if !self.frontier.is_empty() {
+            let y = next("frontier of all methods")?;
+            area.draw(&DashedPathElement::new(line(y), 50, 40, stroke(GREY, 15)))?;
         }
         Ok(())
     }
 }
 
-/// Draws the grid and the frame of a panel; the first panel has the labels of the vertical axis.
-fn grid(svg: &mut String, (x, y): (&Axis, &Axis), panel: usize) -> std::fmt::Result {
-    let ((left, right), bottom) = (edges(panel), HEIGHT - MARGIN_BOTTOM);
-    let colour = |label: &Option<String>| if label.is_some() { "#d0d0d0" } else { "#f0f0f0" };
-    for tick in y.ticks() {
-        let y = y.at(tick.value);
-        writeln!(svg, r##"<path d="M{left} {y:.1}H{right}" stroke="{}"/>"##, colour(&tick.label))?;
-        if let Some(label) = tick.label.filter(|_| panel == 0) {
-            text(svg, left - 10.0, y + 4.5, r#"text-anchor="end""#, &label)?;
-        }
-    }
-    for tick in x.ticks() {
-        let x = x.at(tick.value);
-        writeln!(svg, r##"<path d="M{x:.1} {MARGIN_TOP}V{bottom}" stroke="{}"/>"##, colour(&tick.label))?;
-        if let Some(label) = tick.label {
-            text(svg, x, bottom + 20.0, r#"text-anchor="middle""#, &label)?;
-        }
-    }
-    writeln!(
-        svg,
-        r##"<rect x="{left}" y="{MARGIN_TOP}" width="{}" height="{}" fill="none" stroke="#888"/>"##,
-        right - left,
-        bottom - MARGIN_TOP
-    )
-}
-
-fn line(svg: &mut String, (x, y): (&Axis, &Axis), index: usize, points: &[(f64, f64)]) -> std::fmt::Result {
-    let at: Vec<(f64, f64)> = points.iter().map(|p| (x.at(p.0), y.at(p.1))).collect();
-    let path: Vec<String> = at.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-    writeln!(
-        svg,
-        r#"<polyline points="{}" fill="none" stroke="{}" stroke-width="2" stroke-linejoin="round"/>"#,
-        path.join(" "),
-        colour(index)
-    )?;
-    at.into_iter().try_for_each(|(x, y)| writeln!(svg, "{}", marker(index, x, y)))
+/// Returns a marker with the series' own shape and colour, on a white rim.
+fn marker<DB: DrawingBackend, C: Clone>(
+    index: usize,
+    at: C,
+) -> ComposedElement<C, DB, Polygon<(i32, i32)>, Polygon<(i32, i32)>> {
+    let shape = |radius: f64| {
+        // The corners, and the angle of the first in parts of the angle between two.
+        let (corners, first) = [(24, 0.0), (4, 0.5), (3, 0.25), (4, 0.0)][index % 4];
+        let corner = |i: i32| std::f64::consts::TAU * (f64::from(i) + first) / f64::from(corners);
+        (0..corners).map(|i| pixels(radius * corner(i).cos(), radius * corner(i).sin())).collect::<Vec<_>>()
+    };
+    let radius = [5.0, 6.2, 6.4, 6.2][index % 4];
+    let rim = Polygon::new(shape(radius + 1.2), WHITE.filled());
+    EmptyElement::at(at) + rim + Polygon::new(shape(radius), COLOURS[index % COLOURS.len()].filled())
 }
 
 #[cfg(test)]
@@ -220,25 +227,15 @@ mod tests {
     }
 
     #[test]
-    fn markers_are_inside_their_panel_and_text_escaped() {
+    fn every_point_has_a_marker_and_text_is_escaped() {
         let points = vec![(2.0, 0.7), (2.5, 0.05), (40.0, 3e-4)];
         let mut plot = plot(points.clone());
         plot.mark = Some(Mark { at: vec![points[1], (25.0, 0.05)], label: "knee".into() });
         plot.frontier = plot.series[0].points.clone();
         let svg = stacked(std::slice::from_ref(&plot));
-        assert!(svg.contains("a &lt; b &amp; c"));
-        // Three points and a ring in two panels, and one of each in the legend.
-        assert_eq!(svg.matches("<circle").count(), 10);
-        assert_eq!(svg.matches("stroke-dasharray").count(), 3, "a staircase in each panel, and a dash in the legend");
-        for panel in [0, 1] {
-            let (x, y) = plot.axes(panel);
-            let (left, right) = edges(panel);
-            for &(at_x, at_y) in &plot.series[0].points[panel] {
-                assert!((left..right).contains(&x.at(at_x)));
-                assert!((MARGIN_TOP..=HEIGHT - MARGIN_BOTTOM).contains(&y.at(at_y)));
-            }
-        }
-        assert_eq!(plot.width(), edges(1).1 + MARGIN_RIGHT);
+        assert!(svg.contains("a &lt; b &amp; c") && svg.contains("frontier of all methods"), "{svg}");
+        // Three points and a ring in two panels, and one of each in the legend. A marker has a rim.
+        assert_eq!((svg.matches("<polygon").count(), svg.matches("<circle").count()), (2 * 7, 3));
     }
 
     #[test]

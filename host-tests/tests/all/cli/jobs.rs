@@ -141,7 +141,7 @@ fn interrupted_sweeps_resume_to_the_same_store() -> Result<()> {
     ensure!(merged == table, "{merged}");
     let read = |name: &str| -> Result<Vec<u8>> { Ok(fs::read(sweep.folder()?.join(name))?) };
     ensure!(read("merged.json")? == read("whole.json")?);
-    ensure!(String::from_utf8(read("merged.svg")?)?.contains(">frontier of all methods<"));
+    ensure!(String::from_utf8(read("merged.svg")?)?.contains("\nfrontier of all methods\n"));
     // `merge` only reads, also where the plan's last job has no result.
     let last: Value = serde_json::from_str(plan.lines().last().context("an empty plan")?)?;
     let address = last["address"].as_str().context("no address")?;

@@ -46,7 +46,8 @@ fn a_sweep_stores_allocations_and_scores() -> Result<()> {
     let stars = policies.iter().filter_map(|policy| Some(policy["frontier"].as_array()?.len())).sum::<usize>();
     let marked = printed.lines().filter(|l| !l.starts_with('*')).map(|l| l.matches('*').count()).sum::<usize>();
     assert_eq!(marked, stars, "{printed}");
-    ensure!(fs::read_to_string(fixture.path("s.svg"))?.matches("<polyline").count() >= 8);
+    // Two methods of two policies, each in two panels and in the legend.
+    ensure!(fs::read_to_string(fixture.path("s.svg"))?.matches("stroke-width=\"20\" points").count() >= 12);
     let seed = |n: u32| -> Result<Value> {
         succeeded(
             &fixture.actq(&format!("sweep policy --bpw 4 --methods distill --steps 200 --seed {n} --json t.json"))?,

@@ -1,6 +1,9 @@
-//! An axis of a plot: its scale, its range, its ticks.
+//! An axis of a plot: its scale, its range, the lines of its grid.
 
-use super::drawing::decade_label;
+use std::ops::Range;
+
+use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+use plotters::coord::types::RangedCoordf64;
 
 /// Ratio of the largest value to the smallest from which a horizontal axis is logarithmic.
 const WIDE: f64 = 5.0;
@@ -8,6 +11,8 @@ const WIDE: f64 = 5.0;
 const DENSE: f64 = 15.0;
 /// Space between the outermost points and the ends of a logarithmic axis, in decades.
 const SPACE: f64 = 0.08;
+/// The most labels of a linear axis.
+const MAX_LABELS: usize = 9;
 
 /// Scale of the vertical axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,33 +23,14 @@ pub enum Vertical {
     Percent,
 }
 
-/// A line of the grid.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Tick {
-    /// Its value.
-    pub(super) value: f64,
-    /// Its label; the lines between labels have none.
-    pub(super) label: Option<String>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Scale {
-    /// With a label at each multiple of the step.
-    Linear { step: f64 },
-    /// With a label at each power of ten.
-    Decades,
-    /// With labels at these multiples of a power of ten.
-    Log { digits: &'static [u8] },
-}
-
-/// An axis.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Axis {
-    scale: Scale,
-    /// The ends: values, or their logarithms to base 10.
-    range: (f64, f64),
-    /// Places of the ends in the picture.
-    pixels: (f64, f64),
+/// An axis. The places of a logarithmic one are logarithms to base 10.
+#[derive(Clone, Debug)]
+pub(crate) struct Axis {
+    is_log: bool,
+    range: Range<f64>,
+    /// Places of the grid's lines with a label, and of all of a logarithmic grid.
+    bold: Vec<f64>,
+    light: Vec<f64>,
 }
 
 /// Returns the least and the largest value.
@@ -54,72 +40,81 @@ fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 
 impl Axis {
     /// The vertical axis around these values.
-    pub(super) fn vertical(vertical: Vertical, values: impl Iterator<Item = f64>, pixels: (f64, f64)) -> Self {
-        let (scale, range) = match vertical {
-            Vertical::Percent => (Scale::Linear { step: 20.0 }, (0.0, 100.0)),
-            Vertical::Decades => {
-                let (low, high) = range(values.map(f64::log10)).unwrap_or((0.0, 1.0));
-                let low = (low - SPACE).floor();
-                (Scale::Decades, (low, (high + SPACE).ceil().max(low + 1.0)))
-            }
-        };
-        Self { scale, range, pixels }
+    pub(super) fn vertical(vertical: Vertical, values: impl Iterator<Item = f64>) -> Self {
+        if vertical == Vertical::Percent {
+            return Self::linear(0.0..100.0);
+        }
+        let (low, high) = range(values.map(f64::log10)).unwrap_or((0.0, 1.0));
+        let low = (low - SPACE).floor();
+        Self::log(low..(high + SPACE).ceil().max(low + 1.0), &[1])
     }
 
     /// A horizontal axis around these values: logarithmic if they are above 0 and span a wide range, else linear.
-    pub(super) fn horizontal(values: impl Iterator<Item = f64>, pixels: (f64, f64)) -> Self {
+    pub(super) fn horizontal(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = range(values).unwrap_or((0.0, 1.0));
         if low > 0.0 && high > WIDE * low {
             let digits: &[u8] = if high < DENSE * low { &[1, 2, 3, 4, 6, 8] } else { &[1, 2, 5] };
-            return Self { scale: Scale::Log { digits }, range: (low.log10() - SPACE, high.log10() + SPACE), pixels };
+            return Self::log(low.log10() - SPACE..high.log10() + SPACE, digits);
         }
-        let step = tick_step(high - low);
-        // Half a step of space, so that no marker is on the frame.
-        Self { scale: Scale::Linear { step }, range: (low - 0.5 * step, high + 0.5 * step), pixels }
+        // So that no marker is on the frame.
+        let space = if high > low { 0.1 * (high - low) } else { 1.0 };
+        Self::linear(low - space..high + space)
     }
 
-    /// Returns the place of a value.
-    pub(super) fn at(&self, value: f64) -> f64 {
-        let value = if matches!(self.scale, Scale::Linear { .. }) { value } else { value.log10() };
-        let share = (value - self.range.0) / (self.range.1 - self.range.0);
-        self.pixels.0 + (self.pixels.1 - self.pixels.0) * share
+    fn linear(range: Range<f64>) -> Self {
+        let bold = RangedCoordf64::from(range.clone()).key_points(MAX_LABELS);
+        Self { is_log: false, range, bold, light: Vec::new() }
     }
 
-    /// Returns the lines of the grid, in the order of values.
-    pub(super) fn ticks(&self) -> Vec<Tick> {
-        let (low, high) = self.range;
-        if let Scale::Linear { step } = self.scale {
-            let decimals = (-step.log10().floor()).max(0.0) as usize;
-            let multiples = (low / step).ceil() as i64..=(high / step).floor() as i64;
-            return multiples
-                .map(|multiple| multiple as f64 * step)
-                .map(|value| Tick { value, label: Some(format!("{value:.decimals$}")) })
-                .collect();
-        }
-        let digits = (low.floor() as i32..=high.ceil() as i32).flat_map(|decade| (1..10).map(move |d| (decade, d)));
-        let tick = |(decade, digit): (i32, u8)| {
-            let value = f64::from(digit) * 10f64.powi(decade);
-            let decimals = (-decade).max(0) as usize;
-            let label = match (self.scale, digit) {
-                (Scale::Decades, 1) => Some(decade_label(decade)),
-                (Scale::Log { digits }, digit) if digits.contains(&digit) => Some(format!("{value:.decimals$}")),
-                _ => None,
-            };
-            // Rounding of a logarithm must not lose the tick at an end.
-            let inside = (low - 1e-9..=high + 1e-9).contains(&value.log10());
-            inside.then_some(Tick { value, label })
+    /// A logarithmic axis between two exponents of 10, with labels at these multiples of powers of 10.
+    pub(crate) fn log(range: Range<f64>, digits: &[u8]) -> Self {
+        let lines = |digits: &[u8]| -> Vec<f64> {
+            let decades = range.start.floor() as i32..=range.end.ceil() as i32;
+            let of = |decade: i32| digits.iter().map(move |digit| f64::from(decade) + f64::from(*digit).log10());
+            decades.flat_map(of).filter(|at| (range.start..=range.end).contains(at)).collect()
         };
-        digits.filter_map(tick).collect()
+        let light = lines(&[1, 2, 3, 4, 5, 6, 7, 8, 9]);
+        Self { is_log: true, bold: lines(digits), light, range }
+    }
+
+    /// Returns the place of a value in the range.
+    fn place(&self, value: f64) -> f64 {
+        if self.is_log { value.log10() } else { value }
+    }
+
+    /// Returns the value at a place in the range.
+    fn value(&self, place: f64) -> f64 {
+        if self.is_log { 10f64.powf(place) } else { place }
     }
 }
 
-/// Returns 1, 2 or 5 times a power of ten that divides a range of this length into 4 to 10 steps.
-fn tick_step(length: f64) -> f64 {
-    if length <= 0.0 {
-        return 1.0;
+impl Ranged for Axis {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
+        let share = (self.place(*value) - self.range.start) / (self.range.end - self.range.start);
+        from + (f64::from(to - from) * share).round() as i32
     }
-    let power = 10f64.powf((length / 4.0).log10().floor());
-    [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|step| length / step >= 4.0).unwrap_or(power)
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        let lines = if hint.weight().allow_light_points() { &self.light } else { &self.bold };
+        lines.iter().map(|place| self.value(*place)).collect()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.value(self.range.start)..self.value(self.range.end)
+    }
+}
+
+/// Formats a value of the grid, without the digits of rounding.
+pub(crate) fn label(value: &f64) -> String {
+    let value: f64 = format!("{value:.6e}").parse().unwrap_or(*value);
+    match value.abs() {
+        tiny if tiny < 1e-9 && value.fract() == 0.0 => "0".to_owned(),
+        small if small < 1e-3 => format!("{value:e}"),
+        _ => value.to_string(),
+    }
 }
 
 #[cfg(test)]
@@ -127,38 +122,26 @@ mod tests {
     use super::*;
 
     fn labels(axis: &Axis) -> Vec<String> {
-        axis.ticks().into_iter().filter_map(|tick| tick.label).collect()
-    }
-
-    #[test]
-    fn ticks_are_round() {
-        for (length, step) in [(2.0, 0.5), (1.0, 0.2), (6.0, 1.0), (10.0, 2.0), (0.0, 1.0)] {
-            assert!((tick_step(length) - step).abs() < 1e-12, "{length}: {}", tick_step(length));
-        }
+        axis.bold.iter().map(|place| label(&axis.value(*place))).collect()
     }
 
     #[test]
     fn wide_ranges_are_logarithmic() {
-        let narrow = Axis::horizontal([20.0, 50.0, 80.0].into_iter(), (0.0, 100.0));
+        let narrow = Axis::horizontal([20.0, 50.0, 80.0].into_iter());
         assert_eq!(labels(&narrow), ["20", "30", "40", "50", "60", "70", "80"]);
-        let wide = Axis::horizontal([0.3, 12.0].into_iter(), (0.0, 100.0));
+        let wide = Axis::horizontal([0.3, 12.0].into_iter());
         assert_eq!(labels(&wide), ["0.5", "1", "2", "5", "10"]);
-        let dense = Axis::horizontal([19.0, 140.0].into_iter(), (0.0, 100.0));
+        let dense = Axis::horizontal([19.0, 140.0].into_iter());
         assert_eq!(labels(&dense), ["20", "30", "40", "60", "80", "100"]);
-        let middle = wide.at((0.3f64 * 12.0).sqrt());
-        assert!((middle - 50.0).abs() < 1e-9, "{middle}");
-        let with_zero = Axis::horizontal([0.0, 12.0].into_iter(), (0.0, 100.0));
-        assert!(labels(&with_zero).contains(&"0".to_owned()));
+        assert!(labels(&Axis::horizontal([0.0, 12.0].into_iter())).contains(&"0".to_owned()));
     }
 
     #[test]
     fn vertical_axes_have_whole_decades_or_percent() {
-        let decades = Axis::vertical(Vertical::Decades, [0.7, 3e-4].into_iter(), (400.0, 40.0));
+        let decades = Axis::vertical(Vertical::Decades, [0.7, 3e-4].into_iter());
         assert_eq!(labels(&decades), ["1e-4", "0.001", "0.01", "0.1", "1"]);
-        assert_eq!((decades.at(1e-4), decades.at(1.0)), (400.0, 40.0));
-        assert!(decades.at(0.7) < decades.at(0.05), "larger values are higher");
-        let percent = Axis::vertical(Vertical::Percent, [].into_iter(), (400.0, 40.0));
-        assert_eq!(labels(&percent), ["0", "20", "40", "60", "80", "100"]);
-        assert_eq!((percent.at(0.0), percent.at(100.0)), (400.0, 40.0));
+        assert_eq!((decades.range.start, decades.range.end), (-4.0, 0.0));
+        let percent = Axis::vertical(Vertical::Percent, [].into_iter());
+        assert!(labels(&percent).starts_with(&["0".into()]) && labels(&percent).ends_with(&["100".into()]));
     }
 }

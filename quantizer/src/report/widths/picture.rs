@@ -1,58 +1,45 @@
 //! The widths as a picture: a strip for every matrix, with the curve of its rows' energies above.
 
-use std::fmt::Write as _;
+use std::ops::Range;
 
 use actq_kernels::Width;
+use plotters::prelude::*;
+use plotters::style::text_anchor::HPos;
 
 use super::{ALL, Layer, Reasons, Row, Widths};
-use crate::report::plot::{decade_label, document, text};
+use crate::report::plot::{Area, Axis, Drawn, GREY, SCALE, TEXT, document, font, label, pixels, stroke};
 
-/// Width of the picture and sizes of its parts, in SVG's units.
-const WIDTH: f64 = 760.0;
-const MARGIN_LEFT: f64 = 84.0;
-const MARGIN_RIGHT: f64 = 28.0;
+/// Width of the picture and sizes of its parts, in pixels.
+const WIDTH: i32 = 760;
+const LEFT: f64 = 84.0;
+const RIGHT: f64 = 732.0;
 /// Height of title and legend.
-const HEAD_HEIGHT: f64 = 88.0;
+const HEAD: i32 = 88;
 /// Heights of a layer's parts.
-const NAME_HEIGHT: f64 = 26.0;
-const ENERGIES_HEIGHT: f64 = 96.0;
-const STRIP_HEIGHT: f64 = 22.0;
-const AXIS_HEIGHT: f64 = 40.0;
-const MARGIN_BOTTOM: f64 = 16.0;
+const NAME: i32 = 26;
+const ENERGIES: i32 = 96;
+const STRIP: i32 = 22;
+const LABELS: i32 = 40;
+const BOTTOM: i32 = 16;
 /// The most decades of the axis; smaller values are drawn at its lower end.
-const MOST_DECADES: i32 = 8;
+const MAX_DECADES: i32 = 8;
 
-/// The decades that energies and removal costs span.
-#[derive(Clone, Copy)]
-struct Decades {
-    top: i32,
-    floor: i32,
-}
-
-impl Decades {
-    /// Returns the decades of all `values` above 0; `None` if there are none.
-    fn around(values: impl Iterator<Item = f64> + Clone) -> Option<Self> {
-        let logs = || values.clone().filter(|v| *v > 0.0).map(f64::log10);
-        let top = logs().reduce(f64::max)?.ceil() as i32;
-        let floor = logs().reduce(f64::min)?.floor() as i32;
-        Some(Self { top, floor: floor.clamp(top - MOST_DECADES, top - 1) })
-    }
-
-    /// Returns a value's place between the upper end (0) and the lower end (1).
-    fn share(self, value: f64) -> f64 {
-        let decades = f64::from(self.top - self.floor);
-        ((f64::from(self.top) - value.max(f64::MIN_POSITIVE).log10()) / decades).clamp(0.0, 1.0)
-    }
+/// Returns the exponents of 10 around all `values` above 0; `None` if there are none.
+fn decades(values: impl Iterator<Item = f64>) -> Option<Range<i32>> {
+    let logs = values.filter(|value| *value > 0.0).map(|value| (value.log10(), value.log10()));
+    let (low, high) = logs.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+    let top = high.ceil() as i32;
+    Some((low.floor() as i32).clamp(top - MAX_DECADES, top - 1)..top)
 }
 
 /// Returns the width's colour in Okabe and Ito's palette, from cold (few bits) to warm (many).
-fn colour(width: Option<Width>) -> &'static str {
+fn colour(width: Option<Width>) -> RGBColor {
     match width {
-        None => "#cccccc",
-        Some(Width::W2) => "#56b4e9",
-        Some(Width::W3) => "#009e73",
-        Some(Width::W4) => "#f0e442",
-        Some(Width::W8) => "#d55e00",
+        None => RGBColor(204, 204, 204),
+        Some(Width::W2) => RGBColor(86, 180, 233),
+        Some(Width::W3) => RGBColor(0, 158, 115),
+        Some(Width::W4) => RGBColor(240, 228, 66),
+        Some(Width::W8) => RGBColor(213, 94, 0),
     }
 }
 
@@ -61,122 +48,117 @@ impl Widths {
     /// curve; otherwise rows are in the order of the output.
     pub fn svg(&self) -> String {
         let reasons = self.layers.iter().flat_map(|l| &l.rows).filter_map(|r| r.reasons);
-        let decades = Decades::around(reasons.clone().flat_map(|r| [r.energy, r.removal]));
+        let decades = decades(reasons.clone().flat_map(|r| [r.energy, r.removal]));
         let removable = reasons.clone().any(Reasons::is_removable);
-        let panel = NAME_HEIGHT + STRIP_HEIGHT + AXIS_HEIGHT + if decades.is_some() { ENERGIES_HEIGHT } else { 0.0 };
-        let height = HEAD_HEIGHT + panel * self.layers.len() as f64 + MARGIN_BOTTOM;
-        // Writing to a string can't fail.
-        document(WIDTH, height, |svg| {
+        let layer = NAME + STRIP + LABELS + if decades.is_some() { ENERGIES } else { 0 };
+        document(WIDTH, HEAD + layer * self.layers.len() as i32 + BOTTOM, |area| {
             let title = format!("{}: bits of every row", self.policy);
-            let middle = 0.5 * (MARGIN_LEFT + WIDTH - MARGIN_RIGHT);
-            text(svg, middle, 30.0, r#"text-anchor="middle" font-size="17" font-weight="bold""#, &title)?;
-            legend(svg, decades.is_some(), removable)?;
-            for (i, layer) in self.layers.iter().enumerate() {
-                layer.draw(svg, HEAD_HEIGHT + panel * i as f64, decades)?;
+            area.draw(&Text::new(title, pixels(0.5 * (LEFT + RIGHT), 24.0), font(17.0, HPos::Center)))?;
+            legend(area, decades.is_some(), removable)?;
+            let (_, mut rest) = area.split_vertically(SCALE * HEAD);
+            for matrix in &self.layers {
+                let (own, below) = rest.split_vertically(SCALE * layer);
+                matrix.draw(&own, decades.clone())?;
+                rest = below;
             }
             Ok(())
         })
-        .unwrap_or_default()
     }
 }
 
 /// Draws the legend of colours and marks, in a line.
-fn legend(svg: &mut String, energies: bool, removable: bool) -> std::fmt::Result {
-    let y = 60.0;
-    let mut x = MARGIN_LEFT;
+fn legend(area: &Area<'_>, energies: bool, removable: bool) -> Drawn {
+    let y = 56.0;
+    let label = |x: f64, name: String| area.draw(&Text::new(name, pixels(x, y), font(13.0, HPos::Left)));
+    let mut x = LEFT;
     for width in ALL {
-        let name = width.map_or("no bits".to_owned(), |w| format!("{} bits", w.bits()));
-        swatch(svg, x, y - 11.0, 14.0, 14.0, colour(width))?;
-        text(svg, x + 20.0, y, "", &name)?;
+        area.draw(&Rectangle::new([pixels(x, y - 7.0), pixels(x + 14.0, y + 7.0)], colour(width).filled()))?;
+        label(x + 20.0, width.map_or("no bits".to_owned(), |w| format!("{} bits", w.bits())))?;
         x += if width.is_none() { 88.0 } else { 76.0 };
     }
     if energies {
-        x += 8.0;
-        writeln!(svg, r##"<path d="M{x} {:.1}h22" stroke="#333" stroke-width="1.5"/>"##, y - 4.0)?;
-        text(svg, x + 28.0, y, "", "energy")?;
-        x += 90.0;
+        area.draw(&PathElement::new([pixels(x + 8.0, y), pixels(x + 30.0, y)], stroke(TEXT, 15)))?;
+        label(x + 36.0, "energy".to_owned())?;
     }
     if removable {
-        writeln!(svg, r##"<circle cx="{x}" cy="{:.1}" r="2" fill="#888"/>"##, y - 4.0)?;
-        text(svg, x + 8.0, y, "", "cost of removal")?;
+        area.draw(&Circle::new(pixels(x + 98.0, y), 2 * SCALE, GREY.filled()))?;
+        label(x + 106.0, "cost of removal".to_owned())?;
     }
     Ok(())
 }
 
-fn swatch(svg: &mut String, x: f64, y: f64, width: f64, height: f64, colour: &str) -> std::fmt::Result {
-    writeln!(svg, r#"<rect x="{x:.2}" y="{y:.1}" width="{width:.2}" height="{height:.1}" fill="{colour}"/>"#)
-}
-
 impl Layer {
-    /// Draws the layer below `y`, with its energies if known.
-    fn draw(&self, svg: &mut String, y: f64, decades: Option<Decades>) -> std::fmt::Result {
+    /// Draws the layer, with its energies if known.
+    fn draw(&self, area: &Area<'_>, decades: Option<Range<i32>>) -> Drawn {
         let bytes: usize = self.bytes.iter().map(|b| b.1).sum();
         let name = format!("{}, {} x {}, {bytes} bytes", self.name, self.shape.0, self.shape.1);
-        text(svg, MARGIN_LEFT, y + 17.0, r#"font-size="14""#, &name)?;
+        area.draw(&Text::new(name, pixels(LEFT, 13.0), font(14.0, HPos::Left)))?;
         let mut rows: Vec<&Row> = self.rows.iter().collect();
         let energy = |row: &Row| row.reasons.map_or(0.0, |r| r.energy);
         // The sort is stable: without energies, rows keep their order.
         rows.sort_by(|a, b| energy(b).total_cmp(&energy(a)));
-        let across = (WIDTH - MARGIN_LEFT - MARGIN_RIGHT) / rows.len().max(1) as f64;
-        let mut strip = y + NAME_HEIGHT;
-        if let Some(decades) = decades {
-            energies(svg, &rows, across, strip, decades)?;
-            strip += ENERGIES_HEIGHT;
-        }
-        let mut from = 0;
-        for run in rows.chunk_by(|a, b| a.width == b.width) {
-            let x = MARGIN_LEFT + across * from as f64;
-            swatch(svg, x, strip, across * run.len() as f64, STRIP_HEIGHT, colour(run[0].width))?;
-            from += run.len();
-        }
-        let (right, below) = (WIDTH - MARGIN_RIGHT, strip + STRIP_HEIGHT);
-        writeln!(
-            svg,
-            r##"<rect x="{MARGIN_LEFT}" y="{strip:.1}" width="{}" height="{STRIP_HEIGHT}" fill="none" stroke="#888"/>"##,
-            right - MARGIN_LEFT
-        )?;
+        let mut top = f64::from(NAME);
         let order = match decades {
-            Some(_) => "rows, most energy first",
+            Some(decades) => {
+                let (_, below) = area.split_vertically(SCALE * NAME);
+                energies(&below.split_vertically(SCALE * ENERGIES).0, &rows, decades)?;
+                top += f64::from(ENERGIES);
+                "rows, most energy first"
+            }
             None => "rows in the order of the output",
         };
-        text(svg, MARGIN_LEFT, below + 17.0, "", "1")?;
-        text(svg, 0.5 * (MARGIN_LEFT + right), below + 17.0, r#"text-anchor="middle""#, order)?;
-        text(svg, right, below + 17.0, r#"text-anchor="end""#, &rows.len().to_string())
+        let bottom = top + f64::from(STRIP);
+        let across = |row: usize| LEFT + (RIGHT - LEFT) * row as f64 / rows.len().max(1) as f64;
+        let mut from = 0;
+        for run in rows.chunk_by(|a, b| a.width == b.width) {
+            let corners = [pixels(across(from), top), pixels(across(from + run.len()), bottom)];
+            area.draw(&Rectangle::new(corners, colour(run[0].width).filled()))?;
+            from += run.len();
+        }
+        let corners = [(LEFT, top), (RIGHT, top), (RIGHT, bottom), (LEFT, bottom), (LEFT, top)];
+        area.draw(&PathElement::new(corners.map(|(x, y)| pixels(x, y)), stroke(GREY, 10)))?;
+        let last = rows.len().to_string();
+        for (x, side, text) in
+            [(LEFT, HPos::Left, "1"), (0.5 * (LEFT + RIGHT), HPos::Center, order), (RIGHT, HPos::Right, &last)]
+        {
+            area.draw(&Text::new(text, pixels(x, bottom + 13.0), font(13.0, side)))?;
+        }
+        Ok(())
     }
 }
 
-/// Draws the curve of the rows' energies and the points of their removal costs, in the frame below `y`.
-fn energies(svg: &mut String, rows: &[&Row], across: f64, y: f64, decades: Decades) -> std::fmt::Result {
-    let right = WIDTH - MARGIN_RIGHT;
-    let at = |value: f64| y + ENERGIES_HEIGHT * decades.share(value);
+/// Draws the curve of the rows' energies and the points of their removal costs.
+fn energies(area: &Area<'_>, rows: &[&Row], decades: Range<i32>) -> Drawn {
+    let floor = 10f64.powi(decades.start);
+    let y = Axis::log(f64::from(decades.start)..f64::from(decades.end), &[1]);
     // With many decades, neighbouring labels would touch.
-    let every = if decades.top - decades.floor > 5 { 2 } else { 1 };
-    for decade in decades.floor..=decades.top {
-        let line = at(10f64.powi(decade));
-        writeln!(svg, r##"<path d="M{MARGIN_LEFT} {line:.1}H{right}" stroke="#d0d0d0"/>"##)?;
-        if (decades.top - decade) % every == 0 {
-            text(svg, MARGIN_LEFT - 10.0, line + 4.5, r#"text-anchor="end""#, &decade_label(decade))?;
-        }
-    }
-    let mut path = String::new();
-    for (i, row) in rows.iter().enumerate() {
-        let Some(reasons) = row.reasons else { continue };
-        let x = MARGIN_LEFT + across * (i as f64 + 0.5);
-        if reasons.is_removable() {
-            writeln!(svg, r##"<circle cx="{x:.1}" cy="{:.1}" r="1.2" fill="#888"/>"##, at(reasons.removal))?;
-        }
-        let _ = write!(path, "{x:.1},{:.1} ", at(reasons.energy));
-    }
-    writeln!(
-        svg,
-        r##"<polyline points="{}" fill="none" stroke="#333" stroke-width="1.5" stroke-linejoin="round"/>"##,
-        path.trim_end()
+    let every = if decades.len() > 5 { 2 } else { 1 };
+    let mut chart = ChartBuilder::on(area)
+        .margin_right(pixels(f64::from(WIDTH) - RIGHT, 0.0).0)
+        .y_label_area_size(pixels(LEFT, 0.0).0)
+        .build_cartesian_2d(0.0..rows.len() as f64, y)?;
+    chart
+        .configure_mesh()
+        .disable_x_mesh()
+        .y_label_formatter(&|value| match (decades.end - value.log10().round() as i32) % every {
+            0 => label(value),
+            _ => String::new(),
+        })
+        .label_style(font(13.0, HPos::Right))
+        .axis_style(stroke(GREY, 10))
+        .set_all_tick_mark_size(4 * SCALE)
+        .bold_line_style(stroke(RGBColor(208, 208, 208), 10))
+        .light_line_style(TRANSPARENT)
+        .draw()?;
+    let known = || rows.iter().zip(0..).filter_map(|(row, i)| Some((f64::from(i) + 0.5, row.reasons?)));
+    let at = |value: f64| value.max(floor);
+    chart.draw_series(
+        known()
+            .filter(|(_, reasons)| reasons.is_removable())
+            .map(|(x, reasons)| Circle::new((x, at(reasons.removal)), pixels(1.2, 0.0).0, GREY.filled())),
     )?;
-    writeln!(
-        svg,
-        r##"<rect x="{MARGIN_LEFT}" y="{y:.1}" width="{}" height="{ENERGIES_HEIGHT}" fill="none" stroke="#888"/>"##,
-        right - MARGIN_LEFT
-    )
+    chart.draw_series(LineSeries::new(known().map(|(x, reasons)| (x, at(reasons.energy))), stroke(TEXT, 15)))?;
+    Ok(())
 }
 
 #[cfg(test)]
@@ -185,15 +167,10 @@ mod tests {
 
     #[test]
     fn decades_span_the_values_down_to_a_floor() {
-        let decades = Decades::around([0.0, 2e-3, 0.5].into_iter()).expect("values above 0");
-        assert_eq!((decades.top, decades.floor), (0, -3));
-        assert_eq!((decades.share(1.0), decades.share(1e-3), decades.share(0.0)), (0.0, 1.0, 1.0));
-        assert!(decades.share(0.5) < decades.share(2e-3), "larger values are higher");
+        assert_eq!(decades([0.0, 2e-3, 0.5].into_iter()), Some(-3..0));
         // A value far below the others must not flatten them.
-        let deep = Decades::around([1e-30, 3.0].into_iter()).expect("values above 0");
-        assert_eq!((deep.top, deep.floor), (1, 1 - MOST_DECADES));
-        assert!(Decades::around([0.0].into_iter()).is_none());
-        let one = Decades::around([1.0].into_iter()).expect("a value above 0");
-        assert_eq!((one.top, one.floor), (0, -1));
+        assert_eq!(decades([1e-30, 3.0].into_iter()), Some(1 - MAX_DECADES..1));
+        assert_eq!(decades([0.0].into_iter()), None);
+        assert_eq!(decades([1.0].into_iter()), Some(-1..0));
     }
 }
