@@ -7,14 +7,14 @@ use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _, symlink};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use actq_bench::command::{actq, all, failed, run, succeeded};
+use actq_bench::command::{actq, failed, run, succeeded};
 use actq_bench::golden::Random;
 use anyhow::{Result, ensure};
 use ndarray::Array2;
 use serde_json::json;
 use tempfile::TempDir;
 
-use crate::folder::{snapshot, write_observations, write_policy};
+use crate::folder::{write_observations, write_policy};
 
 const OBS: usize = 8;
 const ACT: usize = 2;
@@ -61,86 +61,6 @@ impl Fixture {
     fn image(&self) -> Result<Vec<u8>> {
         Ok(fs::read(self.path("old.actq"))?)
     }
-}
-
-/// A name to create in the folder first: a link to a path, or another name of a file.
-enum Name {
-    Link(&'static str, &'static str),
-    Hard(&'static str, &'static str),
-    None,
-}
-
-/// The command, the name to create, and the expected message.
-const OVERWRITING: &[(&str, Name, &str)] = &[
-    (
-        "quantize policy --out policy/policy.safetensors",
-        Name::None,
-        "policy/policy.safetensors: is the same file as policy/policy.safetensors, an input",
-    ),
-    ("quantize policy --out policy/policy.json", Name::None, "the same file as policy/policy.json"),
-    ("quantize policy --out policy/calib.npz", Name::None, "the same file as policy/calib.npz"),
-    ("quantize policy --out policy/heldout.npz", Name::None, "the same file as policy/heldout.npz"),
-    // A recording's name, though no recording has it.
-    ("quantize policy --out policy/heldout.safetensors", Name::None, "the same file as policy/heldout.safetensors"),
-    ("quantize policy --calib drive.npz --out drive.npz", Name::None, "the same file as drive.npz"),
-    ("quantize policy --out x.actq --save-stats policy/policy.json", Name::None, "the same file as policy/policy.json"),
-    ("quantize policy --out policy/../policy/calib.npz", Name::None, "the same file as policy/calib.npz"),
-    (
-        "quantize policy --out x.actq",
-        Name::Link("x.actq", "policy/policy.safetensors"),
-        "x.actq: is the same file as policy/policy.safetensors, an input",
-    ),
-    (
-        "quantize policy --out x.actq",
-        Name::Hard("x.actq", "policy/policy.safetensors"),
-        "x.actq: is the same file as policy/policy.safetensors, an input",
-    ),
-    ("quantize policy --out other/policy.json", Name::Link("other", "policy"), "the same file as policy/policy.json"),
-    ("quantize other --out policy/calib.npz", Name::Link("other", "policy"), "the same file as other/calib.npz"),
-    (
-        "quantize policy --out x.actq --save-stats ./x.actq",
-        Name::None,
-        "./x.actq: is the same file as x.actq, another output",
-    ),
-    ("quantize policy --out old.actq --save-stats policy/../old.actq", Name::None, "is the same file as old.actq"),
-    ("quantize policy --out x --save-stats y", Name::Link("y", "x"), "y: is the same file as x"),
-    ("quantize policy --out x --save-stats here/x", Name::Link("here", "."), "here/x: is the same file as x"),
-    ("quantize policy --out old.actq --save-stats y", Name::Hard("y", "old.actq"), "y: is the same file as old.actq"),
-    ("inspect old.actq --widths --svg old.actq", Name::None, "old.actq: is the same file as old.actq, an input"),
-    ("inspect old.actq --widths --stats old.json --svg old.json", Name::None, "is the same file as old.json"),
-    ("inspect old.actq --widths --svg y", Name::Link("y", "old.actq"), "y: is the same file as old.actq"),
-    ("sweep policy --methods rtn --svg z --json z", Name::None, "z: is the same file as z, another output"),
-    ("sweep policy --methods rtn --svg z --json ./z", Name::None, "./z: is the same file as z"),
-    ("sweep policy --methods rtn --svg policy/heldout.npz", Name::None, "the same file as policy/heldout.npz"),
-    ("sweep policy --methods rtn --json policy/policy.json", Name::None, "the same file as policy/policy.json"),
-    (
-        "sweep policy --methods rtn --heldout drive.npz --json y",
-        Name::Hard("y", "drive.npz"),
-        "y: is the same file as drive.npz",
-    ),
-];
-
-#[test]
-fn no_output_overwrites_an_input_or_another_output() -> Result<()> {
-    all(OVERWRITING.iter().map(|(line, name, words)| {
-        let run = || {
-            let fixture = Fixture::new()?;
-            match name {
-                Name::Link(name, to) => symlink(to, fixture.path(name))?,
-                Name::Hard(name, to) => fs::hard_link(fixture.path(to), fixture.path(name))?,
-                Name::None => {}
-            }
-            let before = snapshot(fixture.0.path())?;
-            // The method that accepts any recording, so that nothing else stops the command from writing.
-            let method = if line.starts_with("quantize") { "--method rtn" } else { "" };
-            let output = fixture.run(&format!("{line} {method}"))?;
-            ensure!(output.stdout.is_empty(), "the command did its work");
-            failed(&output, 1, &[words])?;
-            ensure!(snapshot(fixture.0.path())? == before, "files changed");
-            Ok(())
-        };
-        ((*line).to_owned(), run())
-    }))
 }
 
 #[test]

@@ -137,26 +137,3 @@ fn exports_replace_only_exported_files() -> Result<()> {
     ensure!(both.len() == 8 && exported.iter().all(|(name, bytes)| both.get(name) == Some(bytes)), "{:?}", both.keys());
     failed(&export("walk_golden", &[])?, 1, &["walk_golden.c: exists, and actq did not write it"])
 }
-
-#[test]
-fn invalid_names_and_images_are_refused() -> Result<()> {
-    let dir = TempDir::new()?;
-    let at = |name: &str| text(&dir.path().join(name));
-    fs::write(dir.path().join("made.actq"), Made::deployment()?.1.four_bits()?)?;
-    fs::write(dir.path().join("text.actq"), "no image")?;
-    let [image, none, out] = ["made.actq", "text.actq", "out"].map(at);
-    for (image, name, message) in [
-        (&image, "2walk", "a letter first"),
-        (&image, "a-b", "use lower-case letters"),
-        (&image, "actq", "actq.h is the library's header"),
-        (&none, "walker", "text.actq"),
-    ] {
-        failed(&run(actq(&["export-c", image, "--out", &out, "--name", name]), b"")?, 1, &[message])?;
-    }
-    failed(&run(actq(&["export-c", &image, "--out", &none]), b"")?, 1, &["text.actq: exists and is not a folder"])?;
-    let steps = ["export-c", &image, "--out", &out, "--steps"];
-    failed(&run(actq(&[&steps[..], &["5"]].concat()), b"")?, 2, &["--golden"])?;
-    failed(&run(actq(&[&steps[..], &["0", "--golden", &none]].concat()), b"")?, 2, &["--steps", "use 1 step or more"])?;
-    ensure!(!dir.path().join("out").exists(), "nothing is written");
-    Ok(())
-}

@@ -178,13 +178,6 @@ pub(super) fn edit(policy: &Path, pointer: &str, value: Value) -> Result<()> {
     write_json(policy, &json)
 }
 
-/// Replaces a tensor.
-pub(super) fn replace(policy: &Path, name: &'static str, dtype: Dtype, shape: &[usize], bytes: Vec<u8>) -> Result<()> {
-    let mut tensors = tensors();
-    tensors.insert(name, (dtype, shape.to_vec(), bytes));
-    write_tensors(policy, &tensors)
-}
-
 pub(super) fn text(path: &Path) -> String {
     path.display().to_string()
 }

@@ -5,7 +5,7 @@ use std::fs;
 #[cfg(unix)]
 use std::os::unix::fs::PermissionsExt as _;
 
-use actq_bench::command::{actq, all, failed, run, succeeded};
+use actq_bench::command::{actq, failed, run, succeeded};
 use anyhow::{Result, ensure};
 
 use super::bundle::{Robot, YAML, recording};
@@ -18,50 +18,6 @@ fn with_image() -> Result<Robot> {
     let (policy, image) = (text(&robot.path("out")), text(&robot.path("head.actq")));
     succeeded(&run(actq(&["quantize", &policy, "--method", "rtn", "--out", &image]), b"")?)?;
     Ok(robot)
-}
-
-#[test]
-fn bad_files_are_named_with_the_remedy() -> Result<()> {
-    let robot = with_image()?;
-    let names = ["bundle", "new", "head.actq", "made.h", "none", "text", "raw.npz", "out/deploy.toml"];
-    let [bundle, new, image, header, none, malformed, raw, description] = names.map(|name| text(&robot.path(name)));
-    fs::write(robot.path("text"), "= 1")?;
-    let key = text(&robot.path("key.pem"));
-    let sign = ["sign", &image, "--version", "1", "--out", &new, "--key"];
-    let import = ["import", &bundle, "--out", &new, "--accept-profile"];
-    let constants = ["constants", &image, "--out", &header, "--gains"];
-    let push = ["link", "push", "tcp:localhost:1", &image, "--signature"];
-    let answers = [&import[..], &["--answers"]].concat();
-    let form = "pass a TOML file of lines KEY = VALUE to --answers";
-    let lines: [(&[&str], &str, &[&str]); 10] = [
-        (&answers, &none, &["none: cannot read the answers", form]),
-        (&answers, &bundle, &["bundle: cannot read the answers", form]),
-        (&answers, &malformed, &["text: is not TOML", form]),
-        (&constants, &none, &["none: cannot read the gains; pass the deploy.toml of the policy to --gains"]),
-        (&constants, &malformed, &["text: is not a description; pass the deploy.toml"]),
-        (&push, &none, &["none: cannot read the signature; pass a file that `actq sign` wrote to --signature"]),
-        (&push, &description, &["deploy.toml: is not a signature; pass a file that `actq sign` wrote"]),
-        (&sign, &malformed, &["text: is not an Ed25519 private key in PKCS #8 as PEM; make one with `actq keygen`"]),
-        (&["import", "--accept-profile", "--out", &new], &none, &["none: cannot read the bundle"]),
-        (
-            &[&import[..], &["--calib"]].concat(),
-            &recording(&robot)?,
-            &["recording.npz: there is no raw array \"joint_pos\""],
-        ),
-    ];
-    all(lines.map(|(line, file, messages)| {
-        let words = [line, &[file]].concat();
-        (words.join(" "), run(actq(&words), b"").and_then(|output| failed(&output, 1, messages)))
-    }))?;
-    ensure!(!robot.path("new").exists() && !robot.path("made.h").exists(), "something was written");
-    // A key is no signature of the image either.
-    succeeded(&run(actq(&["keygen", "--out", &key]), b"")?)?;
-    failed(&run(actq(&[&push[..], &[&key]].concat()), b"")?, 1, &["key.pem: is not a signature"])?;
-    failed(
-        &run(actq(&["check", &image, "--reference", &format!("{raw}:{raw}")]), b"")?,
-        1,
-        &["it has none of the arrays"],
-    )
 }
 
 #[test]

@@ -328,6 +328,7 @@ fn a_status_says_whether_another_try_helps() -> Result<()> {
         plan.lines().find(is_kind).context("a job")
     };
     failed(&sweep.run("job - --store store", line("drive")?)?, 75, &["run that job first"])?;
+    failed(&sweep.run("job - --store store", "{}")?, 1, &["standard input: is not one job"])?;
     // No file may grow: a stand-in for a full disk.
     let full = |line: &str| -> Result<Output> {
         let mut shell = Command::new("sh");
@@ -389,32 +390,4 @@ fn failed_jobs_leave_the_other_results() -> Result<()> {
     );
     ensure!(!sweep.folder()?.join("new.json").exists(), "the file is of the whole plan");
     Ok(())
-}
-
-#[test]
-fn sweeps_are_refused_before_any_job() -> Result<()> {
-    let sweep = Sweep::new()?;
-    fs::write(sweep.folder()?.join("key.toml"), format!("bit = 3\n{SPEC}"))?;
-    failed(&sweep.run("sweep key.toml --store store --quiet", "")?, 1, &["key.toml", "unknown field `bit`"])?;
-    failed(&sweep.run("sweep none.toml --store store --quiet", "")?, 1, &["none.toml: cannot read the file"])?;
-    failed(
-        &sweep.run("sweep sweep.toml --store store --bpw 3 --methods rtn", "")?,
-        1,
-        &["sweep.toml: is a spec, which has keys for --bpw, --methods"],
-    )?;
-    failed(&sweep.run("sweep sweep.toml policy --store store", "")?, 1, &["sweep.toml: is a spec; sweep it alone"])?;
-    failed(&sweep.run("sweep sweep.toml --quiet", "")?, 1, &["sweep.toml: is a spec; add --store DIR"])?;
-    failed(&sweep.run("sweep sweep.toml --store policy --quiet", "")?, 1, &["is not empty, and has no store.json"])?;
-    // Another try does not help.
-    failed(&sweep.run("merge sweep.toml --store sweep.toml", "")?, 1, &["sweep.toml: is not a folder"])?;
-    fs::create_dir(sweep.folder()?.join("new"))?;
-    failed(&sweep.run("merge sweep.toml --store new", "")?, 1, &["jobs have no result yet"])?;
-    ensure!(sweep.store("new")?.is_empty(), "a command that only reads made a file");
-    // A mistyped folder is not made.
-    for line in ["merge sweep.toml --store nwe", "plan sweep.toml --missing nwe"] {
-        failed(&sweep.run(line, "")?, 1, &["nwe: there is no such folder; name the folder of the results"])?;
-    }
-    ensure!(!sweep.folder()?.join("nwe").exists(), "a folder was made");
-    failed(&sweep.run("job - --store store", "{}")?, 1, &["standard input: is not one job"])?;
-    failed(&sweep.run("plan simulator.sh", "")?, 1, &["simulator.sh: is not a plan"])
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use actq_bench::command::{actq, all, failed, research, run, succeeded};
+use actq_bench::command::{actq, failed, research, run, succeeded};
 use anyhow::{Result, ensure};
 
 use super::fixture::{Fixture, OBS, draw_observations, text, write_npy};
@@ -18,12 +18,6 @@ fn sweep_accepts_named_recordings() -> Result<()> {
         let policy = text(&policy);
         run(actq(&[&["sweep", &policy, "--methods", "rtn,gptq", "--bpw", "4"], more].concat()), b"")
     };
-    failed(&sweep(&[])?, 1, &["actq sweep needs recorded observations: put heldout.npz", "--heldout"])?;
-    failed(
-        &sweep(&["--heldout", &text(&heldout)])?,
-        1,
-        &["gptq needs recorded observations: put calib.npz", "--calib"],
-    )?;
     let table = succeeded(&sweep(&["--heldout", &text(&heldout), "--calib", &text(&calib)])?)?;
     ensure!(table.contains("4 bits") && table.contains("gptq") && table.contains("at 168 MHz"), "{table}");
     Ok(())
@@ -44,20 +38,6 @@ fn no_worker_outlives_a_sweep_without_log() -> Result<()> {
     let results = names.iter().filter(|name| name.ends_with(".json") && *name != "store.json").count();
     ensure!(results == 2, "two workers started: {names:?}");
     Ok(())
-}
-
-/// With distill in the list, the options of learning apply to it alone.
-#[test]
-fn sweeps_without_learning_refuse_its_options() -> Result<()> {
-    let fixture = Fixture::new()?;
-    let policy = text(&fixture.policy());
-    let lines = [("steps", "--steps 2"), ("effort", "--effort quick"), ("relative", "--relative")];
-    all(lines.map(|(key, options)| {
-        let line = format!("--methods rtn,gptq --bpw 4 {options}");
-        let arguments: Vec<&str> = ["sweep", &policy].into_iter().chain(line.split_whitespace()).collect();
-        let refusal = format!("{key}: only method distill learns; add \"distill\" to methods, or remove {key}");
-        (line.clone(), run(actq(&arguments), b"").and_then(|output| failed(&output, 1, &[&refusal])))
-    }))
 }
 
 /// Every method that needs actions takes the f32 policy's, and so do the errors.
