@@ -21,7 +21,7 @@ use crate::record::{FORMAT, Outcome, Record};
 use crate::store::Store;
 use crate::work::{self, Work};
 use inputs::{Kept, check_inputs, heldout, image, path_of};
-pub use merge::{merge, merge_finished};
+pub use merge::{Read, merge, merge_finished};
 
 /// Runs a job and writes its result into the store, in place of a damaged one. Returns `false` if the store has the
 /// whole result already. `watch` receives the present work and the share of it that is done.
@@ -40,7 +40,7 @@ pub fn run(job: &Job, store: &Store, host: &dyn Host, watch: &mut dyn FnMut(&str
             Work::Learn(learn) => images::learn(job, learn, store, host, watch)?,
             Work::Evaluate(evaluate) => (self::evaluate(job, evaluate, store, host)?, None),
             Work::Drive(drive) => drive::drive(job, drive, store, host)?,
-            Work::Merge(merge) => (Outcome::Merged(self::merge(merge, store)?), None),
+            Work::Merge(merge) => (Outcome::Merged(self::merge(merge, &|address| store.read_whole(address))?), None),
             Work::Custom(work) => custom::custom(job, work, store, host, watch)?,
         };
         let record = Record { format: FORMAT, address: job.address.clone(), version: version(), result };

@@ -1,5 +1,6 @@
 //! The folder of results: one file per job, whole or absent.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::digest::{is_digest, of_bytes};
 use crate::error::JobError;
 use crate::host::Host;
+use crate::job::Job;
 use crate::record::{FORMAT, Outcome, Record};
 
 /// Name of the file that makes a folder a store.
@@ -160,10 +162,17 @@ impl Store {
         is_digest(address) && self.read_whole(address).is_ok()
     }
 
-    /// Returns what is damaged in the result of a job or in the file beside it; `None` if both are whole, or if there is
-    /// no result.
-    pub fn damage(&self, address: &str) -> Option<Error> {
-        self.read_whole(address).err().filter(|error| !error.again).map(|error| error.error)
+    /// Reads the results of jobs, and checks the files beside them, one time.
+    pub fn results(&self, jobs: &[Job]) -> Results<'_> {
+        let (mut whole, mut damaged) = (BTreeMap::new(), Vec::new());
+        for Job { address, .. } in jobs {
+            match self.read_whole(address) {
+                Ok(result) => drop(whole.insert(address.clone(), result)),
+                Err(error) if !error.again => damaged.push(error.error),
+                Err(_) => (),
+            }
+        }
+        Results { store: self, whole, damaged }
     }
 
     /// Reads the result of a job, and checks the file beside it.
@@ -251,6 +260,32 @@ impl Store {
 
     fn write(&self, name: &str, bytes: &[u8], host: &dyn Host) -> Result<(), JobError> {
         host.write(&self.folder.join(name), bytes).map_err(JobError::again)
+    }
+}
+
+/// The results of a plan that a store had.
+#[derive(Debug)]
+pub struct Results<'a> {
+    store: &'a Store,
+    /// Results that are whole, with the files beside them, by their addresses.
+    whole: BTreeMap<String, Outcome>,
+    /// What is damaged in a result or in the file beside it.
+    pub damaged: Vec<Error>,
+}
+
+impl Results<'_> {
+    /// Returns `true` if the result of a job is whole.
+    pub fn has(&self, address: &str) -> bool {
+        self.whole.contains_key(address)
+    }
+
+    /// Returns the result of a job.
+    ///
+    /// # Errors
+    ///
+    /// As [`Store::read_whole`].
+    pub fn get(&self, address: &str) -> Result<Outcome, JobError> {
+        self.whole.get(address).map_or_else(|| self.store.read_whole(address), |result| Ok(result.clone()))
     }
 }
 

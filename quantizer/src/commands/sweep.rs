@@ -80,7 +80,7 @@ pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> 
         merge::report_finished(&jobs, &store)?;
         return Err(error);
     }
-    merge::report(&jobs, &store, outputs, args.svg.is_some(), args.json.is_some())
+    merge::report(&jobs, &|address| store.read_whole(address), outputs, args.svg.is_some(), args.json.is_some())
 }
 
 /// Returns the spec or plan that is given instead of policies.

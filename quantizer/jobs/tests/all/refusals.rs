@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use std::slice;
 
 use crate::common::{Fake, SPEC, files, folder, jobs, run_all};
 use actq_jobs::job::Job;
@@ -176,7 +177,7 @@ fn any_changed_byte_of_a_store_is_noticed() {
             let Ok(whole) = fs::read(&file) else { continue };
             let noticed = |bytes: &[u8], what: &str| {
                 fs::write(&file, bytes).expect("written");
-                let damage = store.damage(&job.address).map(|damage| format!("{damage:#}"));
+                let damage = store.results(slice::from_ref(job)).damaged.first().map(|damage| format!("{damage:#}"));
                 let named = damage.as_ref().is_some_and(|text| text.contains(&*file.to_string_lossy()));
                 assert!(named && !store.has(&job.address), "{kind}, {ending}, {what}: {damage:?}");
             };
@@ -189,7 +190,7 @@ fn any_changed_byte_of_a_store_is_noticed() {
             (0..whole.len()).step_by(1 + whole.len() / 50).for_each(|cut| noticed(&whole[..cut], "cut"));
             noticed(&[&whole[..], b"\n"].concat(), "longer");
             fs::write(&file, &whole).expect("written");
-            assert!(store.has(&job.address) && store.damage(&job.address).is_none());
+            assert!(store.has(&job.address) && store.results(slice::from_ref(job)).damaged.is_empty());
         }
     }
 }

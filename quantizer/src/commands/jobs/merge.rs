@@ -3,12 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use actq::error::Error;
 use actq::text::count;
 use actq_jobs::job::Job;
 use actq_jobs::merged::Merged;
 use actq_jobs::record::Outcome;
-use actq_jobs::run;
+use actq_jobs::run::{self, Read};
 use actq_jobs::store::Store;
 use actq_jobs::work::{Merge, Work};
 use anyhow::{Context as _, Result, ensure};
@@ -26,7 +25,8 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     let store = Store::open_existing(&args.store)?;
     refuse_inside(&args.store, args.svg.iter().chain(&args.json))?;
     let outputs = reserve(args.svg.iter().chain(&args.json), plan::inputs(&args.spec, &jobs))?;
-    let damaged: Vec<Error> = jobs.iter().filter_map(|job| store.damage(&job.address)).collect();
+    let results = store.results(&jobs);
+    let damaged = &results.damaged;
     note(damaged.iter().map(|damage| format!("{damage:#}")));
     ensure!(
         damaged.is_empty(),
@@ -36,7 +36,7 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
         args.spec.display(),
         args.store.display()
     );
-    let left = jobs.iter().filter(|job| job.work.kind() != "merge" && !store.has(&job.address)).count();
+    let left = jobs.iter().filter(|job| job.work.kind() != "merge" && !results.has(&job.address)).count();
     ensure!(
         left == 0,
         "{}: {left} of {} jobs have no result yet; run `actq sweep {} --store {}`",
@@ -45,13 +45,13 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
         args.spec.display(),
         args.store.display()
     );
-    report(&jobs, &store, outputs, args.svg.is_some(), args.json.is_some())
+    report(&jobs, &|address| results.get(address), outputs, args.svg.is_some(), args.json.is_some())
 }
 
 /// Prints the rows of a plan whose images and errors are in the store, after some jobs have failed.
 pub(crate) fn report_finished(jobs: &[Job], store: &Store) -> Result<()> {
     let merge = rows_of(merge_of(jobs)?)?;
-    let Some(finished) = run::merge_finished(merge, store)? else { return Ok(()) };
+    let Some(finished) = run::merge_finished(merge, &store.results(jobs))? else { return Ok(()) };
     let rows: usize = finished.policies.iter().map(|policy| policy.images.len()).sum();
     print(&merged::report(&finished))?;
     note([format!("the table has {rows} of {}, and no success where a drive failed", count(merge.rows.len(), "row"))]);
@@ -73,8 +73,8 @@ pub(crate) fn refuse_inside<'a>(store: &Path, outputs: impl IntoIterator<Item = 
 }
 
 /// Prints the results of a plan that are in the store, and writes the outputs: a plot, then figures as JSON.
-pub(crate) fn report(jobs: &[Job], store: &Store, outputs: Outputs, svg: bool, json: bool) -> Result<()> {
-    let merged = merged(jobs, store)?;
+pub(crate) fn report(jobs: &[Job], read: Read<'_>, outputs: Outputs, svg: bool, json: bool) -> Result<()> {
+    let merged = merged(jobs, read)?;
     print(&merged::report(&merged))?;
     let svg = svg.then(|| frontiers::svg(&merged));
     let json = if json { Some(serde_json::to_string_pretty(&merged)? + "\n") } else { None };
@@ -103,13 +103,11 @@ fn rows_of(job: &Job) -> Result<&Merge> {
 }
 
 /// Returns the results of a plan: those of its merge if that has run, or else of its other jobs. It writes nothing.
-fn merged(jobs: &[Job], store: &Store) -> Result<Merged> {
+fn merged(jobs: &[Job], read: Read<'_>) -> Result<Merged> {
     let job = merge_of(jobs)?;
-    if !store.has(&job.address) {
-        return Ok(run::merge(rows_of(job)?, store)?);
-    }
-    match store.read(&job.address)? {
-        Outcome::Merged(merged) => Ok(merged),
-        _ => anyhow::bail!("{}: the result is not of kind merge", job.address),
+    match read(&job.address) {
+        Ok(Outcome::Merged(merged)) => Ok(merged),
+        Err(_) => Ok(run::merge(rows_of(job)?, read)?),
+        Ok(_) => anyhow::bail!("{}: the result is not of kind merge", job.address),
     }
 }

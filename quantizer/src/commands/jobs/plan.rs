@@ -20,8 +20,9 @@ pub(crate) fn run(args: &PlanArgs) -> Result<()> {
     let mut jobs = read(&args.spec, &Command)?;
     if let Some(folder) = &args.missing {
         let store = Store::open_existing(folder)?;
-        note(jobs.iter().filter_map(|job| store.damage(&job.address)).map(|damage| format!("{damage:#}")));
-        jobs.retain(|job| !store.has(&job.address));
+        let results = store.results(&jobs);
+        note(results.damaged.iter().map(|damage| format!("{damage:#}")));
+        jobs.retain(|job| !results.has(&job.address));
     }
     jobs.retain(|job| args.stage.is_none_or(|stage| job.stage == stage));
     print(&order::text(&jobs)?)

@@ -46,9 +46,10 @@ pub struct Pool<'a> {
 /// At the end, if a job has failed; the store then has the results of the others. [`JobError::again`] is `true` if each
 /// of those that failed may succeed later.
 pub fn complete(jobs: &[Job], store: &Store, pool: &Pool<'_>) -> Result<()> {
-    note(jobs.iter().filter_map(|job| store.damage(&job.address)).map(|damage| format!("{damage:#}; it runs now")));
+    let results = store.results(jobs);
+    note(results.damaged.iter().map(|damage| format!("{damage:#}; it runs now")));
     let progress = Progress::new(pool.quiet, "starting")?;
-    let schedule = Schedule::new(jobs, |job| store.has(&job.address), pool.tries);
+    let schedule = Schedule::new(jobs, |job| results.has(&job.address), pool.tries);
     let mut work = Working { jobs, store, schedule, pool, shares: BTreeMap::new(), is_final: false };
     let ended = work.work(&progress);
     drop(progress);
