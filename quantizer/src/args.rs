@@ -88,10 +88,10 @@ pub(crate) enum Command {
     /// Turn a deploy bundle into an image and firmware, in one command that can be run again
     ///
     /// Imports the bundle into OUT/policy, compares it with --reference, quantizes it to OUT/policy.actq, and compares
-    /// the image with the reference. Writes OUT/policy.h and OUT/policy.rs for the application, and builds
-    /// OUT/BOARD.elf (in a checkout of actq, by `cargo xtask firmware`). Each step is a command of its own: import,
-    /// quantize, check, constants. If one fails, run the command again. It keeps the description, which you may edit in
-    /// between, and an image that was made with the same files and options.
+    /// the image with the reference. Writes OUT/policy.h and OUT/policy.rs for the application, and with --board builds
+    /// OUT/BOARD.elf, by `cargo xtask firmware` in the checkout that --sources names. Each step is a command of its
+    /// own: import, quantize, check, constants. If one fails, run the command again. It keeps the description, which
+    /// you may edit in between, and an image that was made with the same files and options.
     ///
     /// Without --steps, --effort and --minutes, learning takes at most 6 minutes, so that the image depends on the
     /// machine's speed. Pass --steps or --effort for the same image on every machine.

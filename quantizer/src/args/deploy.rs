@@ -70,6 +70,9 @@ pub(crate) struct DeployArgs {
     /// The board to build firmware for; `cargo xtask firmware --list` shows them
     #[arg(long, value_name = "NAME")]
     pub(crate) board: Option<String>,
+    /// The checkout of actq to build the firmware in, for --board. Without it, the command that builds it is printed
+    #[arg(long, value_name = "DIR", requires = "board")]
+    pub(crate) sources: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) reading: ReadingArgs,
     /// A recording of raw values by `actq serve --record`, or a folder of them; may be repeated. Without one, the

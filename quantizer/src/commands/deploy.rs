@@ -1,9 +1,8 @@
 //! `actq deploy`
 
 use std::collections::BTreeSet;
-use std::env;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use actq::data::files_of;
@@ -13,7 +12,7 @@ use actq::runtime::ImageBuffer;
 use actq_deploy::description::Description;
 use actq_deploy::{Bundle, DESCRIPTION};
 use actq_onnx::{Onnx, data_files};
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, ensure};
 
 use super::{bundle, check, constants, quantize};
 use crate::args::{CheckArgs, ConstantsArgs, DeployArgs, ImportArgs, LearnArgs, QuantizeArgs};
@@ -41,8 +40,8 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
         "give --recordings: what the policy observes on its task. `actq import` and `actq quantize --method rtn` make a first image; \
          run it on the robot or in simulation by `actq serve IMAGE --record FILE`, and pass FILE"
     );
-    if let Some(board) = &args.board {
-        check_board(board)?;
+    if let (Some(sources), Some(board)) = (&args.sources, &args.board) {
+        check_board(sources, board)?;
     }
     let made_with = made_with(args)?;
     let policy = args.out.join(POLICY);
@@ -64,7 +63,7 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
     }
     if let Some(board) = &args.board {
         step(5, "firmware")?;
-        firmware(board, &image, &args.out.join(format!("{board}.elf")))?;
+        firmware(args.sources.as_deref(), board, &image)?;
     }
     Ok(())
 }
@@ -214,55 +213,42 @@ fn is_made(image: &Path, policy: &Path, record: &Path, made_with: &str) -> bool 
     same && matches!((digest(), load(policy)), (Ok(digest), Ok(policy)) if policy.digest == digest)
 }
 
-/// Returns the checkout of actq that the present folder is in, whose own command builds firmware.
-fn checkout() -> Result<Option<PathBuf>> {
-    let here = env::current_dir().context("cannot find the current folder")?;
-    let root = here.ancestors().find(|folder| folder.join("tools/xtask/Cargo.toml").is_file());
-    Ok(root.map(Path::to_owned))
+/// Starts the command of a checkout of actq that builds firmware.
+fn xtask(sources: &Path, board: &str) -> Command {
+    let mut command = Command::new("cargo");
+    command.current_dir(sources).args(["xtask", "firmware", "--board", board]);
+    command
 }
 
-/// Refuses a board that the checkout has no firmware for. Outside a checkout no firmware is built.
-fn check_board(board: &str) -> Result<()> {
-    let Some(root) = checkout()? else { return Ok(()) };
-    let list = Command::new("cargo")
-        .current_dir(root)
-        .args(["xtask", "firmware", "--list"])
-        .stderr(Stdio::inherit())
-        .output()
-        .context("cannot start cargo, which builds the firmware")?;
+/// Refuses a board that the sources have no firmware for.
+fn check_board(sources: &Path, board: &str) -> Result<()> {
+    let status = xtask(sources, board).arg("--list").stdout(Stdio::null()).status();
+    let status = status.with_context(|| format!("cannot start cargo in {}", sources.display()))?;
     ensure!(
-        list.status.success(),
-        "cannot list the boards by `cargo xtask firmware --list`; remove --board, or repair it"
+        status.success(),
+        "--board {board}: the sources in {} have no firmware for it; use another board, or remove --board",
+        sources.display()
     );
-    let list = String::from_utf8_lossy(&list.stdout);
-    let boards: Vec<&str> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
-    ensure!(boards.contains(&board), "--board {board}: there is no such board; use one of {}", boards.join(", "));
     Ok(())
 }
 
-/// Builds the firmware by the workspace's own command, which only a checkout has.
-fn firmware(board: &str, image: &Path, elf: &Path) -> Result<()> {
+/// Builds the firmware by the sources' own command; without sources, shows that command.
+fn firmware(sources: Option<&Path>, board: &str, image: &Path) -> Result<()> {
     let image = fs::canonicalize(image).with_context(|| image.display().to_string())?;
-    let Some(root) = checkout()? else {
+    let Some(sources) = sources else {
         note([format!(
-            "firmware is built in a checkout of actq: cargo xtask firmware --board {board} --image {} --out {board}.elf",
+            "no firmware is built without --sources; in a checkout of actq: cargo xtask firmware --board {board} --image {} --out {board}.elf",
             image.display()
         )]);
         return Ok(());
     };
-    let elf = fs::canonicalize(elf.parent().unwrap_or(Path::new(".")))
-        .context("no output folder")?
-        .join(elf.file_name().unwrap_or_default());
-    let mut command = Command::new("cargo");
-    command
-        .current_dir(root)
-        .args(["xtask", "firmware", "--board", board, "--image"])
-        .arg(&image)
-        .arg("--out")
-        .arg(&elf);
-    let status = command.status().context("cannot start cargo")?;
-    if !status.success() {
-        bail!("cannot build the firmware for {board}; {} is whole, and the command can be run again", image.display());
-    }
+    let elf = image.with_file_name(format!("{board}.elf"));
+    let status = xtask(sources, board).arg("--image").arg(&image).arg("--out").arg(&elf).status();
+    let status = status.context("cannot start cargo")?;
+    ensure!(
+        status.success(),
+        "cannot build the firmware for {board}; {} is whole, and the command can be run again",
+        image.display()
+    );
     Ok(())
 }

@@ -16,8 +16,8 @@ use crate::{PROFILE, limits};
 /// The request.
 #[derive(Args, Debug, Default)]
 pub(crate) struct Options {
-    /// Show the boards
-    #[arg(long, exclusive = true)]
+    /// Show the boards; fails for a --board that is not among them
+    #[arg(long, conflicts_with_all = ["image", "limits", "features", "key", "out"])]
     pub(crate) list: bool,
     /// The board; --list shows them
     #[arg(long, value_name = "NAME", value_parser = board, required_unless_present = "list")]

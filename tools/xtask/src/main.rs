@@ -143,9 +143,11 @@ mod tests {
         let parse = |line: &str| Cli::try_parse_from(line.split(' ')).map(|_| ()).map_err(|error| error.to_string());
         assert_eq!(parse("xtask demo --help"), Ok(()));
         assert_eq!(parse("xtask firmware --list"), Ok(()));
+        assert_eq!(parse("xtask firmware --board stm32f405 --list"), Ok(()));
         assert_eq!(parse("xtask python --optional -- -k head"), Ok(()));
         for (line, expected) in [
             ("xtask firmware --board microbit --out f.elf", "use one of mps2-an386, mps2-an505, mps2-an500, stm32f405"),
+            ("xtask firmware --board stm32f4 --list", "use one of"),
             ("xtask firmware --board stm32f405", "--out <FILE.elf>"),
             ("xtask firmware --board stm32f405 --out f.elf --key 12", "64 hexadecimal digits"),
             ("xtask verify --al", "--all"),
