@@ -17,7 +17,7 @@ mod watch;
 
 pub use budgets::quantize;
 pub use flash::check_budget;
-pub use held_out::HeldOut;
+pub use held_out::{HeldOut, minutes_of_image};
 pub use quantizer::{QuantizedPolicy, Quantizer};
 pub use revision::REVISION;
 pub use tries::{Search, Try};

@@ -36,6 +36,8 @@ pub struct Policy {
     pub graph: Graph,
     /// Operations around the network in an image; the network's observations and actions then differ from the image's.
     pub around: Option<Around>,
+    /// Nodes of its source that replace or limit NaN and infinity, with what they do. The network has none of these.
+    pub guards: Vec<String>,
     /// Weights of all its matrices as they were trained; the divisor of bits per weight.
     pub weights: usize,
     /// Trained values ([`Graph::parameters`]), counted before what depends on the time alone became tables.
@@ -61,6 +63,7 @@ impl Policy {
             parameters: graph.parameters(),
             graph,
             around: None,
+            guards: Vec::new(),
             digest: [0; 32],
         }
     }

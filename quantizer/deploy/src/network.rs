@@ -47,7 +47,7 @@ impl OnnxNetwork {
             let read = |is_inner| -> Result<_> {
                 let choice = Choice { output: Some(name.clone()), is_fed: true, is_inner, ..Choice::default() };
                 let imported = file.import(&choice)?;
-                let policy = Policy::of_files(path, [path, path], &imported.json, &imported.weights)?;
+                let policy = imported.policy(path, path)?;
                 Ok((imported, Rc::new(policy)))
             };
             let (imported, policy) = read(false)?;

@@ -154,8 +154,19 @@ impl Importer for Onnx {
     }
 
     fn load(&self, path: &Path) -> Result<Policy> {
-        let imported = import(path, &Choice::default())?;
-        Policy::of_files(path, [path, path], &imported.json, &imported.weights)
+        import(path, &Choice::default())?.policy(path, path)
+    }
+}
+
+impl Imported {
+    /// Reads the policy in its two files. `file` names both in errors, and `folder` becomes the policy's.
+    ///
+    /// # Errors
+    ///
+    /// As [`Policy::of_files`].
+    pub fn policy(&self, folder: &Path, file: &Path) -> Result<Policy> {
+        let policy = Policy::of_files(folder, [file, file], &self.json, &self.weights)?;
+        Ok(Policy { guards: self.guards.clone(), ..policy })
     }
 }
 

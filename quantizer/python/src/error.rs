@@ -27,6 +27,32 @@ pub(crate) fn raise(error: impl Into<anyhow::Error>) -> PyErr {
     Error::new_err(lines.join("\n"))
 }
 
+/// As [`raise`], with the arguments of `import_policy` instead of the options of `actq import`.
+pub(crate) fn raise_of_import(error: actq::error::Error) -> PyErr {
+    Error::new_err(as_arguments(&printable(&format!("{error:#}"))))
+}
+
+/// Replaces options and their values by arguments, as `--observe gain` by `observe=["gain"]`.
+fn as_arguments(text: &str) -> String {
+    let mut text = text.replace("actq import --", "--");
+    for (option, argument) in [("--observe ", "observe"), ("--output ", "output"), ("--state ", "states")] {
+        let mut rest = std::mem::take(&mut text);
+        while let Some(at) = rest.find(option) {
+            let value = &rest[at + option.len()..];
+            let (value, after) = value.split_at(value.find([' ', ';', ':', ',']).unwrap_or(value.len()));
+            text += &rest[..at];
+            text += &match (argument, value.split_once('=')) {
+                ("observe", _) => format!("observe=[{value:?}]"),
+                ("states", Some((from, to))) => format!("states={{{from:?}: {to:?}}}"),
+                _ => format!("{argument}={value:?}"),
+            };
+            rest = after.to_owned();
+        }
+        text += &rest;
+    }
+    text
+}
+
 /// Extracts an argument. What Python or numpy cannot convert is this package's error, too.
 pub(crate) fn given<'a, 'py, T: FromPyObject<'a, 'py>>(object: &'a Bound<'py, PyAny>) -> PyResult<T> {
     object.extract::<T>().map_err(|error| of_python(object.py(), error.into()))

@@ -19,7 +19,7 @@ use numpy::{IntoPyArray as _, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::error::{OrRaise as _, error, given, raise};
+use crate::error::{OrRaise as _, error, given, raise_of_import};
 
 /// A policy in f32, as it was trained.
 ///
@@ -143,10 +143,8 @@ pub(crate) fn import_path(
             if is_answered {
                 return Err(refuse_answers());
             }
-            let imported = import(&path, &choice).or_raise()?;
-            let policy =
-                actq::policy::Policy::of_files(&path, [&path, &path], &imported.json, &imported.weights).or_raise()?;
-            return Ok(Policy::new(policy));
+            let imported = import(&path, &choice).map_err(raise_of_import)?;
+            return Ok(Policy::new(imported.policy(&path, &path).or_raise()?));
         }
         if choice.output.is_some() || !choice.states.is_empty() || !choice.observed.is_empty() {
             return Err(error!("{}: only an ONNX file takes output, states and observe", path.display()));
@@ -201,10 +199,8 @@ pub(crate) fn import_onnx<'py>(
     let (imported, policy, probes, actions) = py.detach(|| {
         let choice = Choice { output, states, observed: observe, ..Choice::default() };
         let imported = import_bytes(bytes, Path::new(""), &name, &choice).map_err(|error| error.context(name.clone()));
-        let imported = imported.map_err(raise)?;
-        let names = [Path::new(&name); 2];
-        let policy =
-            actq::policy::Policy::of_files(Path::new(""), names, &imported.json, &imported.weights).or_raise()?;
+        let imported = imported.map_err(raise_of_import)?;
+        let policy = imported.policy(Path::new(""), Path::new(&name)).or_raise()?;
         let probes = probes(&imported, &policy, &MAGNITUDES, FRAMES);
         let actions = actions(&policy, &probes);
         PyResult::Ok((imported, policy, probes, actions))

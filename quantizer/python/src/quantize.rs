@@ -7,7 +7,7 @@ use actq::budget::{Budget, TimeLimit};
 use actq::data::{Recording, Recordings, Sizes, joined};
 use actq::measure::{check, eval, recorded};
 use actq::methods::{Activations, Effort, MOST_MINUTES, Method, Options};
-use actq::pipeline::{Quantizer, check_budget};
+use actq::pipeline::{Quantizer, check_budget, minutes_of_image};
 use actq::runtime::ImageBuffer;
 use actq_cli::importers::{learned, learned_from, recorded_sizes};
 use actq_cli::report::notes;
@@ -139,14 +139,7 @@ pub(crate) fn quantize(
         let mut recordings = read(&policy, calib, heldout, in_folder)?;
         let mut warnings = notes::of_recordings(&recordings);
         warnings.extend(recorded::use_policy(&mut recordings, &policy.graph).iter().map(ToString::to_string));
-        if recordings.heldout.is_none() {
-            // The other half is for the images without held-out parts.
-            options.minutes = options.minutes.map(|minutes| minutes / 2.0);
-        }
-        let limits = match &policy.around {
-            Some(around) => notes::targets_without_limits(around),
-            None => notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))),
-        };
+        options.minutes = minutes_of_image(&policy, &recordings, &options);
         let calibrating = |share| worker.report("calibrating", share);
         let quantizer = Quantizer::new(&policy, &recordings, options.method.clone(), options.minutes, calibrating)?;
         warnings.extend(notes::mixed_units(quantizer.method().mixed_units()));
@@ -159,7 +152,7 @@ pub(crate) fn quantize(
         };
         let alone = found.buffer();
         let image = alone.image(Path::new("image"))?;
-        let mut notes: Vec<String> = limits.into_iter().collect();
+        let mut notes = notes::of_policy(&policy);
         if let Some(check) = check::check(&policy, image, &recordings, &options.method, held_out)? {
             notes.push(notes::errors(&check).trim_end().to_owned());
             warnings.extend(notes::of_check(&check, &options));

@@ -19,7 +19,7 @@ use super::import::refuse_existing;
 use crate::args::{ImportArgs, ReadingArgs};
 use crate::outputs::unfinished::OutputFolder;
 use crate::questions;
-use crate::report::deployment;
+use crate::report::{deployment, notes};
 use crate::terminal::{note, print, reserve};
 
 /// Returns `true` if the arguments name a bundle, or have an option that only bundles take.
@@ -50,7 +50,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     };
     note(deployment::unread(&reading.unread));
     note(deployment::without_limits(&reading.description));
-    note(deployment::guards(&bundle.guards()));
+    note(notes::guards(&bundle.guards()));
 
     let Gathered { mut files, mut inputs } = Gathered::of(&bundle, &reading)?;
     inputs.extend(args.calib.iter().chain(&args.reading.answers).chain(&args.reading.profile).cloned());

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use actq::data::{Dataset, Recording, Sizes};
 use actq::import::{FILES, Importer as _};
-use actq::policy::Policy;
 use actq_onnx::{Choice, Onnx, import};
 use anyhow::{Result, ensure};
 
@@ -24,7 +23,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     };
     let imported = import(&args.model, &choice)?;
     let [json, weights] = FILES.map(|name| args.out.join(name));
-    let policy = Policy::of_files(&args.out, [&args.model, &args.model], &imported.json, &imported.weights)?;
+    let policy = imported.policy(&args.out, &args.model)?;
     if let Some(fault) = imported.faults.first() {
         let remedy = "export it with a lower opset_version (torch declares 18 for 26 and above)";
         let invalid = format!("{}: the file is invalid: {fault}; {remedy}", args.model.display());

@@ -10,7 +10,7 @@ use actq::measure::time::{CLOCK, StepTime};
 use actq::measure::{check, own, recorded};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::stats::Stats;
-use actq::pipeline::{HeldOut, QuantizedPolicy, Quantizer, check_budget};
+use actq::pipeline::{HeldOut, QuantizedPolicy, Quantizer, check_budget, minutes_of_image};
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_kernels::Width;
@@ -54,14 +54,8 @@ pub fn run(
     let mut recordings = Recordings { calib, heldout };
     note(notes::of_recordings(&recordings));
     note(recorded::use_policy(&mut recordings, &source.graph).iter().map(ToString::to_string));
-    if recordings.heldout.is_none() {
-        // The other half is for the images without held-out parts.
-        options.minutes = options.minutes.map(|minutes| minutes / 2.0);
-    }
-    note(match &source.around {
-        Some(around) => notes::targets_without_limits(around),
-        None => notes::without_limits((0..source.act_len).map(|i| source.contract.limits(i))),
-    });
+    options.minutes = minutes_of_image(&source, &recordings, &options);
+    note(notes::of_policy(&source));
     let started = Instant::now();
     start_threads(args.run.threads)?;
     progress.begin("calibrating");

@@ -1,6 +1,6 @@
 //! Reports on an imported deploy bundle.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use actq::text::{count, printable};
@@ -61,18 +61,6 @@ pub fn without_limits(description: &Description) -> Option<String> {
             "the bundle states no limits for {}: a motor controller refuses to arm without them; add limits = [LOW, HIGH] to its [[target]] in \
              deploy.toml, each a number or one for each joint",
             names.join(", ")
-        )
-    })
-}
-
-/// Formats what the networks do with values that are not finite, as a note.
-pub fn guards(guards: &BTreeSet<String>) -> Option<String> {
-    let all: Vec<&str> = guards.iter().map(String::as_str).collect();
-    (!all.is_empty()).then(|| {
-        format!(
-            "{}. The image has none of these: a step with NaN or infinity in its observation is refused, and the application must \
-             replace such values before the step",
-            all.join("; ")
         )
     })
 }

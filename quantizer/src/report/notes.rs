@@ -47,8 +47,30 @@ pub fn how_to_record(policy: &Policy) -> String {
     )
 }
 
+/// Returns notes on a policy: actions or targets without limits, and what its source does with values that are not
+/// finite.
+pub fn of_policy(policy: &Policy) -> Vec<String> {
+    let limits = match &policy.around {
+        Some(around) => targets_without_limits(around),
+        None => without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))),
+    };
+    limits.into_iter().chain(guards(&policy.guards)).collect()
+}
+
+/// Returns a note on what a policy's source does with values that are not finite.
+pub(crate) fn guards<'a>(guards: impl IntoIterator<Item = &'a String>) -> Option<String> {
+    let all: Vec<&str> = guards.into_iter().map(String::as_str).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "{}. The image has none of these: a step with NaN or infinity in its observation is refused, and the application must \
+             replace such values before the step",
+            all.join("; ")
+        )
+    })
+}
+
 /// Returns a note that lists the actions without limits, for which a motor controller refuses to arm.
-pub fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Option<String> {
+pub(crate) fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Option<String> {
     let is_limited =
         |limits: Option<[f32; 2]>| limits.is_some_and(|limits| limits.iter().all(|limit| limit.is_finite()));
     let limits = limits.into_iter().enumerate();
@@ -64,7 +86,7 @@ pub fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Opt
 }
 
 /// Returns a note if a target of a description has no limits.
-pub fn targets_without_limits(around: &Around) -> Option<String> {
+fn targets_without_limits(around: &Around) -> Option<String> {
     let is_limited =
         |i: usize| around.limits.as_ref().is_some_and(|[low, high]| low[i] > f32::MIN && high[i] < f32::MAX);
     let without: Vec<usize> = (0..around.action_len()).filter(|i| !is_limited(*i)).collect();

@@ -126,6 +126,7 @@ fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) 
         parameters,
         graph: without_ignored(&graph),
         around: None,
+        guards: Vec::new(),
         digest,
     };
     policy.check()?;

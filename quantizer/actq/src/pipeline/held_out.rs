@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
-use crate::data::{Dataset, Part};
+use crate::data::{Dataset, Part, Recordings};
 use crate::error::Result;
 use crate::measure::check::compared;
 use crate::measure::eval::{ErrorReport, ErrorSums};
@@ -32,6 +32,15 @@ pub struct HeldOut {
 pub(super) struct Fold<'a> {
     method: PreparedMethod<'a>,
     held_out: Dataset,
+}
+
+/// Returns the minutes of learning that are left for the image itself: half of them if parts of the calibration recording
+/// will be held out for its error, as the images without those parts take the other half.
+pub fn minutes_of_image(policy: &Policy, recordings: &Recordings, options: &Options) -> Option<f64> {
+    let minutes = options.minutes?;
+    let calib = recordings.calib.as_ref().filter(|_| recordings.heldout.is_none());
+    let has_parts = calib.is_some_and(|calib| !calib.parts(&policy.graph, options.method.least_frames()).is_empty());
+    Some(if has_parts { minutes / 2.0 } else { minutes })
 }
 
 impl<'a> Quantizer<'a> {
@@ -116,7 +125,6 @@ mod tests {
 
     use super::*;
     use crate::budget::Budget;
-    use crate::data::Recordings;
     use crate::graph::Graph;
     use crate::measure::eval::evaluate;
     use crate::random::Random;
@@ -181,6 +189,18 @@ mod tests {
         assert_eq!(with(Method::Distill, 220), None);
         assert!(with(Method::Distill, 230).is_some_and(|error| error > 0.0));
         assert!(with(Method::Gptq, 30).is_some_and(|error| error > 0.0));
+    }
+
+    #[test]
+    fn half_of_the_minutes_measure_if_parts_can_be_held_out() {
+        let policy = Policy::of("random", lstm());
+        let options = Options { minutes: Some(4.0), ..Options::new(Method::Distill, Budget::BitsPerWeight(8.0)) };
+        let minutes = |frames: usize, heldout: Option<usize>| {
+            let walk = |frames| walk(&policy.graph, frames, 5);
+            let recordings = Recordings { calib: Some(walk(frames)), heldout: heldout.map(walk) };
+            minutes_of_image(&policy, &recordings, &options)
+        };
+        assert_eq!([minutes(230, None), minutes(220, None), minutes(230, Some(9))], [Some(2.0), Some(4.0), Some(4.0)]);
     }
 
     #[test]

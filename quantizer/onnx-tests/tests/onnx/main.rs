@@ -34,7 +34,7 @@ const TOLERANCE: f32 = 1e-5;
 
 fn imported(bytes: &[u8], choice: &Choice) -> Result<(Imported, Policy)> {
     let imported = import_bytes(bytes.to_vec(), Path::new("."), "test", choice)?;
-    let policy = Policy::of_files(Path::new("."), [Path::new("policy.json"); 2], &imported.json, &imported.weights)?;
+    let policy = imported.policy(Path::new("."), Path::new("policy.json"))?;
     Ok((imported, policy))
 }
 

@@ -1,6 +1,7 @@
 //! Remarks on a file: guards against NaN and infinity, and operators that it must not have.
 
 use actq_cli::report::imported::summary;
+use actq_cli::report::notes;
 use actq_onnx::Choice;
 use anyhow::Result;
 
@@ -27,6 +28,9 @@ fn remarks(guarded: &str) -> Result<(Vec<String>, Vec<String>)> {
         "a step with NaN or infinity in its observation is refused, and the application must replace such values";
     assert_eq!(report.contains(refusal), !imported.guards.is_empty());
     assert!(imported.guards.iter().all(|guard| report.matches(guard).count() == 1), "{report}");
+    // `quantize` and Python take the file without this summary.
+    let notes = notes::of_policy(&policy).join("\n");
+    assert!(imported.guards.iter().all(|guard| notes.contains(guard)), "{notes}");
     Ok((imported.guards, imported.faults))
 }
 
