@@ -42,8 +42,9 @@
 //!   it. Its enums are exhaustive, so that a writer that forgets an operation does not compile.
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
-// Without the feature, the modules for writers are private, with their public items.
-#![cfg_attr(not(feature = "writer"), allow(unreachable_pub))]
+// Without the feature `writer`, the modules for writers are private, with public items, and nothing uses some of these. They are compiled
+// in every build, so that a feature adds no code; the linker leaves out what a program does not call.
+#![cfg_attr(not(feature = "writer"), allow(dead_code, unreachable_pub, unused_imports))]
 
 /// Declares methods that are public with the feature `writer`, and private to the crate without it.
 macro_rules! writer_methods {

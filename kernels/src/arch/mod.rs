@@ -47,10 +47,8 @@ mod armv7em;
 #[cfg(actq_fpu)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
 mod armv7em_fpu;
-#[cfg(any(feature = "writer", not(actq_fpu)))]
 pub mod portable;
 mod product;
-#[cfg(feature = "writer")]
 pub mod reference;
 
 #[cfg(actq_armv7em)]

@@ -1,9 +1,7 @@
 //! The checksum.
 
 use super::header::UNCHECKED_WORDS;
-#[cfg(feature = "writer")]
 use super::header::{W_BYTES, W_CRC};
-#[cfg(feature = "writer")]
 use crate::error::ImageError;
 
 /// Remainders of four bits: a sixteenth of the usual table of 1 KB. They read an image word by word.
@@ -63,7 +61,6 @@ const fn reduce(mut crc: u32, bytes: usize) -> u32 {
 ///
 /// [`ImageError::TooShort`] if `bytes` ends before these fields, [`ImageError::Length`] if its length needs more than
 /// 32 bits.
-#[cfg(feature = "writer")]
 pub fn seal(bytes: &mut [u8]) -> Result<(), ImageError> {
     let len = u32::try_from(bytes.len()).map_err(|_| ImageError::Length)?;
     write(bytes, W_BYTES, len)?;
@@ -72,7 +69,6 @@ pub fn seal(bytes: &mut [u8]) -> Result<(), ImageError> {
 }
 
 /// Writes word `at` of an image.
-#[cfg(feature = "writer")]
 fn write(bytes: &mut [u8], at: usize, word: u32) -> Result<(), ImageError> {
     let field = bytes.get_mut(4 * at..).and_then(|rest| rest.first_chunk_mut()).ok_or(ImageError::TooShort)?;
     *field = word.to_le_bytes();

@@ -2,7 +2,6 @@
 
 use super::header::{self as h, Words};
 use super::info::header;
-#[cfg(feature = "writer")]
 use super::view::Image;
 use super::words::{high, low};
 use crate::image::op;

@@ -1,11 +1,8 @@
 //! The header: one table of its fields, by which they are read and written.
 
-#[cfg(feature = "writer")]
 use super::region::Region;
 use super::words::{HEADER_WORDS, Part};
-#[cfg(feature = "writer")]
 use super::words::{Records, TooLarge};
-#[cfg(feature = "writer")]
 use crate::layout::LAYOUT_STAMP;
 
 /// `ACTQ` in the first four bytes.
@@ -48,7 +45,6 @@ macro_rules! header {
             )+)*
         }
 
-        #[cfg(feature = "writer")]
         impl Header {
             /// Returns the header's words, without length and checksum ([`seal`](super::crc::seal)).
             ///
@@ -159,7 +155,6 @@ impl Kind {
 }
 
 /// The fields of a header, for a writer.
-#[cfg(feature = "writer")]
 #[derive(Clone, Copy, Debug)]
 pub struct Header {
     /// The meaning of the output.

@@ -2,10 +2,8 @@
 
 use super::header::{BLOCK_WORDS, MATRIX_WORDS, MAX_ROWS};
 use super::words::{Records, high, low, record, rest_from, section};
-#[cfg(feature = "writer")]
 use super::words::{TooLarge, halves};
 use crate::error::ImageError;
-#[cfg(feature = "writer")]
 use crate::layout::half::{bf16, half_word};
 use crate::layout::{Block, BlockShape, Lanes, Width, is_group};
 
@@ -53,7 +51,6 @@ impl MatrixRecord {
     /// # Errors
     ///
     /// [`TooLarge`] if a size does not fit its field.
-    #[cfg(feature = "writer")]
     pub fn emit(&self) -> Result<[u32; MATRIX_WORDS], TooLarge> {
         let Self { rows, cols, group, x_max, blocks } = *self;
         Ok([halves(rows, cols)?, halves(group, x_max.into())?, halves(blocks.count, 0)?, blocks.offset])
@@ -97,7 +94,6 @@ impl BlockRecord {
     /// # Errors
     ///
     /// [`TooLarge`] if a size does not fit its field.
-    #[cfg(feature = "writer")]
     pub fn emit(&self) -> Result<[u32; BLOCK_WORDS], TooLarge> {
         let head = self.width.bits() | u32::from(self.lanes.code()) << 8;
         Ok([halves(head as usize, self.rows)?, self.weights, self.scales, self.steps])
@@ -140,14 +136,12 @@ pub struct RowBlock<'a> {
 impl<'a> RowBlock<'a> {
     /// Returns the row scale of the block's row `i`.
     #[inline(always)]
-    #[cfg(feature = "writer")]
     pub fn scale(&self, i: usize) -> f32 {
         bf16(half_word(self.scales, i))
     }
 
     /// Dequantizes the block's row `i` to `level * group scale * row scale`, with the integers multiplied first. It
     /// fills `out` up to the number of columns.
-    #[cfg(feature = "writer")]
     pub fn dequantize(&self, i: usize, out: &mut [f32]) {
         let scale = self.scale(i);
         for (col, out) in out.iter_mut().enumerate().take(self.block.shape().cols) {
@@ -185,19 +179,16 @@ impl<'a> Matrix<'a> {
     }
 
     /// Returns the bytes of everything that describes the weights ([`block_bytes`]), without biases and matrix record.
-    #[cfg(feature = "writer")]
     pub fn weight_bytes(&self) -> usize {
         self.blocks().map(|rows| block_bytes(rows.block.shape(), !rows.steps.is_empty())).sum()
     }
 
     /// Returns the bias of output `row`; 0 if the matrix has none.
-    #[cfg(feature = "writer")]
     pub fn bias(&self, row: usize) -> f32 {
         self.bias.get(row).map_or(0.0, |w| f32::from_bits(u32::from_le(*w)))
     }
 
     /// Returns `true` if the matrix has biases: a product that accumulates adds those that it has.
-    #[cfg(feature = "writer")]
     pub fn has_bias(&self) -> bool {
         !self.bias.is_empty()
     }
@@ -256,20 +247,17 @@ pub(crate) fn row_block<'a>(
 
 /// Returns the bytes of a block: packed words with their padding and group scales, row scales, output steps if the
 /// block is `stepped`, and the block record.
-#[cfg(feature = "writer")]
 pub const fn block_bytes(shape: BlockShape, stepped: bool) -> usize {
     let steps = if stepped { shape.rows.div_ceil(4) } else { 0 };
     4 * (shape.words() + shape.rows.div_ceil(2) + steps + BLOCK_WORDS)
 }
 
 /// Packs u16 values two a word, as the image holds row scales.
-#[cfg(feature = "writer")]
 pub fn half_words(values: &[u16]) -> impl Iterator<Item = u32> + '_ {
     values.chunks(2).map(|pair| pair.iter().rev().fold(0u32, |word, v| word << 16 | u32::from(*v)))
 }
 
 /// Packs u8 values four a word, as the image holds output steps.
-#[cfg(feature = "writer")]
 pub fn quarter_words(values: &[u8]) -> impl Iterator<Item = u32> + '_ {
     values.chunks(4).map(|four| four.iter().rev().fold(0u32, |word, v| word << 8 | u32::from(*v)))
 }

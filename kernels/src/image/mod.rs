@@ -23,30 +23,22 @@ mod text;
 mod view;
 mod words;
 
-#[cfg(feature = "writer")]
 pub use contract::CONTRACT_ARRAYS;
 pub use crc::checksum;
-#[cfg(feature = "writer")]
 pub use crc::seal;
-#[cfg(feature = "writer")]
 pub use header::Header;
 pub use header::Kind;
 pub use info::ImageInfo;
 pub(crate) use matrix::row_block;
-#[cfg(feature = "writer")]
 pub use matrix::{BlockRecord, MatrixRecord, block_bytes, half_words, quarter_words};
 pub use matrix::{Matrix, RowBlock};
 pub(crate) use op::Around;
 pub use op::OpKind;
-#[cfg(feature = "writer")]
 pub use playback::kept_words;
 pub use ports::{Port, PortKind};
-#[cfg(feature = "writer")]
 pub use proof::{largest_sum_bound, worst_case};
 pub use record::Op;
-#[cfg(feature = "writer")]
 pub use record::OpRecord;
 pub use region::Region;
 pub use view::Image;
-#[cfg(feature = "writer")]
 pub use words::{Records, TooLarge};

@@ -1,6 +1,5 @@
 //! The operations, and a table of them: codes, names, the data that each needs, and the feature that has it.
 
-#[cfg(feature = "writer")]
 use core::mem::discriminant;
 
 use super::header as h;
@@ -116,24 +115,20 @@ impl OpKind {
         })
     }
 
-    #[cfg(feature = "writer")]
     fn form(self) -> Option<&'static Form> {
         FORMS.iter().find(|form| discriminant(&form.kind) == discriminant(&self))
     }
 
     /// Returns the operation code; 0 if the build leaves the operation out.
-    #[cfg(feature = "writer")]
     pub(crate) fn code(self) -> u8 {
         self.form().map_or(0, |form| form.code)
     }
 
-    #[cfg(feature = "writer")]
     fn texts(self) -> [&'static str; 2] {
         TEXTS.get(usize::from(self.code()).wrapping_sub(1)).copied().unwrap_or_default()
     }
 
     /// Returns a human-readable name; each function has its own.
-    #[cfg(feature = "writer")]
     pub fn name(self) -> &'static str {
         match self {
             Self::Function(function) => function.name(),
@@ -143,7 +138,6 @@ impl OpKind {
 
     /// Returns a human-readable name of the single constants, or of the third region of an operation without
     /// constants; empty if a report need not show them.
-    #[cfg(feature = "writer")]
     pub fn label(self) -> &'static str {
         self.texts()[1]
     }
@@ -212,7 +206,6 @@ macro_rules! operations {
         pub(crate) const NAMES: &[&str] = &[$(stringify!($NAME)),*];
 
         /// Human-readable names, and what they call their constants and third region.
-        #[cfg(feature = "writer")]
         static TEXTS: [[&str; 2]; NAMES.len()] = [$([$text, concat!($($label)?)]),*];
 
         /// Returns the feature of this crate with the operation of a code; empty if every build has it.

@@ -3,7 +3,6 @@
 
 use super::text::is_text;
 use super::view::Image;
-#[cfg(feature = "writer")]
 use super::words::{TooLarge, halves};
 use super::words::{high, low, record, section};
 

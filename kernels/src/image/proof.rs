@@ -6,7 +6,6 @@ use crate::x::{Plan, Scale, max_prepared_words};
 
 /// Computes the largest magnitude that an int32 sum of the block's rows can reach for activations up to `x_max`: the
 /// largest row sum of `|level| * scale`, times `x_max`. It is exact, in time linear in the number of weights.
-#[cfg(feature = "writer")]
 pub fn worst_case(block: &Block<'_>, x_max: u16) -> i64 {
     // A block of a valid shape always has a sum.
     largest_sum(block).map_or(i64::MAX, |sum| i64::from(sum) * i64::from(x_max))

@@ -7,14 +7,12 @@ use super::matrix::{Matrix, matrix};
 use super::op::{Around, FORMS, Form, IS_PARTIAL, NAMES, OpKind};
 use super::region::Region;
 use super::view::Image;
-#[cfg(feature = "writer")]
 use super::words::{TooLarge, halves};
 use super::words::{high, low, record, section, word};
 use crate::error::ImageError;
 use crate::math::Function;
 
 /// The fields of an operation's record, for a writer.
-#[cfg(feature = "writer")]
 #[derive(Clone, Copy, Debug)]
 pub struct OpRecord {
     /// Function of the operation.
@@ -31,7 +29,6 @@ pub struct OpRecord {
     pub data: u32,
 }
 
-#[cfg(feature = "writer")]
 impl OpRecord {
     /// Returns the record's words, which [`Image::ops`] reads.
     ///
@@ -75,7 +72,6 @@ impl<'a> Op<'a> {
     }
 
     /// Returns a recurrent cell's other region, the work area of a linear operation, or an empty region.
-    #[cfg(feature = "writer")]
     pub fn third(&self) -> Region {
         self.regions[2]
     }
@@ -101,22 +97,18 @@ impl<'a> Op<'a> {
     }
 
     /// Returns the single constants.
-    #[cfg(feature = "writer")]
     pub fn constants(&self) -> impl Iterator<Item = f32> {
         (0..usize::from(self.form.uses.constants)).map(|i| self.constant(i))
     }
 
-    writer_methods! {
-        /// Returns the coefficients of denoising step `step`, and the arena offset of its noise.
-        fn coefficients(&self, step: usize) -> ([f32; h::COEFFICIENTS], usize) {
-            let first = h::DENOISE_WORDS + step * h::COEFFICIENTS;
-            let noise = word(self.image, self.data().wrapping_add(1)) as usize;
-            (core::array::from_fn(|i| self.constant(first + i)), noise.wrapping_add(step * self.dst().len))
-        }
+    /// Returns the coefficients of denoising step `step`, and the arena offset of its noise.
+    pub fn coefficients(&self, step: usize) -> ([f32; h::COEFFICIENTS], usize) {
+        let first = h::DENOISE_WORDS + step * h::COEFFICIENTS;
+        let noise = word(self.image, self.data().wrapping_add(1)) as usize;
+        (core::array::from_fn(|i| self.constant(first + i)), noise.wrapping_add(step * self.dst().len))
     }
 
     /// Returns array `i` of f32 bits, of the length of `dst`: see [`OpKind`].
-    #[cfg(feature = "writer")]
     pub fn array(&self, i: usize) -> &'a [u32] {
         self.part(i, &(0..self.dst().len))
     }
@@ -150,11 +142,9 @@ impl<'a> Op<'a> {
         u32::from_le(self.record[3]) as usize
     }
 
-    writer_methods! {
-        /// Returns `true` if the operation reads its destination.
-        fn reads_dst(&self) -> bool {
-            self.form.uses.reads_dst || self.kind == OpKind::Linear { accumulate: true }
-        }
+    /// Returns `true` if the operation reads its destination.
+    pub fn reads_dst(&self) -> bool {
+        self.form.uses.reads_dst || self.kind == OpKind::Linear { accumulate: true }
     }
 
     pub(super) fn is_linear(&self) -> bool {

@@ -1,6 +1,5 @@
 //! Words of an image and their halves.
 
-#[cfg(feature = "writer")]
 use core::fmt;
 
 use crate::error::ImageError;
@@ -46,7 +45,6 @@ impl Part {
     }
 
     /// Returns a word with this field; its other bits are 0.
-    #[cfg(feature = "writer")]
     pub(super) fn put(self, value: usize) -> Result<u32, TooLarge> {
         match self {
             Self::Low => halves(value, 0),
@@ -57,22 +55,18 @@ impl Part {
 }
 
 /// A size that does not fit its field.
-#[cfg(feature = "writer")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLarge(pub usize);
 
-#[cfg(feature = "writer")]
 impl fmt::Display for TooLarge {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "a size of the policy is {}; the format's limit is 65535", self.0)
     }
 }
 
-#[cfg(feature = "writer")]
 impl core::error::Error for TooLarge {}
 
 /// Packs two u16 in a word.
-#[cfg(feature = "writer")]
 pub(super) fn halves(low: usize, high: usize) -> Result<u32, TooLarge> {
     let most = if low > high { low } else { high };
     if most > 0xffff { Err(TooLarge(most)) } else { Ok(low as u32 | (high as u32) << 16) }

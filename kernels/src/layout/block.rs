@@ -1,11 +1,9 @@
 //! A block of rows in place: its shape, its words, and the place of each code and scale.
 
 use super::format::QUAD;
-#[cfg(feature = "writer")]
 use super::format::{Cell, Format, STRIP};
 use super::lanes::{Lanes, MAX_PAIRED_GROUPED, PAIRED_GROUP, is_group};
 use super::pow2::{div_down, div_up, round_up};
-#[cfg(feature = "writer")]
 use super::table::with_format;
 use super::table::{LAYOUTS, Layout};
 use super::width::Width;
@@ -102,13 +100,11 @@ impl BlockShape {
     }
 
     /// Returns the words of the block.
-    #[cfg(feature = "writer")]
     pub const fn words(self) -> usize {
         self.padded_rows() / QUAD * self.quad_words()
     }
 
     /// Returns the first row and the number of rows of the strip that holds `row`.
-    #[cfg(feature = "writer")]
     const fn strip(self, row: usize) -> (usize, usize) {
         let height = self.layout().strip;
         let first = row & !(height - 1);
@@ -118,7 +114,6 @@ impl BlockShape {
 
     /// Returns the index of the first word of the cell that holds `row` in unit `unit`, and the distance to its next
     /// word.
-    #[cfg(feature = "writer")]
     pub(super) const fn cell_at(self, row: usize, unit: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
         let Cell { rows, words, .. } = self.layout().cell;
@@ -135,13 +130,11 @@ impl BlockShape {
     }
 
     /// Returns `true` if the scales of a strip of `height` rows follow pairs of groups.
-    #[cfg(feature = "writer")]
     const fn in_pairs(self, height: usize) -> bool {
         self.layout().x.pairs && height == STRIP
     }
 
     /// Returns the index of the word that holds the scale of `group` for `row`, and the scale's first bit.
-    #[cfg(feature = "writer")]
     pub(super) const fn scale_at(self, row: usize, group: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
         let row = row - first;
@@ -170,7 +163,6 @@ pub struct Block<'a> {
 impl<'a> Block<'a> {
     /// Combines `words` (little-endian, as in the image) with their shape; `None` if the shape is not valid or the
     /// length differs from [`BlockShape::words`].
-    #[cfg(feature = "writer")]
     pub fn new(shape: BlockShape, words: &'a [u32]) -> Option<Self> {
         if !shape.is_valid() {
             return None;
@@ -209,7 +201,6 @@ impl<'a> Block<'a> {
     }
 
     /// Returns the code at (`row`, `col`); 0 when out of range.
-    #[cfg(feature = "writer")]
     pub fn code(&self, row: usize, col: usize) -> u8 {
         if row >= self.shape.rows || col >= self.shape.cols {
             return 0;
@@ -220,7 +211,6 @@ impl<'a> Block<'a> {
     }
 
     /// Returns the words of the cell that holds `row` in unit `unit`.
-    #[cfg(feature = "writer")]
     fn cell(&self, row: usize, unit: usize) -> [u32; 3] {
         let (at, step) = self.shape.cell_at(row, unit);
         let mut cell = [0u32; 3];
@@ -231,13 +221,11 @@ impl<'a> Block<'a> {
     }
 
     /// Returns the level at (`row`, `col`), without any scale.
-    #[cfg(feature = "writer")]
     pub fn level(&self, row: usize, col: usize) -> i32 {
         self.shape.width.level(self.code(row, col))
     }
 
     /// Returns the group scale of (`row`, `col`); 1 without group scales.
-    #[cfg(feature = "writer")]
     pub fn group_scale(&self, row: usize, col: usize) -> u8 {
         match self.shape.group {
             0 => 1,
@@ -249,7 +237,6 @@ impl<'a> Block<'a> {
     }
 }
 
-#[cfg(feature = "writer")]
 fn extract<F: Format>(words: [u32; 3], row: usize, col: usize) -> u8 {
     F::extract(words, row, col)
 }

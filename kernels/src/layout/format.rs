@@ -99,28 +99,23 @@ pub trait Format {
     const X: XLayout;
 
     /// The bits of a code.
-    #[cfg(feature = "writer")]
     const CODE_BITS: u32 = (1 << Self::WIDTH.bits()) - 1;
 
     /// Returns the place of the code at (`row`, `col`) of a cell: the index of its part ([`Self::parts`]), its first
     /// bit there, modulo 32, and the bits of the code that are stored inverted.
-    #[cfg(feature = "writer")]
     fn place(row: usize, col: usize) -> (usize, usize, u32);
 
     /// Returns a cell's parts, words in each of which whole codes are: its words, and zeros.
-    #[cfg(feature = "writer")]
     fn parts([w0, w1, w2]: [u32; 3]) -> [u32; 8] {
         [w0, w1, w2, 0, 0, 0, 0, 0]
     }
 
     /// Returns the words of a cell: the inverse of [`Self::parts`].
-    #[cfg(feature = "writer")]
     fn whole([w0, w1, w2, ..]: [u32; 8]) -> [u32; 3] {
         [w0, w1, w2]
     }
 
     /// Writes `code` into a cell's words; the field must be zero before.
-    #[cfg(feature = "writer")]
     fn insert(words: &mut [u32; 3], row: usize, col: usize, code: u8) {
         let (part, bit, inverted) = Self::place(row, col);
         let mut parts = Self::parts(*words);
@@ -129,7 +124,6 @@ pub trait Format {
     }
 
     /// Returns the code at (`row`, `col`) of a cell.
-    #[cfg(feature = "writer")]
     fn extract(words: [u32; 3], row: usize, col: usize) -> u8 {
         let (part, bit, inverted) = Self::place(row, col);
         (Self::parts(words)[part & 7].rotate_right(bit as u32) & Self::CODE_BITS ^ inverted) as u8

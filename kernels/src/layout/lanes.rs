@@ -82,7 +82,6 @@ impl Lanes {
     }
 
     /// Returns the lanes of a [code](Self::code).
-    #[cfg(feature = "writer")]
     pub const fn from_code(code: u8) -> Option<Self> {
         match code {
             0 => Some(Self::Single),

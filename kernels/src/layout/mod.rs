@@ -37,10 +37,6 @@
 //!
 //! To add a width: its two layout files here, its line in `registry!` below and in the table above, its kernels' line
 //! in `arch/armv7em/table.rs`, and another [`LAYOUT_STAMP`].
-#![cfg_attr(
-    all(actq_armv7em, not(feature = "writer")),
-    allow(dead_code, reason = "the assembler computes what a layout file computes in Rust")
-)]
 
 /// The registry: a line for every width, with its bits, its feature, the grid of its levels (`Grid`), and its layouts
 /// of single and of paired lanes. It passes all lines to another macro, after a first argument for that.
@@ -64,7 +60,6 @@ mod block;
 mod format;
 pub(crate) mod half;
 pub(crate) mod lanes;
-#[cfg(feature = "writer")]
 mod pack;
 mod pow2;
 mod table;
@@ -79,24 +74,18 @@ pub mod w8_paired;
 pub(crate) mod width;
 
 pub use block::{Block, BlockShape};
-#[cfg(feature = "writer")]
 pub use format::{Cell, Start};
-#[cfg(any(feature = "writer", not(actq_armv7em)))]
 pub use format::{Format, Sums};
 pub use format::{PAD_COLS, QUAD, STRIP, XLayout};
 pub(crate) use lanes::PAIRED_GROUP;
-#[cfg(feature = "writer")]
 pub use lanes::{GROUPS, MAX_PAIRED_GROUPED};
 pub use lanes::{Lanes, MAX_GROUP, is_group};
-#[cfg(feature = "writer")]
 pub use pack::{PackError, pack};
 pub(crate) use pow2::{div_down, div_up, round_up};
 pub use table::Layout;
-#[cfg(feature = "writer")]
 pub use table::StripLog;
 #[cfg(actq_fpu)]
 pub(crate) use table::layout;
-#[cfg(any(feature = "writer", not(actq_armv7em)))]
 pub(crate) use table::with_format;
 pub use width::Width;
 

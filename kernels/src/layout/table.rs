@@ -24,7 +24,6 @@ pub struct Layout {
     /// Binary logarithm of a unit's columns.
     pub unit_log: u8,
     /// Binary logarithm of a strip's rows.
-    #[cfg_attr(not(any(feature = "writer", actq_armv7em)), expect(dead_code, reason = "only the assembler reads it"))]
     pub strip_log: StripLog,
     /// Binary logarithm of the step.
     pub step_log: u8,
@@ -72,7 +71,6 @@ macro_rules! table {
         }
 
         /// Calls a function that is generic over the layout of `$shape`.
-        #[cfg(any(feature = "writer", not(actq_armv7em)))]
         macro_rules! with_format {
             ($shape:expr, $call:ident::<_>$arguments:tt) => {{
                 use $crate::layout::lanes::Lanes;
@@ -83,7 +81,6 @@ macro_rules! table {
                 }
             }};
         }
-        #[cfg(any(feature = "writer", not(actq_armv7em)))]
         pub(crate) use with_format;
     };
 }

@@ -27,7 +27,6 @@ impl Format for W2 {
     const STEP: usize = 16;
     const X: XLayout = XLayout::single(-3);
 
-    #[cfg(feature = "writer")]
     fn place(_row: usize, col: usize) -> (usize, usize, u32) {
         (0, 1 + 2 * (col / 2) + 16 * (col % 2), 0)
     }

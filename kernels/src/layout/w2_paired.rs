@@ -51,7 +51,6 @@ impl Format for W2Paired {
         pairs: true,
     };
 
-    #[cfg(feature = "writer")]
     fn place(row: usize, col: usize) -> (usize, usize, u32) {
         let bit = 4 * (col / 2) + 16 * (col % 2);
         if row == 0 { (0, bit, 0) } else { (0, bit + 14, 2) }

@@ -34,7 +34,6 @@ impl Format for W3 {
     const STEP: usize = 32;
     const X: XLayout = XLayout::single(-7);
 
-    #[cfg(feature = "writer")]
     fn place(_row: usize, col: usize) -> (usize, usize, u32) {
         let (word, field) = (col / 2 / FIELDS, col / 2 % FIELDS);
         // The last pair is doubled.
@@ -42,13 +41,11 @@ impl Format for W3 {
         (word, first + 16 * (col % 2), 0)
     }
 
-    #[cfg(feature = "writer")]
     fn parts([w0, w1, w2]: [u32; 3]) -> [u32; 8] {
         let last = w0 & SPARE | w1 & SPARE << 1 | w2 & SPARE << 2;
         [w0, w1, w2, last, 0, 0, 0, 0]
     }
 
-    #[cfg(feature = "writer")]
     fn whole([w0, w1, w2, last, ..]: [u32; 8]) -> [u32; 3] {
         [w0 | last & SPARE, w1 | last & SPARE << 1, w2 | last & SPARE << 2]
     }

@@ -25,10 +25,8 @@ use super::width::Width;
 /// The codes of a set.
 const MASK: u32 = 0xe007_e007;
 /// Bits 7 and 8 of both lanes: those of a rotated last set that are not spare in `w0` and `w2`.
-#[cfg(feature = "writer")]
 const TAKEN: u32 = 0x0180_0180;
 /// Bits 9 to 12 of both lanes.
-#[cfg(feature = "writer")]
 const SPARE: u32 = 0x1e00_1e00;
 
 /// The 3-bit layout of paired lanes.
@@ -66,18 +64,15 @@ impl Format for W3Paired {
         pairs: false,
     };
 
-    #[cfg(feature = "writer")]
     fn place(row: usize, col: usize) -> (usize, usize, u32) {
         let (set, bit) = (2 * (col / 2) + row / 2, 16 * (col % 2));
         if row.is_multiple_of(2) { (set, bit, 0) } else { (set, bit + 13, 4) }
     }
 
-    #[cfg(feature = "writer")]
     fn parts(words: [u32; 3]) -> [u32; 8] {
         sets(words)
     }
 
-    #[cfg(feature = "writer")]
     fn whole(sets: [u32; 8]) -> [u32; 3] {
         let mut w0 = sets[0] | sets[1].rotate_left(6);
         let mut w1 = sets[2] | sets[3].rotate_left(6);

@@ -26,7 +26,6 @@ impl Format for W4 {
     const STEP: usize = 8;
     const X: XLayout = XLayout::single(-15);
 
-    #[cfg(feature = "writer")]
     fn place(_row: usize, col: usize) -> (usize, usize, u32) {
         (0, 1 + 4 * (col / 2) + 16 * (col % 2), 0)
     }

@@ -50,7 +50,6 @@ impl Format for W4Paired {
         pairs: false,
     };
 
-    #[cfg(feature = "writer")]
     fn place(row: usize, col: usize) -> (usize, usize, u32) {
         match row {
             0 => (0, 16 * col, 0),

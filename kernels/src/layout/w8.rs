@@ -29,7 +29,6 @@ impl Format for W8 {
     const STEP: usize = 4;
     const X: XLayout = XLayout::single(0);
 
-    #[cfg(feature = "writer")]
     fn place(_row: usize, col: usize) -> (usize, usize, u32) {
         (0, 8 * (col / 2) + 16 * (col % 2), 0)
     }

@@ -39,7 +39,6 @@ impl Format for W8Paired {
         pairs: false,
     };
 
-    #[cfg(feature = "writer")]
     fn place(row: usize, col: usize) -> (usize, usize, u32) {
         if row == 0 { (0, 16 * col, 0x80) } else { (0, 16 * col + 8, 0) }
     }

@@ -82,7 +82,6 @@ impl Width {
     }
 
     /// Returns the level (weight divided by its scale) of `code`. Bits of `code` above the width are ignored.
-    #[cfg(feature = "writer")]
     pub const fn level(self, code: u8) -> i32 {
         match self.grid() {
             Grid::Whole => code as i8 as i32,
@@ -103,7 +102,6 @@ impl Width {
 
     /// Returns the code whose level is nearest to `x` (a weight divided by its scale); ties go to the even code. At 8
     /// bits the result is symmetric: it is never -128. NaN gives the lowest code.
-    #[cfg(feature = "writer")]
     pub fn nearest_code(self, x: f32) -> u8 {
         match self.grid() {
             Grid::Whole => libm::rintf(x.clamp(-127.0, 127.0)) as i32 as u8,

@@ -1,6 +1,5 @@
 //! The elementwise functions.
 
-#[cfg(any(test, feature = "writer"))]
 use super::exp2::tanh_fraction;
 use super::exp2::{EXP, EXPONENT, FIXED_ONE, QUARTER, exp_fraction, fraction, power};
 use super::limits::zero_or_nan;
@@ -100,7 +99,6 @@ impl Function {
 
     /// Applies the function to every element, as [`Function::apply`] does, in a loop of its own that is inlined: a
     /// caller that is compiled for vectors gets a loop of vectors.
-    #[cfg(feature = "writer")]
     #[inline(always)]
     pub fn apply_inlined(self, x: &mut [f32]) {
         match self {
@@ -126,7 +124,6 @@ fn native(function: impl Fn(Native) -> Native, x: f32) -> f32 {
     function(Native::of(x)).get()
 }
 
-#[cfg(feature = "writer")]
 #[inline(always)]
 fn each_inlined(x: &mut [f32], function: impl Fn(f32) -> f32) {
     x.iter_mut().for_each(|x| *x = function(*x));
@@ -276,7 +273,6 @@ pub fn relu(x: f32) -> f32 {
 
 /// Computes `x` if positive, otherwise `exp(x) - 1`
 #[inline(always)]
-#[cfg(any(test, feature = "writer"))]
 pub fn elu<R: Real>(x: R) -> R {
     ELU.of(x)
 }
@@ -289,7 +285,6 @@ pub fn sigmoid<R: Real>(x: R) -> R {
 
 /// Computes `(e - 1) / (e + 1)` with `e = exp(2 x)`
 #[inline(always)]
-#[cfg(any(test, feature = "writer"))]
 pub fn tanh<R: Real>(x: R) -> R {
     let (n, d) = tanh_fraction(x);
     n / d

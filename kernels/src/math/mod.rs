@@ -24,9 +24,7 @@ pub(crate) mod real;
 mod soft;
 
 pub use functions::Function;
-#[cfg(any(feature = "writer", not(actq_fpu)))]
 pub use functions::sigmoid;
-#[cfg(feature = "writer")]
 pub use functions::{cos, elu, exp, gelu, gelu_tanh, mish, relu, silu, sin, softplus, tanh};
 pub(crate) use limits::zero_or_nan;
 pub use limits::{ORIENTATION, clamp};

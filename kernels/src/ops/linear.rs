@@ -9,7 +9,6 @@ use core::ops::Range;
 
 use super::elementwise::copy_le;
 use crate::arch;
-#[cfg(feature = "writer")]
 use crate::arch::Mismatch;
 use crate::arch::gemv;
 use crate::cursor::LinearCursor;
@@ -45,7 +44,6 @@ impl RowBlock<'_> {
     /// # Errors
     ///
     /// [`Mismatch`] if `x` was prepared for another shape, or if `start` or `y` is too short.
-    #[cfg(feature = "writer")]
     pub fn apply(
         &self,
         x: &Prepared<'_>,

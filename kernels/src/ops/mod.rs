@@ -1,7 +1,6 @@
 //! The operations of an image: each in its file, and here their list and the executor, which runs one of them.
 
 mod around;
-#[cfg(feature = "writer")]
 pub mod cells;
 pub mod denoise;
 pub mod elementwise;
@@ -16,10 +15,8 @@ use crate::arch;
 use crate::arena::{part, regions};
 use crate::cursor::Cursor;
 use crate::error::Fault;
-#[cfg(feature = "writer")]
 use crate::error::StepError;
 use crate::image::{Op, OpKind, Region};
-#[cfg(feature = "writer")]
 use crate::meter::Unlimited;
 use crate::meter::{Meter, Work};
 
@@ -29,7 +26,6 @@ use crate::meter::{Meter, Work};
 /// # Errors
 ///
 /// As [`Head::step`](crate::Head::step).
-#[cfg(feature = "writer")]
 pub fn run_whole(op: &Op<'_>, step: usize, arena: &mut [u32]) -> Result<(), StepError> {
     run(op, arena, &mut Cursor { step, ..Cursor::default() }, &mut Unlimited)?;
     Ok(())

@@ -9,7 +9,6 @@ use crate::math::{Native, Real, zero_or_nan};
 /// Computes in place `(x - mean) / sqrt(variance + eps) * weight + bias`, with mean and biased variance over the vector
 /// (torch's LayerNorm). Sums run in order from the first element. It does nothing if there are too few weights or
 /// biases.
-#[cfg(feature = "writer")]
 pub fn layer_norm(x: &mut [f32], weight: &[u32], bias: &[u32], eps: f32) {
     layer_norm_units(0..3 * x.len(), &mut Moments::default(), x, weight, bias, eps);
 }
@@ -34,7 +33,6 @@ pub(crate) fn layer_norm_units(
 }
 
 /// Computes in place `x / sqrt(mean(x^2) + eps) * weight`. It does nothing if there are too few weights.
-#[cfg(feature = "writer")]
 pub fn rms_norm(x: &mut [f32], weight: &[u32], eps: f32) {
     rms_norm_units(0..2 * x.len(), &mut Moments::default(), x, weight, eps);
 }

@@ -107,7 +107,6 @@ pub fn of_op(op: &Op<'_>) -> Cost {
 /// Computes the cost of a linear operation with biases, from `cols` values to `rows`, whose blocks have these shapes,
 /// each of another width. `in_order` is `false` if they have output steps. If it accumulates, its output is added to,
 /// without biases.
-#[cfg(feature = "writer")]
 pub fn of_linear(
     [rows, cols]: [usize; 2],
     blocks: impl IntoIterator<Item = BlockShape>,
@@ -125,7 +124,6 @@ pub fn of_linear(
 }
 
 /// Computes the cost of the elements of an operation that has no matrix, or of the units of a cell.
-#[cfg(feature = "writer")]
 pub fn of_elements(kind: OpKind, len: usize) -> Cost {
     total(|add| {
         add(value(kind, kind.code()), len);

@@ -128,7 +128,6 @@ impl Feature {
     pub const COUNT: usize = GEMVS + LAYOUTS * Strips::ALL.len() * Gemv::ALL.len();
 
     /// Iterates over all features.
-    #[cfg(any(test, feature = "writer"))]
     pub fn all() -> impl Iterator<Item = Self> {
         (0..Self::COUNT as u16).map(Self)
     }

@@ -11,17 +11,13 @@ mod plan;
 mod prepared;
 mod scale;
 
-#[cfg(feature = "writer")]
 pub use crate::error::NotFinite;
 pub(crate) use plan::Extent;
-#[cfg(feature = "writer")]
 pub use plan::KernelArguments;
 pub use plan::{Plan, max_prepared_words};
 pub use prepared::Prepared;
 #[cfg(not(actq_fpu))]
 pub(crate) use prepared::lay_out;
-#[cfg(feature = "writer")]
 pub use prepared::prepare;
 pub use scale::Scale;
-#[cfg(feature = "writer")]
 pub use scale::TINY;

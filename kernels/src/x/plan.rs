@@ -19,13 +19,11 @@ pub struct Plan {
     pub(crate) first: usize,
     /// Words of the prepared vector.
     pub(super) words: usize,
-    #[cfg_attr(not(any(feature = "writer", actq_armv7em)), expect(dead_code, reason = "only the assembler reads it"))]
     arguments: KernelArguments,
 }
 
 /// Arguments of an assembler kernel that depend on the vector's lengths. The plan keeps them: a call has no time to
 /// compute them.
-#[cfg_attr(not(any(feature = "writer", actq_armv7em)), expect(dead_code, reason = "only the assembler reads it"))]
 #[derive(Clone, Copy, Debug)]
 pub struct KernelArguments {
     /// Words that the kernel reads. Single lanes read no more than the block's own units. With row scales, the vector's
@@ -99,7 +97,6 @@ impl Plan {
     }
 
     /// Returns the words of the prepared vector.
-    #[cfg(feature = "writer")]
     pub const fn words(&self) -> usize {
         self.words
     }
@@ -112,31 +109,26 @@ impl Plan {
 
     /// Returns the arguments of an assembler kernel.
     #[inline(always)]
-    #[cfg(any(feature = "writer", actq_armv7em))]
     pub const fn arguments(&self) -> KernelArguments {
         self.arguments
     }
 
     /// Returns the columns of a group.
-    #[cfg(any(feature = "writer", not(actq_fpu)))]
     const fn group(&self) -> usize {
         self.first + (self.chunks - 1) * self.layout.x.chunk
     }
 
     /// Returns the words of a group.
-    #[cfg(any(feature = "writer", not(actq_fpu)))]
     pub(super) const fn group_words(&self) -> usize {
         self.group() / 2 + self.chunks * self.layout.x.start_words + self.layout.x.sum as usize
     }
 
     /// Returns the words of a chunk of `columns` columns.
-    #[cfg(any(feature = "writer", not(actq_fpu)))]
     pub(super) const fn chunk_words(&self, columns: usize) -> usize {
         self.layout.x.start_words + columns / 2
     }
 
     /// Returns the words before the pair of column `col`.
-    #[cfg(feature = "writer")]
     pub(super) const fn words_before(&self, col: usize) -> usize {
         let (group, col) = (col / self.group(), col % self.group());
         let full_before = (col + self.layout.x.chunk - self.first) / self.layout.x.chunk;

@@ -1,7 +1,6 @@
 //! A prepared vector, and its preparation in Rust.
 
 use super::plan::Plan;
-#[cfg(any(feature = "writer", not(actq_fpu)))]
 use crate::layout::XLayout;
 
 /// A prepared vector.
@@ -32,20 +31,17 @@ impl<'a> Prepared<'a> {
     }
 
     /// Iterates over the groups' words, each with its sum if the layout has one.
-    #[cfg(any(feature = "writer", not(actq_armv7em)))]
     pub(crate) fn groups(&self) -> impl Iterator<Item = &'a [u32]> {
         self.words.chunks(self.plan.group_words())
     }
 
     /// Iterates over the chunks of a group's words, without its sum.
-    #[cfg(any(feature = "writer", not(actq_armv7em)))]
     pub(crate) fn chunks(&self, group: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
         let (first, rest) = group.split_at(self.plan.chunk_words(self.plan.first).min(group.len()));
         core::iter::once(first).chain(rest.chunks(self.plan.chunk_words(self.plan.layout.x.chunk)))
     }
 
     /// Returns the value of column `col`; 0 when out of range.
-    #[cfg(feature = "writer")]
     pub fn value(&self, col: usize) -> i16 {
         if col >= self.plan.padded {
             return 0;
@@ -56,7 +52,6 @@ impl<'a> Prepared<'a> {
 }
 
 /// Prepares integers as [`Scale::quantize`](super::Scale::quantize) prepares f32 values.
-#[cfg(feature = "writer")]
 pub fn prepare<'w>(x: &[i16], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
     let x = x.get(..plan.shape.cols).unwrap_or(x);
     lay_out(x, plan, out.get_mut(..plan.words)?, |value| value as u16 as u32);
@@ -64,7 +59,6 @@ pub fn prepare<'w>(x: &[i16], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prep
 }
 
 /// Writes the prepared vector of any values, which `integer` converts to integers whose low 16 bits count.
-#[cfg(any(feature = "writer", not(actq_fpu)))]
 pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: impl Fn(V) -> u32) {
     let mut x = x;
     for group in out.chunks_exact_mut(plan.group_words()).take(plan.groups) {
@@ -89,7 +83,6 @@ pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: i
 }
 
 /// Writes a chunk of `x`, filled with zeros, and returns the sum of its integers.
-#[cfg(any(feature = "writer", not(actq_fpu)))]
 fn chunk<V: Copy>(x: &[V], format: &XLayout, out: &mut [u32], integer: &impl Fn(V) -> u32) -> i32 {
     let (starts, pairs) = out.split_at_mut(format.start_words.min(out.len()));
     let (whole, rest) = x.as_chunks::<2>();

@@ -19,25 +19,23 @@ impl Scale {
     /// Scale of integers that stay as they are.
     pub(crate) const ONE: Self = Self { scale: 1.0, inverse: 1.0 };
 
-    writer_methods! {
-        /// Returns the scale of a vector whose largest magnitude has these bits, for integers in `-x_max ..= x_max`.
-        /// Magnitudes compare as their bits; infinity's bits and all above are not finite.
-        #[inline(always)]
-        fn of_magnitude(bits: u32, x_max: u16) -> Result<Self, NotFinite> {
-            if bits >= f32::INFINITY.to_bits() {
-                return Err(NotFinite);
-            }
-            if bits < TINY.to_bits() {
-                return Ok(Self { scale: 0.0, inverse: 0.0 });
-            }
-            let (amax, x_max) = (f32::from_bits(bits), f32::from(x_max));
-            Ok(Self { scale: amax / x_max, inverse: x_max / amax })
+    /// Returns the scale of a vector whose largest magnitude has these bits, for integers in `-x_max ..= x_max`.
+    /// Magnitudes compare as their bits; infinity's bits and all above are not finite.
+    #[inline(always)]
+    pub fn of_magnitude(bits: u32, x_max: u16) -> Result<Self, NotFinite> {
+        if bits >= f32::INFINITY.to_bits() {
+            return Err(NotFinite);
         }
+        if bits < TINY.to_bits() {
+            return Ok(Self { scale: 0.0, inverse: 0.0 });
+        }
+        let (amax, x_max) = (f32::from_bits(bits), f32::from(x_max));
+        Ok(Self { scale: amax / x_max, inverse: x_max / amax })
+    }
 
-        /// Returns the factor from values to integers, before rounding.
-        fn inverse(self) -> f32 {
-            self.inverse
-        }
+    /// Returns the factor from values to integers, before rounding.
+    pub fn inverse(self) -> f32 {
+        self.inverse
     }
 
     /// Returns the factor of the integers.

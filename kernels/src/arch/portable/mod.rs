@@ -2,18 +2,15 @@
 
 mod cells;
 mod elementwise;
-#[cfg(any(feature = "writer", not(actq_armv7em)))]
 mod gemv;
 mod norm;
 mod vector;
 
 pub use cells::{gru_elements, lstm_elements};
 pub use elementwise::{denoise, normalize};
-#[cfg(any(feature = "writer", not(actq_armv7em)))]
 pub use gemv::gemv;
 pub use norm::{standardize, sum, sum_squares};
 #[cfg(not(actq_fpu))]
 pub(crate) use vector::quantize;
-#[cfg(any(feature = "writer", not(actq_armv7em)))]
 pub use vector::{copy, magnitude};
 pub use vector::{scale, sqrt};

@@ -6,7 +6,6 @@ use crate::math::{Native, Real};
 use crate::x::{Plan, lay_out};
 
 /// Returns the bits of the largest magnitude.
-#[cfg(any(feature = "writer", not(actq_armv7em)))]
 pub fn magnitude(x: &[f32]) -> u32 {
     x.iter().fold(0u32, |m, v| m.max(v.to_bits() & 0x7fff_ffff))
 }
