@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::file::File;
 use super::styles::ended;
-use super::{by_tract, compare, drawn, imported, refused};
+use super::{by_tract, compare, drawn, imported};
 
 /// A denoiser whose time step is an integer or a float in the file.
 fn denoiser(integers: bool) -> Vec<u8> {
@@ -33,18 +33,4 @@ fn a_cast_time_step_is_a_float() -> Result<()> {
     assert!(floats.integers.is_empty());
     let observations = drawn(&policy);
     compare(&by_tract(&denoiser(false), &floats, &observations)?, &actions(&policy, &observations))
-}
-
-#[test]
-fn integer_computations_are_refused() {
-    for (text, expected) in [
-        ("Cast(Div(time, [2]), to=1)", "computed with the integers of the input \"time\""),
-        ("time", "computed with the integers of the input \"time\""),
-        ("Cast(time, to=10)", "rounds a value of the network to float16"),
-    ] {
-        let mut file = File::default();
-        file.integers("time", &[1, 4]);
-        let x = file.write(&[], text);
-        refused(&ended(file, &x, 4), expected);
-    }
 }

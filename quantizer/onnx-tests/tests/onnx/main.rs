@@ -2,6 +2,7 @@
 //! harm.
 
 mod bounds;
+mod cases;
 mod command;
 mod constants;
 mod damaged;
@@ -10,10 +11,6 @@ mod file;
 mod integers;
 mod norms;
 mod notation;
-mod pools;
-mod remarks;
-mod rows;
-mod states;
 mod styles;
 
 use std::path::Path;
