@@ -136,6 +136,14 @@ impl ActionContract {
         max_step.is_some() || smoothing.is_some() || binarise.is_some() || ensemble.is_some() || *overlap > 0
     }
 
+    /// Returns action `i` of the network's output: scaled, offset and limited. The other arrays act on executed actions.
+    pub fn apply(&self, i: usize, raw: f32) -> f32 {
+        let of = |array: &Option<Vec<f32>>| array.as_ref().map(|values| values[i]);
+        let action = raw * of(&self.scale).unwrap_or(1.0) + of(&self.offset).unwrap_or(0.0);
+        let action = of(&self.low).map_or(action, |low| action.max(low));
+        of(&self.high).map_or(action, |high| action.min(high))
+    }
+
     /// Returns the lower and upper limit of action `i`, if it has both. If only other actions have some, f32's largest
     /// number stands in their place.
     pub fn limits(&self, i: usize) -> Option<[f32; 2]> {

@@ -77,48 +77,33 @@ impl From<Cause> for Error {
     }
 }
 
-impl From<BudgetTooSmall> for Error {
-    fn from(error: BudgetTooSmall) -> Self {
-        Cause::Budget(error).into()
-    }
-}
-
-impl From<ImageError> for Error {
-    fn from(error: ImageError) -> Self {
-        Cause::Image(error).into()
-    }
-}
-
-impl From<io::Error> for Error {
-    fn from(error: io::Error) -> Self {
-        Cause::Io(error).into()
-    }
-}
-
-macro_rules! from_other {
-    ($($error:ty),*) => {
+macro_rules! from {
+    ($($error:ty => $cause:expr),* $(,)?) => {
         $(impl From<$error> for Error {
             fn from(error: $error) -> Self {
-                Self::other(error)
+                ($cause)(error).into()
             }
         })*
     };
 }
 
-from_other!(
-    HeadError,
-    PackError,
-    StepError,
-    TooLarge,
-    ndarray::ShapeError,
-    rayon::ThreadPoolBuildError,
-    safetensors::SafeTensorError,
-    serde_json::Error,
-    std::num::TryFromIntError,
-    std::str::Utf8Error,
-    std::string::FromUtf8Error,
-    zip::result::ZipError
-);
+from! {
+    BudgetTooSmall => Cause::Budget,
+    ImageError => Cause::Image,
+    io::Error => Cause::Io,
+    HeadError => Self::other,
+    PackError => Self::other,
+    StepError => Self::other,
+    TooLarge => Self::other,
+    ndarray::ShapeError => Self::other,
+    rayon::ThreadPoolBuildError => Self::other,
+    safetensors::SafeTensorError => Self::other,
+    serde_json::Error => Self::other,
+    std::num::TryFromIntError => Self::other,
+    std::str::Utf8Error => Self::other,
+    std::string::FromUtf8Error => Self::other,
+    zip::result::ZipError => Self::other,
+}
 
 impl fmt::Display for Cause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

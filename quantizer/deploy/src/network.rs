@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
-use actq::contract::ActionContract;
 use actq::error::{Context as _, Result, ensure};
 use actq::graph::{Network, State, Weights, zero_state};
 use actq::policy::Policy;
@@ -111,15 +110,8 @@ impl Output {
     fn step(&mut self, inputs: &[Vec<f32>]) -> Vec<f32> {
         let obs: Vec<f32> = self.reads.iter().flat_map(|i| inputs[*i].iter().copied()).collect();
         let pass = Network::new(&self.policy.graph).forward_one(&self.weights, &obs, &mut self.state);
-        let (len, contract) = (self.policy.act_len, &self.policy.contract);
-        pass.iter().enumerate().map(|(i, value)| action(contract, i % len, *value)).collect()
+        // The importer made the contract of the graph's last operations.
+        let Policy { act_len, contract, .. } = &*self.policy;
+        pass.iter().enumerate().map(|(i, value)| contract.apply(i % act_len, *value)).collect()
     }
-}
-
-/// Applies the contract that the importer made of the graph's last operations.
-fn action(contract: &ActionContract, i: usize, value: f32) -> f32 {
-    let of = |array: &Option<Vec<f32>>| array.as_ref().map(|array| array[i]);
-    let value = value * of(&contract.scale).unwrap_or(1.0) + of(&contract.offset).unwrap_or(0.0);
-    let value = of(&contract.low).map_or(value, |low| value.max(low));
-    of(&contract.high).map_or(value, |high| value.min(high))
 }

@@ -10,13 +10,7 @@ use crate::policy::Policy;
 pub fn actions(policy: &Policy, observations: &[Vec<f32>]) -> Vec<Vec<f32>> {
     let (network, weights) = (Network::new(&policy.graph), Weights::of(&policy.graph));
     let mut state = zero_state(&policy.graph, 1);
-    let contract = &policy.contract;
-    let at = |array: &Option<Vec<f32>>, i: usize, none: f32| array.as_ref().map_or(none, |values| values[i]);
-    let one = |(i, raw): (usize, &f32)| {
-        let i = i % policy.act_len;
-        let action = raw * at(&contract.scale, i, 1.0) + at(&contract.offset, i, 0.0);
-        action.max(at(&contract.low, i, f32::NEG_INFINITY)).min(at(&contract.high, i, f32::INFINITY))
-    };
+    let one = |(i, raw): (usize, &f32)| policy.contract.apply(i % policy.act_len, *raw);
     let mut step = |obs: &Vec<f32>| {
         let obs = Array2::from_shape_fn((1, obs.len()), |(_, i)| obs[i]);
         network.forward(&weights, obs, &mut state).output().iter().enumerate().map(one).collect()
