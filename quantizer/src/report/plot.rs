@@ -192,11 +192,11 @@ impl Plot {
     }
 }
 
+/// A shape on its rim.
+type Marker<C, DB> = ComposedElement<C, DB, Polygon<(i32, i32)>, Polygon<(i32, i32)>>;
+
 /// Returns a marker with the series' own shape and colour, on a white rim.
-fn marker<DB: DrawingBackend, C: Clone>(
-    index: usize,
-    at: C,
-) -> ComposedElement<C, DB, Polygon<(i32, i32)>, Polygon<(i32, i32)>> {
+fn marker<DB: DrawingBackend, C: Clone>(index: usize, at: C) -> Marker<C, DB> {
     let shape = |radius: f64| {
         // The corners, and the angle of the first in parts of the angle between two.
         let (corners, first) = [(24, 0.0), (4, 0.5), (3, 0.25), (4, 0.0)][index % 4];
