@@ -271,17 +271,25 @@ fn a_difference_from_the_reference_is_explained() -> Result<()> {
 #[test]
 fn bad_bundles_are_refused_by_file_and_key() -> Result<()> {
     let cases = [
-        ("step_dt: 0.01", "step_dt: fast", "deploy.yaml: step_dt (line 3) must be a finite number"),
-        ("step_dt: 0.01", "step_dt: 0", "rate_hz = inf"),
-        ("[1, 0]", "[1, 1]", "joint_ids_map: a motor occurs twice"),
-        ("[1, 0]", "[1, 2]", "3 motors"),
-        ("[0.5, -0.5]\nactions", "[0.5]\nactions", "default_joint_pos has 1 values, but joint_ids_map 2"),
+        ("step_dt: 0.01", "step_dt: fast", "deploy.yaml: step_dt (line 3) must be finite numbers"),
+        ("step_dt: 0.01", "step_dt: 0", "step_dt = 0 (deploy.yaml: step_dt): give a number above 0"),
+        ("[1, 0]", "[1, 1]", "joint_ids_map: a place occurs twice"),
+        ("[1, 0]", "[1, 2]", "joint_ids_map: it has 2 joints of 3"),
+        (
+            "[0.5, -0.5]\nactions",
+            "[0.5]\nactions",
+            "default_joint_pos) has 1 values, but deploy.yaml: joint_ids_map has 2",
+        ),
         ("[0.5, -0.5]\nactions", "[0.5, .nan]\nactions", "default_joint_pos"),
-        ("history_length: 2}\n  last", "history_length: 3}\n  last", "has 10 values, and the graph takes 8"),
+        (
+            "history_length: 2}\n  last",
+            "history_length: 3}\n  last",
+            "says 8 values, and deploy.yaml: observations says 10 values of 2 joints",
+        ),
         ("history_length: 2}\n  last", "history_length: -1}\n  last", "history_length"),
         ("JointPositionAction", "JointMusicAction", "JointMusicAction"),
         ("last_action: {clip: null, scale: 1.0", "last_action: {clip: [1], scale: 1.0", "must be two numbers"),
-        ("stiffness: [10.0, 20.0]", "stiffness: [10.0]", "1 gains for 2 joints"),
+        ("stiffness: [10.0, 20.0]", "stiffness: [10.0]", "stiffness says 1 gains"),
         ("joint_pos_rel:", "last_action: {}\n  last_action:", "occurs twice"),
     ];
     for (from, to, expected) in cases {
