@@ -98,9 +98,7 @@ pub fn balance_bytes(graph: &Graph) -> usize {
 /// the policy usable.
 fn choose_part(graph: &Graph, site: &Site, columns: &Columns, moments: &[Moments]) -> Part {
     let part = Part::cheapest(columns, count_reading_weights(graph, site), graph.weights());
-    let keeps_usable = |factors: Vec<f64>| {
-        part.holds(&factors) && !site.readings.iter().any(|r| is_ruined(graph, r, moments, &factors))
-    };
+    let keeps_usable = |factors: Vec<f64>| part.holds(&factors) && !is_ruined(graph, site, moments, &factors);
     let is_usable = !columns.are_far() && part.factors(columns).is_some_and(keeps_usable);
     if is_usable { part } else { Part::whole(columns) }
 }
@@ -113,7 +111,7 @@ fn is_worthwhile(graph: &Graph, site: &Site, columns: &Columns, part: &Part, mom
     saved(&Part::whole(columns)) >= MIN_SAVED_BITS * graph.weights() as f64
         || (columns.saved_bits() >= RUINOUS_BITS && saved(part) >= 0.0)
         || columns.are_far()
-        || site.readings.iter().any(|reading| is_ruined(graph, reading, moments, &unit_factors))
+        || is_ruined(graph, site, moments, &unit_factors)
 }
 
 /// Computes the bits that an operation saves, minus the bits of its own bytes.
@@ -128,14 +126,17 @@ fn count_reading_weights(graph: &Graph, site: &Site) -> usize {
 }
 
 /// `true` if the unit that all elements of this value share ruins a matrix that also reads another value, after these
-/// factors are applied.
-fn is_ruined(graph: &Graph, reading: &Reading, moments: &[Moments], factors: &[f64]) -> bool {
-    let squares: Vec<f64> = reading.spread(factors, 1.0).into_iter().map(|d| d * d).collect();
-    let deviations = deviations(&moments[reading.matrix]);
-    let values: Vec<f64> = deviations.into_iter().zip(&squares).map(|(d, square)| d * d * square).collect();
-    let energies = graph.matrices[reading.matrix].column_energies();
-    let energies: Vec<f64> = energies.into_iter().zip(&squares).map(|(energy, square)| energy / square).collect();
-    reading.is_partial() && lost_bits(&energies, &values) >= RUINOUS_BITS
+/// factors are applied. Beside the observation, a hidden value has the unit of the training: the observation's differs.
+fn is_ruined(graph: &Graph, site: &Site, moments: &[Moments], factors: &[f64]) -> bool {
+    let is_ruined = |reading: &Reading| {
+        let squares: Vec<f64> = reading.spread(factors, 1.0).into_iter().map(|d| d * d).collect();
+        let deviations = deviations(&moments[reading.matrix]);
+        let values: Vec<f64> = deviations.into_iter().zip(&squares).map(|(d, square)| d * d * square).collect();
+        let energies = graph.matrices[reading.matrix].column_energies();
+        let energies: Vec<f64> = energies.into_iter().zip(&squares).map(|(energy, square)| energy / square).collect();
+        reading.is_partial() && lost_bits(&energies, &values) >= RUINOUS_BITS
+    };
+    site.is_observed && site.readings.iter().any(is_ruined)
 }
 
 /// `true` if the value is the output of a normalization without an output limit, and only the site's readers read it.

@@ -14,6 +14,8 @@ pub(super) struct Site {
     pub(super) value: ValueId,
     /// `true` if the policy normalizes all of it, or a matrix made it: its units are those of the training.
     pub(super) is_normalized: bool,
+    /// `true` if it is computed from the observation without a matrix.
+    pub(super) is_observed: bool,
     /// Nodes that read the value only through these columns.
     pub(super) readers: Vec<usize>,
     /// Readings of the value, one for each matrix.
@@ -58,12 +60,9 @@ pub(super) fn sites(graph: &Graph) -> Vec<Site> {
         let (readers, mut readings) = keep_consistent(graph, readers(graph, &observed, value));
         readings.sort_unstable();
         readings.dedup();
-        (!readings.is_empty()).then_some(Site {
-            value,
-            is_normalized: normalized[value] || !observed[value],
-            readers,
-            readings,
-        })
+        let is_observed = observed[value];
+        let is_normalized = normalized[value] || !is_observed;
+        (!readings.is_empty()).then_some(Site { value, is_normalized, is_observed, readers, readings })
     };
     let fixed = fixed_values(graph);
     let is_joined = |value: usize| value > 0 && matches!(graph.nodes[value - 1].kind, NodeKind::Concat(_));
