@@ -263,16 +263,3 @@ operations! {
     /// [`Wrapper::History`], whose data has the lengths of `src` and of the third region.
     HISTORY = 20 "history": OpKind::Around(Wrapper::History), Uses { src: 1, third: 1, constants: 3, ..Uses::NONE }, if "around";
 }
-
-#[cfg(test)]
-mod tests {
-    use super::FORMS;
-
-    /// As a writer looks it up: by the kind, whatever its detail.
-    #[test]
-    fn every_operation_has_its_own_code() {
-        for form in &FORMS {
-            assert_eq!(form.kind.code(), form.code, "{:?}", form.kind);
-        }
-    }
-}
