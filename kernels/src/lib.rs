@@ -1,7 +1,49 @@
-#![doc = include_str!("../README.md")]
+//! Low-bit GEMV kernels and an action-head executor for microcontrollers: `no_std`, no allocation, no panic after
+//! [`Image::new_checked`] or [`Image::new_checksummed`].
+//!
+//! The command `actq` quantizes a robot policy's last layers, or a whole small policy, into one image on a host. This
+//! crate runs that image in place from flash:
+//!
+//! ```
+//! # fn run(bytes: &[u8], scratch: &mut [u32], observation: &[f32]) -> Result<(), actq_kernels::Error> {
+//! use actq_kernels::{Head, Image};
+//!
+//! let image = Image::new_checked(bytes)?; // checks checksum, layout, bounds and overflow limits
+//! let mut head = Head::new(image, scratch)?; // `scratch` has at least `image.scratch_words()` words
+//! head.reset();
+//! let action = head.step(observation)?; // the same bits on every machine
+//! # let _ = action; Ok(())
+//! # }
+//! ```
+//!
+//! [`include_image!`] puts an image into the program. `docs/FORMAT.md` documents the image, `docs/KERNELS.md` the
+//! kernels. Everything outside the integer GEMV is IEEE 754 binary32 in a fixed order, without fused multiply-add, so
+//! that a host, QEMU and a board give identical bits.
+//!
+//! Features:
+//!
+//! - `w2`, `w3`, `w4`, `w8`: matrices of weights of these bits.
+//! - `single`, `paired`: matrices of one weight in a lane of 16 bits (activations above 127, or groups of 64 or 128),
+//!   and of two (all others). `groups`: group scales.
+//! - `elu`: ELU, tanh and sigmoid. `silu`: SiLU. `functions`: GELU, softplus, mish, exp, sine, cosine. (ReLU is in
+//!   every build.)
+//! - `norm`: layer norm and RMS norm. `recurrent`: LSTM and GRU cells. `flow`: flow and diffusion policies.
+//! - `chunks`: action chunks of more than one action, with overlap and temporal ensemble.
+//! - `around`: the operations around a network (`docs/DEPLOY.md`): raw values in, targets out.
+//!
+//! These make the code smaller when they are off; all are on by default. An image that needs one that the build leaves
+//! out does not compile in [`include_image!`], and is refused with [`ImageError::LeftOut`] at run time; `actq inspect`
+//! lists what an image needs. Three more:
+//!
+//! - `compact` shortens the assembler's loops for paired lanes of 3, 4 and 8 bits: less code, more time, the same bits.
+//! - `defmt` derives `defmt::Format` for the error types.
+//! - `writer` makes public what writes images and what checks the kernels: packed layouts, records, arithmetic and the
+//!   parts of the cost model. The quantizer, tests and measurements use it. It is **unstable**: any version may change
+//!   it. Its enums are exhaustive, so that a writer that forgets an operation does not compile.
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
-// The feature `writer` makes modules public. They are compiled in every build: the linker leaves out what nothing calls.
+// Without the feature `writer`, the modules for writers are private, with public items, and nothing uses some of these. They are compiled
+// in every build, so that a feature adds no code; the linker leaves out what a program does not call.
 #![cfg_attr(not(feature = "writer"), allow(dead_code, unreachable_pub, unused_imports))]
 
 /// Declares methods that are public with the feature `writer`, and private to the crate without it.
@@ -18,48 +60,47 @@ macro_rules! writer_methods {
     };
 }
 
-#[cfg(target_pointer_width = "16")]
-compile_error!("no image runs on a machine with addresses of 16 bits: records hold offsets of 32 bits");
-
-#[cfg(not(feature = "writer"))]
-mod arch;
+// A test checks the dependencies between these modules by the table in docs/ARCHITECTURE.md. A module that writers need
+// is public with the feature `writer`.
 #[cfg(feature = "writer")]
 pub mod arch;
+#[cfg(not(feature = "writer"))]
+mod arch;
 mod arena;
 mod cursor;
 mod error;
 mod head;
-#[cfg(not(feature = "writer"))]
-mod image;
 #[cfg(feature = "writer")]
 pub mod image;
+#[cfg(not(feature = "writer"))]
+mod image;
 #[doc(hidden)]
 pub mod include;
-#[cfg(not(feature = "writer"))]
-mod layout;
 #[cfg(feature = "writer")]
 pub mod layout;
 #[cfg(not(feature = "writer"))]
-mod math;
+mod layout;
 #[cfg(feature = "writer")]
 pub mod math;
-mod meter;
 #[cfg(not(feature = "writer"))]
-mod ops;
+mod math;
+mod meter;
 #[cfg(feature = "writer")]
 pub mod ops;
 #[cfg(not(feature = "writer"))]
-mod pace;
+mod ops;
 #[cfg(feature = "writer")]
 pub mod pace;
 #[cfg(not(feature = "writer"))]
-mod round;
+mod pace;
 #[cfg(feature = "writer")]
 pub mod round;
 #[cfg(not(feature = "writer"))]
-mod x;
+mod round;
 #[cfg(feature = "writer")]
 pub mod x;
+#[cfg(not(feature = "writer"))]
+mod x;
 
 pub use arch::{BACKEND, Backend};
 pub use error::{Error, HeadError, ImageError, SavedError, StepError};

@@ -5,7 +5,7 @@ use super::front::Front;
 use super::header::{self as h, Words};
 use super::info::check_whole;
 use super::matrix::{matrix, row_block};
-use super::op::{OpKind, Uses, Wrapper};
+use super::op::{Around, OpKind, Uses};
 use super::ports::PortKind;
 use super::proof::fits_i32;
 use super::record::Op;
@@ -328,24 +328,24 @@ impl<'a> Image<'a> {
 
 /// Checks the data of an operation around a network.
 #[inline(never)]
-fn check_around(kind: Wrapper, op: &Op<'_>, front: &mut Front<'_>) -> Result<(), ImageError> {
+fn check_around(kind: Around, op: &Op<'_>, front: &mut Front<'_>) -> Result<(), ImageError> {
     let n = op.dst().len;
     let valid = match kind {
-        Wrapper::Select => {
+        Around::Select => {
             front.take(op.data(), 1 + n.div_ceil(2))?;
             (op.half(1) == 0 || op.half(1) == 1 && op.half(0) == 4) && (0..n).all(|i| op.half(2 + i) < op.half(0))
         }
-        Wrapper::Constant | Wrapper::Start => {
+        Around::Constant | Around::Start => {
             front.take_finite(op.data(), n)?;
             true
         }
-        Wrapper::Row => {
+        Around::Row => {
             let rows = op.half(0);
             front.take(op.data(), 2)?;
             front.take_finite(op.data() + 2, rows * n)?;
             op.half(1) < rows && op.half(2) < rows && op.half(3) == 0
         }
-        Wrapper::Stand => {
+        Around::Stand => {
             let groups = op.half(1);
             front.take(op.data(), 2)?;
             front.take_finite(op.data() + 2, n)?;
@@ -353,7 +353,7 @@ fn check_around(kind: Wrapper, op: &Op<'_>, front: &mut Front<'_>) -> Result<(),
             let sum: usize = (0..groups).map(|group| op.half(2 * (2 + n) + group)).sum();
             sum == op.half(0) && is_positive(op.constant(1))
         }
-        Wrapper::History => {
+        Around::History => {
             front.take(op.data(), 3)?;
             let [frame, slots, length, stride, newest, flags] = [0, 1, 2, 3, 4, 5].map(|i| op.half(i));
             // The ring has the oldest frame. The products of two u16 and their sum fit 32 bits.
@@ -361,7 +361,7 @@ fn check_around(kind: Wrapper, op: &Op<'_>, front: &mut Front<'_>) -> Result<(),
             n == frame * length && stride > 0 && newest < 2 && flags < 4 && slots == oldest.max(1)
         }
         // It has no data.
-        Wrapper::Clip => true,
+        Around::Clip => true,
     };
     if valid { Ok(()) } else { Err(ImageError::Around) }
 }

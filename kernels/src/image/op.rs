@@ -46,13 +46,6 @@ pub enum OpKind {
     /// network's next input. Constants: the limit of the predicted sample, infinite for none; the arena offset of the
     /// first step's noise, or 0; the coefficients of each step.
     Denoise,
-    /// An operation around a network ([`crate::ops::around`]).
-    Around(Wrapper),
-}
-
-/// An operation around a network: raw values in, targets out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wrapper {
     /// `dst[i] = src[index[i]]`. Data: the length of `src`, 1 if `src` is a quaternion whose length must be near 1, the
     /// indices.
     Select,
@@ -73,6 +66,18 @@ pub enum Wrapper {
     History,
 }
 
+/// An operation around a network ([`crate::ops::around`]): see [`OpKind`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Around {
+    Select,
+    Clip,
+    Constant,
+    Start,
+    Row,
+    Stand,
+    History,
+}
+
 impl OpKind {
     /// Returns `true` if the operation differs between denoising steps.
     pub(super) fn is_of_step(self) -> bool {
@@ -81,18 +86,37 @@ impl OpKind {
 
     /// Returns the operation around a network; `None` for all others, and in a build without these operations.
     #[inline(always)]
-    pub(crate) fn around(self) -> Option<Wrapper> {
-        match self {
-            Self::Around(wrapper) if cfg!(feature = "around") => Some(wrapper),
-            _ => None,
+    pub(crate) fn around(self) -> Option<Around> {
+        if !cfg!(feature = "around") {
+            return None;
         }
+        Some(match self {
+            Self::Select => Around::Select,
+            Self::Clip => Around::Clip,
+            Self::Constant => Around::Constant,
+            Self::Start => Around::Start,
+            Self::Row => Around::Row,
+            Self::Stand => Around::Stand,
+            Self::History => Around::History,
+            // No wildcard: a new operation is decided on here.
+            Self::Normalize { .. }
+            | Self::Linear { .. }
+            | Self::Function(_)
+            | Self::LayerNorm
+            | Self::RmsNorm
+            | Self::Add
+            | Self::Copy
+            | Self::LstmCell
+            | Self::GruCell
+            | Self::Mul
+            | Self::Noise
+            | Self::Table
+            | Self::Denoise => return None,
+        })
     }
 
     fn form(self) -> Option<&'static Form> {
-        FORMS.iter().find(|form| match (form.kind, self) {
-            (Self::Around(wrapper), Self::Around(of)) => wrapper == of,
-            (kind, of) => discriminant(&kind) == discriminant(&of),
-        })
+        FORMS.iter().find(|form| discriminant(&form.kind) == discriminant(&self))
     }
 
     /// Returns the operation code; 0 if the build leaves the operation out.
@@ -248,18 +272,18 @@ operations! {
     TABLE = 12 "table": OpKind::Table, Uses { arrays: 1, ..Uses::NONE }, if "flow";
     /// [`OpKind::Denoise`]
     DENOISE = 13 "denoise": OpKind::Denoise, Uses { src: 1, third: 1, constants: h::DENOISE_WORDS as u8, reads_dst: true, ..Uses::NONE }, if "flow";
-    /// [`Wrapper::Select`], whose data has the length of `src`.
-    SELECT = 14 "select": OpKind::Around(Wrapper::Select), Uses { src: 1, arrays: 1, ..Uses::NONE }, if "around";
-    /// [`Wrapper::Clip`]
-    CLIP = 15 "clip" "high": OpKind::Around(Wrapper::Clip), Uses { src: 1, third: 1, reads_dst: true, ..Uses::NONE }, if "around";
-    /// [`Wrapper::Constant`]
-    CONSTANT = 16 "constant": OpKind::Around(Wrapper::Constant), Uses { arrays: 1, ..Uses::NONE }, if "around";
-    /// [`Wrapper::Start`], whose third region is one word.
-    START = 17 "start": OpKind::Around(Wrapper::Start), Uses { third: 1, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
-    /// [`Wrapper::Row`], whose third region is one word.
-    ROW = 18 "row": OpKind::Around(Wrapper::Row), Uses { third: 1, constants: 2, arrays: 1, ..Uses::NONE }, if "around";
-    /// [`Wrapper::Stand`], whose data has the length of `src`, and whose third region is one word.
-    STAND = 19 "stand": OpKind::Around(Wrapper::Stand), Uses { src: 1, third: 1, constants: 2, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
-    /// [`Wrapper::History`], whose data has the lengths of `src` and of the third region.
-    HISTORY = 20 "history": OpKind::Around(Wrapper::History), Uses { src: 1, third: 1, constants: 3, ..Uses::NONE }, if "around";
+    /// [`OpKind::Select`], whose data has the length of `src`.
+    SELECT = 14 "select": OpKind::Select, Uses { src: 1, arrays: 1, ..Uses::NONE }, if "around";
+    /// [`OpKind::Clip`]
+    CLIP = 15 "clip" "high": OpKind::Clip, Uses { src: 1, third: 1, reads_dst: true, ..Uses::NONE }, if "around";
+    /// [`OpKind::Constant`]
+    CONSTANT = 16 "constant": OpKind::Constant, Uses { arrays: 1, ..Uses::NONE }, if "around";
+    /// [`OpKind::Start`], whose third region is one word.
+    START = 17 "start": OpKind::Start, Uses { third: 1, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
+    /// [`OpKind::Row`], whose third region is one word.
+    ROW = 18 "row": OpKind::Row, Uses { third: 1, constants: 2, arrays: 1, ..Uses::NONE }, if "around";
+    /// [`OpKind::Stand`], whose data has the length of `src`, and whose third region is one word.
+    STAND = 19 "stand": OpKind::Stand, Uses { src: 1, third: 1, constants: 2, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
+    /// [`OpKind::History`], whose data has the lengths of `src` and of the third region.
+    HISTORY = 20 "history": OpKind::History, Uses { src: 1, third: 1, constants: 3, ..Uses::NONE }, if "around";
 }

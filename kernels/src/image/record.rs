@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use super::header::{self as h, MATRIX_WORDS, OP_WORDS};
 use super::matrix::{Matrix, matrix};
-use super::op::{FORMS, Form, IS_PARTIAL, NAMES, OpKind, Wrapper};
+use super::op::{Around, FORMS, Form, IS_PARTIAL, NAMES, OpKind};
 use super::region::Region;
 use super::view::Image;
 use super::words::{TooLarge, halves};
@@ -127,7 +127,7 @@ impl<'a> Op<'a> {
     /// Returns the units that slices can cut the operation into: its elements, for each pass over them. A history also
     /// keeps those of the new frame.
     pub(crate) fn units(&self) -> usize {
-        let kept = if self.kind == OpKind::Around(Wrapper::History) { self.src().len } else { 0 };
+        let kept = if self.kind == OpKind::History { self.src().len } else { 0 };
         self.dst().len * usize::from(self.form.uses.passes) + kept
     }
 
@@ -209,12 +209,12 @@ impl<'a> Image<'a> {
                 }
                 OpKind::Function(function)
             }
-            kind if kind.around().is_some_and(|kind| kind != Wrapper::Clip) => {
+            kind if kind.around().is_some_and(|kind| kind != Around::Clip) => {
                 // Lengths in the data's first word: of a frame, or of all of `src`; of a history's slots.
                 let sizes = self.word(data as usize);
                 src = if src > 0 { low(sizes) } else { 0 };
                 third.len = match kind {
-                    OpKind::Around(Wrapper::History) => low(sizes) * high(sizes) + 1,
+                    OpKind::History => low(sizes) * high(sizes) + 1,
                     _ => usize::from(form.uses.third),
                 };
                 kind

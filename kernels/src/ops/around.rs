@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use crate::arena::{part, regions};
 use crate::error::Fault;
-use crate::image::{Op, Region, Wrapper};
+use crate::image::{Around, Op, Region};
 use crate::math::ORIENTATION;
 use crate::ops::elementwise::{copy, copy_le};
 
@@ -35,7 +35,7 @@ fn is_orientation(quaternion: &[u32]) -> bool {
 /// [`Fault::Damaged`] if the image does not have the operation's regions or data, [`Fault::Orientation`] for a
 /// quaternion whose length is not near 1.
 #[inline(never)]
-pub(super) fn run(kind: Wrapper, op: &Op<'_>, arena: &mut [u32], units: &Range<usize>) -> Result<(), Fault> {
+pub(super) fn run(kind: Around, op: &Op<'_>, arena: &mut [u32], units: &Range<usize>) -> Result<(), Fault> {
     let [dst, src, third, _] = regions(arena, &op.regions, Region::default());
     let is_last = units.end == op.units();
     if dst.is_empty() {
@@ -44,7 +44,7 @@ pub(super) fn run(kind: Wrapper, op: &Op<'_>, arena: &mut [u32], units: &Range<u
     // Operations that keep something for the next step have a count as their last word.
     let count = third.last().copied().unwrap_or(0);
     let next = match kind {
-        Wrapper::Select => {
+        Around::Select => {
             if op.half(1) == 1 && !is_orientation(src) {
                 return Err(Fault::Orientation);
             }
@@ -53,37 +53,37 @@ pub(super) fn run(kind: Wrapper, op: &Op<'_>, arena: &mut [u32], units: &Range<u
             }
             return Ok(());
         }
-        Wrapper::Clip => {
+        Around::Clip => {
             for (x, (low, high)) in part(dst, units).iter_mut().zip(part(src, units).iter().zip(part(third, units))) {
                 *x = clip(*x, *low, *high);
             }
             return Ok(());
         }
-        Wrapper::Constant => {
+        Around::Constant => {
             copy_le(op.part(0, units), part(dst, units));
             return Ok(());
         }
-        Wrapper::Start => {
+        Around::Start => {
             if count == 0 {
                 copy_le(op.part(0, units), part(dst, units));
             }
             1
         }
-        Wrapper::Row => {
+        Around::Row => {
             let (rows, first) = (op.half(0), op.half(1));
             let row = (count as usize).checked_sub(1).unwrap_or(first).min(rows.saturating_sub(1));
             copy_le(op.part(row, units), part(dst, units));
             // 0 is for a step after a reset.
             1 + if row + 1 < rows { row + 1 } else { op.half(2) } as u32
         }
-        Wrapper::Stand => {
+        Around::Stand => {
             if !stands(op, src) {
                 return Ok(());
             }
             copy_le(op.part(0, units), part(dst, units));
             1
         }
-        Wrapper::History => {
+        Around::History => {
             let Some((_, ring)) = third.split_last_mut() else { return Err(Fault::Damaged) };
             let history = History::of(op, count as usize);
             history.run(units, src, ring, dst);

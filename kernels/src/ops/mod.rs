@@ -115,9 +115,17 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         }
         // The match has no wildcard: it does not compile without an arm for every operation. `Linear`, `Denoise` and
         // the operations around a network have returned above, and a checked image has none that the build leaves out.
-        OpKind::Linear { .. } | OpKind::Denoise | OpKind::LstmCell | OpKind::GruCell | OpKind::Around(_) => {
-            return Err(Fault::Damaged);
-        }
+        OpKind::Linear { .. }
+        | OpKind::Denoise
+        | OpKind::LstmCell
+        | OpKind::GruCell
+        | OpKind::Select
+        | OpKind::Clip
+        | OpKind::Constant
+        | OpKind::Start
+        | OpKind::Row
+        | OpKind::Stand
+        | OpKind::History => return Err(Fault::Damaged),
     }
     Ok(units.end == len)
 }

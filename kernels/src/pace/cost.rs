@@ -13,7 +13,7 @@ pub use super::feature::Feature;
 use super::feature::{Gemv, Prepare, Strips};
 use super::rates::RATES;
 use crate::image::op;
-use crate::image::{Image, Matrix, Op, OpKind, Wrapper};
+use crate::image::{Image, Matrix, Op, OpKind};
 use crate::layout::{BlockShape, QUAD, STRIP};
 use crate::meter::{OutputStart, RUN};
 use crate::x::{Extent, Plan};
@@ -197,7 +197,7 @@ pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
 fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
     add(values(op).1, len);
     rest(op.kind, len % EIGHT, add);
-    if op.kind == OpKind::Around(Wrapper::History) {
+    if op.kind == OpKind::History {
         add(Feature::FRAME, op.dst().len.checked_div(op.src().len).unwrap_or(0));
     }
     squared(op, add);
@@ -222,7 +222,7 @@ fn rest(kind: OpKind, len: usize, add: &mut dyn FnMut(Feature, usize)) {
 
 /// Counts the values whose norm an operation computes, in each of its pieces.
 fn squared(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
-    if op.kind == OpKind::Around(Wrapper::Stand) || op.kind == OpKind::Around(Wrapper::Select) && op.half(1) == 1 {
+    if op.kind == OpKind::Stand || op.kind == OpKind::Select && op.half(1) == 1 {
         add(Feature::SQUARED, op.src().len);
     }
 }
@@ -240,7 +240,7 @@ pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
 /// Counts the features of one value of an operation, in the denoising step with the highest cost.
 pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     add(values(op).1, 1);
-    if op.kind == OpKind::Around(Wrapper::History) {
+    if op.kind == OpKind::History {
         // A frame may be one value long.
         add(Feature::FRAME, 1);
     }
@@ -255,7 +255,7 @@ pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(Feature, u
 pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
     let values = match op.kind {
         OpKind::Linear { .. } => 0,
-        OpKind::Around(Wrapper::History) => op.units(),
+        OpKind::History => op.units(),
         _ => op.dst().len,
     };
     (Feature::operation(op.code()), value(op.kind, op.code()), values)

@@ -7,7 +7,7 @@ use actq::measure::size::{Beside, bits_per_weight, file_bits_per_weight, hex};
 use actq::policy::DEFAULT_RATE_HZ;
 use actq::text::{count, printable};
 use actq_kernels::image::Matrix;
-use actq_kernels::image::{Kind, Op, OpKind, Region, Wrapper};
+use actq_kernels::image::{Kind, Op, OpKind, Region};
 use actq_kernels::{Image, PortKind};
 
 use super::memory::{Peak, peak};
@@ -125,7 +125,7 @@ fn row(op: &Op<'_>) -> Vec<String> {
             format!("{}x{}{}", matrix.rows, matrix.cols, if accumulate { " added" } else { "" })
         }
         (OpKind::RmsNorm, _) if op.constant(0) == Balance::FREE_EPS => "factors, by the quantizer".into(),
-        (OpKind::Around(Wrapper::History), _) => count(op.dst().len / op.src().len.max(1), "frame"),
+        (OpKind::History, _) => count(op.dst().len / op.src().len.max(1), "frame"),
         (kind, _) if kind.label().is_empty() => String::new(),
         (kind, _) => {
             let constants: String = op.constants().map(|constant| format!(" {constant}")).collect();

@@ -1,7 +1,7 @@
 //! Raw values for a self-test: within the ranges of their inputs, and orientations where operations need them.
 
 use actq_kernels::PortKind;
-use actq_kernels::image::{OpKind, Wrapper};
+use actq_kernels::image::OpKind;
 
 use crate::around::Around;
 use crate::graph::lowering::{Slice, Step, StepData};
@@ -65,8 +65,7 @@ fn within([low, high]: [f32; 2], unit: f32) -> f32 {
 fn quaternions(around: &Around) -> Vec<[Read; 4]> {
     let steps: Vec<&Step<Slice>> = around.before.iter().chain(&around.after).collect();
     let found = steps.iter().enumerate().filter_map(|(i, step)| {
-        let (OpKind::Around(Wrapper::Select), StepData::Words(words), Some(src)) = (step.kind, &step.data, step.src)
-        else {
+        let (OpKind::Select, StepData::Words(words), Some(src)) = (step.kind, &step.data, step.src) else {
             return None;
         };
         let reads = (words[0] >> 16 == 1).then(|| [0, 1, 2, 3].map(|e| read(&steps[..i], src.buffer, src.offset + e)));
@@ -85,7 +84,7 @@ fn read(steps: &[&Step<Slice>], mut buffer: usize, mut at: usize) -> Option<Read
         let mut place = i;
         match (step.kind, &step.data) {
             (OpKind::Copy, _) => {}
-            (OpKind::Around(Wrapper::Select), StepData::Words(words)) => {
+            (OpKind::Select, StepData::Words(words)) => {
                 let half = 2 + i;
                 place = (words[half / 2] >> (16 * (half % 2)) & 0xffff) as usize;
             }
@@ -94,7 +93,7 @@ fn read(steps: &[&Step<Slice>], mut buffer: usize, mut at: usize) -> Option<Read
                 (factor, offset) = (factor / scale, offset / scale + mean);
             }
             // It limits in place.
-            (OpKind::Around(Wrapper::Clip), _) => continue,
+            (OpKind::Clip, _) => continue,
             _ => return None,
         }
         let src = step.src?;

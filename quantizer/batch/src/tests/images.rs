@@ -8,7 +8,7 @@ use actq::graph::lowering::{Buffer, Lifetime, Slice, Step, StepData};
 use actq::graph::ops::{Concat, Gru, Iterate, Pointwise, Span, Table};
 use actq::methods::Activations;
 use actq_bench::networks::{self, Builder, Draw};
-use actq_kernels::image::{Kind, OpKind, Wrapper};
+use actq_kernels::image::{Kind, OpKind};
 use actq_kernels::math::Function;
 use actq_kernels::ops::denoise::Coefficients;
 use actq_kernels::{PortKind, Width};
@@ -150,34 +150,28 @@ pub(super) fn around(seed: u64) -> Result<Vec<u8>> {
     let raw = Slice { buffer: 0, offset: 0, len };
     let reversed = value(len, Lifetime::Step);
     let places = (0..len.div_ceil(2)).map(|i| pair(len - 1 - 2 * i, len.saturating_sub(2 * i + 2)));
-    add(
-        OpKind::Around(Wrapper::Select),
-        reversed,
-        Some(raw),
-        None,
-        StepData::Words([pair(len, 0)].into_iter().chain(places).collect()),
-    );
+    add(OpKind::Select, reversed, Some(raw), None, StepData::Words([pair(len, 0)].into_iter().chain(places).collect()));
     let limits = [-0.5, 0.5].map(|limit| {
         let dst = value(len, Lifetime::Step);
-        add(OpKind::Around(Wrapper::Constant), dst, None, None, StepData::Constants(vec![limit; len]));
+        add(OpKind::Constant, dst, None, None, StepData::Constants(vec![limit; len]));
         dst
     });
-    add(OpKind::Around(Wrapper::Clip), reversed, Some(limits[0]), Some(limits[1]), StepData::None);
+    add(OpKind::Clip, reversed, Some(limits[0]), Some(limits[1]), StepData::None);
     let (kept, count) = (value(len, Lifetime::State), value(1, Lifetime::State));
-    add(OpKind::Around(Wrapper::Start), kept, None, Some(count), StepData::Constants(vec![0.25; len]));
+    add(OpKind::Start, kept, None, Some(count), StepData::Constants(vec![0.25; len]));
     add(OpKind::Add, kept, Some(reversed), None, StepData::None);
     let (row, count) = (value(len, Lifetime::Step), value(1, Lifetime::State));
     let rows = [pair(3, 0), pair(1, 0)].into_iter().chain((0..3 * len as u32).map(|i| (i as f32).to_bits()));
-    add(OpKind::Around(Wrapper::Row), row, None, Some(count), StepData::Words(rows.collect()));
+    add(OpKind::Row, row, None, Some(count), StepData::Words(rows.collect()));
     let limit = len as f32;
     let at = [pair(len, 1), limit.to_bits()].into_iter().chain(vec![0; len]).chain([pair(len, 0)]);
-    add(OpKind::Around(Wrapper::Stand), row, Some(raw), Some(count), StepData::Words(at.collect()));
+    add(OpKind::Stand, row, Some(raw), Some(count), StepData::Words(at.collect()));
     add(OpKind::Add, row, Some(kept), None, StepData::None);
     let (length, flags) = (3, draw.below(4));
     let slots = 2 * (length - 1);
     let (frames, ring) = (value(len * length, Lifetime::Step), value(len * slots + 1, Lifetime::State));
     let sizes = [pair(len, slots), pair(length, 2), pair(0, flags)];
-    add(OpKind::Around(Wrapper::History), frames, Some(row), Some(ring), StepData::Words(sizes.to_vec()));
+    add(OpKind::History, frames, Some(row), Some(ring), StepData::Words(sizes.to_vec()));
     let action = value(len, Lifetime::Step);
     let output = Slice { buffer: OUTPUT, ..action };
     let after = vec![Step { kind: OpKind::Copy, dst: action, src: Some(output), third: None, data: StepData::None }];

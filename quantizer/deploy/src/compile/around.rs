@@ -4,7 +4,7 @@ use actq::around::{Around, NamedPort, OUTPUT};
 use actq::error::{Context as _, Result, ensure};
 use actq::graph::lowering::{Lifetime, Slice, StepData};
 use actq_kernels::PortKind;
-use actq_kernels::image::{OpKind, Wrapper};
+use actq_kernels::image::OpKind;
 
 use super::chain::Chain;
 use super::clock;
@@ -54,7 +54,7 @@ impl Compiler<'_> {
             if state.start.iter().any(|number| *number != 0.0) {
                 let count = self.to.state(1);
                 let start = state.start.iter().map(|number| *number as f32).collect();
-                self.to.emit(OpKind::Around(Wrapper::Start), place, None, Some(count), StepData::Constants(start));
+                self.to.emit(OpKind::Start, place, None, Some(count), StepData::Constants(start));
             }
         }
         for (n, network) in plan.networks.iter().enumerate() {
@@ -186,7 +186,7 @@ impl Compiler<'_> {
             let low = self.to.constant(&of(&contract.low, f32::MIN));
             let high = self.to.constant(&of(&contract.high, f32::MAX));
             place = self.to.writable_copy(place);
-            self.to.emit(OpKind::Around(Wrapper::Clip), place, Some(low), Some(high), StepData::None);
+            self.to.emit(OpKind::Clip, place, Some(low), Some(high), StepData::None);
         }
         self.outputs.push((output, place));
         Ok(place)
@@ -220,7 +220,7 @@ impl Compiler<'_> {
         let (value, count) = (self.to.value(rows[0].len()), self.to.state(1));
         let mut data = words(&[rows.len(), first, next, 0]);
         data.extend(rows.iter().flatten().map(|number| number.to_bits()));
-        self.to.emit(OpKind::Around(Wrapper::Row), value, None, Some(count), StepData::Words(data));
+        self.to.emit(OpKind::Row, value, None, Some(count), StepData::Words(data));
         (value, count)
     }
 
@@ -244,7 +244,7 @@ impl Compiler<'_> {
             data.push(squared.to_bits());
             data.extend(standing.at.iter().map(|phase| (*phase as f32).to_bits()));
             data.extend(words(&parts.iter().map(|part| part.len).collect::<Vec<_>>()));
-            self.to.emit(OpKind::Around(Wrapper::Stand), value, Some(read), Some(count), StepData::Words(data));
+            self.to.emit(OpKind::Stand, value, Some(read), Some(count), StepData::Words(data));
         }
         Ok(value)
     }

@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use actq::error::{Result, bail};
 use actq::graph::lowering::{Slice, StepData};
-use actq_kernels::image::{OpKind, Wrapper};
+use actq_kernels::image::OpKind;
 use actq_kernels::math::Function;
 
 use super::operations::{Operations, words};
@@ -202,7 +202,7 @@ impl Chain {
         // An operation takes no two operands of the same memory.
         let high = if low.overlaps(high) { to.writable_copy(high) } else { high };
         let value = self.make_writable(to);
-        to.emit(OpKind::Around(Wrapper::Clip), value, Some(low), Some(high), StepData::None);
+        to.emit(OpKind::Clip, value, Some(low), Some(high), StepData::None);
     }
 }
 
@@ -260,6 +260,6 @@ fn frames(to: &mut Operations, history: &History, frame: Slice) -> Slice {
     let flags = usize::from(history.first == First::Newest) | usize::from(history.fill == Fill::First) << 1;
     let (frames, ring) = (to.value(history.length * frame.len), to.state(slots * frame.len + 1));
     let sizes = words(&[frame.len, slots, history.length, history.stride, newest, flags]);
-    to.emit(OpKind::Around(Wrapper::History), frames, Some(frame), Some(ring), StepData::Words(sizes));
+    to.emit(OpKind::History, frames, Some(frame), Some(ring), StepData::Words(sizes));
     frames
 }

@@ -3,7 +3,7 @@
 use actq::graph::Graph;
 use actq::graph::lowering::{Buffer, BufferId, Lifetime, Slice, Step, StepData};
 use actq::graph::steps::operations;
-use actq_kernels::image::{OpKind, Wrapper};
+use actq_kernels::image::OpKind;
 
 /// Time of operations, relative to the network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -93,7 +93,7 @@ impl Operations {
     fn selected(&mut self, src: Slice, is_orientation: usize, places: &[usize]) -> Slice {
         let halves: Vec<usize> = [src.len, is_orientation].into_iter().chain(places.iter().copied()).collect();
         let dst = self.value(places.len());
-        self.emit(OpKind::Around(Wrapper::Select), dst, Some(src), None, StepData::Words(words(&halves)));
+        self.emit(OpKind::Select, dst, Some(src), None, StepData::Words(words(&halves)));
         dst
     }
 
@@ -119,7 +119,7 @@ impl Operations {
     /// Returns constants as a value.
     pub(super) fn constant(&mut self, numbers: &[f32]) -> Slice {
         let dst = self.value(numbers.len());
-        self.emit(OpKind::Around(Wrapper::Constant), dst, None, None, StepData::Constants(numbers.to_vec()));
+        self.emit(OpKind::Constant, dst, None, None, StepData::Constants(numbers.to_vec()));
         dst
     }
 

@@ -12,7 +12,7 @@ use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq_bench::networks::{Builder, accumulating};
 use actq_kernels::Width;
-use actq_kernels::image::{Kind, OpKind, Wrapper};
+use actq_kernels::image::{Kind, OpKind};
 use actq_kernels::ops::denoise::Coefficients;
 use anyhow::{Context as _, Result};
 
@@ -93,34 +93,28 @@ fn around() -> Result<(String, Vec<u8>)> {
         let dst = value(len, Lifetime::Step);
         let places = (0..len.div_ceil(2)).map(|i| pair(len - 1 - 2 * i, len.saturating_sub(2 * i + 2)));
         let data = [pair(len, 0)].into_iter().chain(places).collect();
-        add(OpKind::Around(Wrapper::Select), dst, Some(raw), None, StepData::Words(data));
+        add(OpKind::Select, dst, Some(raw), None, StepData::Words(data));
         let limits = [-0.5, 0.5].map(|limit| {
             let dst = value(len, Lifetime::Step);
-            add(OpKind::Around(Wrapper::Constant), dst, None, None, StepData::Constants(vec![limit; len]));
+            add(OpKind::Constant, dst, None, None, StepData::Constants(vec![limit; len]));
             dst
         });
-        add(OpKind::Around(Wrapper::Clip), dst, Some(limits[0]), Some(limits[1]), StepData::None);
+        add(OpKind::Clip, dst, Some(limits[0]), Some(limits[1]), StepData::None);
         let (kept, count) = (value(len, Lifetime::State), value(1, Lifetime::State));
-        add(OpKind::Around(Wrapper::Start), kept, None, Some(count), StepData::Constants(vec![0.25; len]));
+        add(OpKind::Start, kept, None, Some(count), StepData::Constants(vec![0.25; len]));
         let (row, count) = (value(len, Lifetime::Step), value(1, Lifetime::State));
         let rows = [pair(3, 0), pair(1, 0)].into_iter().chain((0..3 * len as u32).map(|i| (i as f32).to_bits()));
-        add(OpKind::Around(Wrapper::Row), row, None, Some(count), StepData::Words(rows.collect()));
+        add(OpKind::Row, row, None, Some(count), StepData::Words(rows.collect()));
         for read in [len, 8] {
             let at = [pair(read, 1), never_moves].into_iter().chain(vec![0; len]).chain([pair(read, 0)]);
-            add(
-                OpKind::Around(Wrapper::Stand),
-                row,
-                Some(Slice { len: read, ..raw }),
-                Some(count),
-                StepData::Words(at.collect()),
-            );
+            add(OpKind::Stand, row, Some(Slice { len: read, ..raw }), Some(count), StepData::Words(at.collect()));
         }
         for (frame, length) in [(len, 3), (1, len), (len / 4, 8)] {
             let slots = 2 * (length - 1);
             let (frames, ring) = (value(frame * length, Lifetime::Step), value(frame * slots + 1, Lifetime::State));
             let sizes = [pair(frame, slots), pair(length, 2), pair(0, 0)];
             let newest = Slice { len: frame, ..raw };
-            add(OpKind::Around(Wrapper::History), frames, Some(newest), Some(ring), StepData::Words(sizes.to_vec()));
+            add(OpKind::History, frames, Some(newest), Some(ring), StepData::Words(sizes.to_vec()));
         }
     }
     let [observation, action] = [8, 8].map(|len| value(len, Lifetime::Step));
