@@ -1,6 +1,6 @@
 //! SVG pictures by plotters: their shared parts, and a line plot of one or more panels with a common vertical axis.
 //!
-//! plotters takes whole pixels. A picture is drawn [`SCALE`] times as large as it is shown, since a row of a matrix may
+//! plotters takes whole pixels. A picture is drawn `SCALE` times as large as it is shown, since a row of a matrix may
 //! be narrower than a pixel.
 
 mod axis;

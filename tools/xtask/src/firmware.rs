@@ -28,7 +28,7 @@ pub(crate) struct Options {
     /// The range of every axis, LOW:HIGH or LOW:HIGH:RATE (change in a second), or a file with a line for each axis
     ///
     /// The stricter of these and the image's own limits hold; without either no axis may move.
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     pub(crate) limits: Option<String>,
     /// Features of firmware-demo: tick-8khz, foc, defmt-rtt, defmt-semihosting
     #[arg(long, value_name = "LIST")]
