@@ -18,33 +18,26 @@ OWN = set(vars(torch.nn.Module()))
 
 def changed_values(fresh: Any, used: Any) -> List[str]:
     """Names the values in which two copies of a module differ: buffers, parameters and attributes."""
-    before, after = _values(fresh), _values(used)
+    before, after = values_of(fresh), values_of(used)
     return [name for name in after if name not in before or not _same(before[name][2], after[name][2], depth=4)]
 
 
 def kept_tensors(module: Any, changed: Sequence[str]) -> Dict[str, List[torch.Tensor]]:
     """Returns the floating-point tensors of changed values by name; a tuple or list has several."""
-    found = {}
+    found, all_values = {}, values_of(module)
     for name in changed:
-        part, attribute = owner(module, name)
-        value = getattr(part, attribute)
+        _, _, value = all_values[name]
         values = list(value) if isinstance(value, (tuple, list)) else [value]
         if values and all(isinstance(item, torch.Tensor) and item.is_floating_point() for item in values):
             found[name] = values
     return found
 
 
-def owner(module: Any, name: str) -> Tuple[Any, str]:
-    """Returns the submodule that has a value, and the value's name there."""
-    at, _, attribute = name.rpartition(".")
-    return dict(module.named_modules())[at], attribute
-
-
 def depends_on(
     used: Any, changed: Sequence[str], run: Callable[[], Array], expected: Array, share: Callable[[Array, Array], float]
 ) -> bool:
     """Returns `True` if the actions of `run` change with these values of the module, which it overwrites."""
-    values = _values(used)
+    values = values_of(used)
     for part, name, value in (values[name] for name in changed):
         moved = _moved(value)
         if moved is not value:
@@ -56,7 +49,7 @@ def depends_on(
         return True
 
 
-def _values(module: Any) -> Dict[str, Tuple[Any, str, Any]]:
+def values_of(module: Any) -> Dict[str, Tuple[Any, str, Any]]:
     """Returns all values of a module by name, each with its submodule and its name there."""
     found: Dict[str, Tuple[Any, str, Any]] = {}
     for prefix, part in module.named_modules():

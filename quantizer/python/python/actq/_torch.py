@@ -16,7 +16,7 @@ import torch
 
 from . import _actq, _sb3
 from ._actq import Error, Policy
-from ._memory import changed_values, depends_on, kept_tensors, owner
+from ._memory import changed_values, depends_on, kept_tensors, values_of
 from ._typing import Array
 
 if TYPE_CHECKING:
@@ -327,13 +327,12 @@ class Stateless(torch.nn.Module):
         self.module, self.kept, self.name = module, kept, name
 
     def forward(self, *inputs: torch.Tensor) -> Tensors:
-        at = len(inputs) - sum(self.kept.values())
+        at, places = len(inputs) - sum(self.kept.values()), values_of(self.module)
         given, held = inputs[:at], iter(inputs[at:])
         for name, count in self.kept.items():
             # The module may change them in place.
             values = [next(held).clone() for _ in range(count)]
-            part, attribute = owner(self.module, name)
-            before = getattr(part, attribute)
+            part, attribute, before = places[name]
             setattr(part, attribute, type(before)(values) if isinstance(before, (tuple, list)) else values[0])
         outputs = tuple(tensor for _, tensor in tensors(self.module(*given), "output", self.name))
         after = kept_tensors(self.module, list(self.kept)).values()
