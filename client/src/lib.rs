@@ -6,7 +6,6 @@
 //! [`serve`] those of a simulator, and [`log`] records the actions. [`keys`] creates keys and signatures.
 #![forbid(unsafe_code)]
 
-// The dependencies between these modules are in docs/ARCHITECTURE.md; a test compares them.
 pub mod client;
 pub mod connection;
 pub mod event;

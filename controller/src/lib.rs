@@ -10,7 +10,6 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-// The dependencies between these modules are in docs/ARCHITECTURE.md; a test compares them.
 mod age;
 pub mod axis;
 pub mod breadcrumb;

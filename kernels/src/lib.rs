@@ -42,8 +42,8 @@
 //!   it. Its enums are exhaustive, so that a writer that forgets an operation does not compile.
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
-// Without the feature `writer`, the modules for writers are private, with public items, and nothing uses some of these. They are compiled
-// in every build, so that a feature adds no code; the linker leaves out what a program does not call.
+// Without the feature `writer`, the modules for writers are private, with public items, and nothing uses some of these.
+// They are compiled in every build, so that a feature adds no code; the linker leaves out what a program does not call.
 #![cfg_attr(not(feature = "writer"), allow(dead_code, unreachable_pub, unused_imports))]
 
 /// Declares methods that are public with the feature `writer`, and private to the crate without it.
@@ -60,8 +60,7 @@ macro_rules! writer_methods {
     };
 }
 
-// A test checks the dependencies between these modules by the table in docs/ARCHITECTURE.md. A module that writers need
-// is public with the feature `writer`.
+// A module that writers need is public with the feature `writer`.
 #[cfg(feature = "writer")]
 pub mod arch;
 #[cfg(not(feature = "writer"))]

@@ -7,7 +7,6 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-// The dependencies between these modules are in docs/ARCHITECTURE.md; a test compares them.
 pub mod code;
 mod decoder;
 mod fields;

@@ -4,8 +4,6 @@
 //! [`pipeline`] makes an image of them. A method of [`methods`], or one of another crate ([`methods::CustomMethod`]),
 //! turns every weight matrix into codes and scales, based on what [`calibrate`] finds in the recordings. [`emit`]
 //! writes the bytes. [`measure`] runs the finished image through the same executor as the firmware.
-//!
-//! `docs/ARCHITECTURE.md` lists which folder may use which, and a test checks it.
 #![deny(unsafe_code)]
 
 #[cfg(test)]

@@ -162,7 +162,7 @@ impl Store {
         is_digest(address) && self.read_whole(address).is_ok()
     }
 
-    /// Reads the results of jobs, and checks the files beside them, one time.
+    /// Reads the results of jobs, and checks the files beside them, once.
     pub fn results(&self, jobs: &[Job]) -> Results<'_> {
         let (mut whole, mut damaged) = (BTreeMap::new(), Vec::new());
         for Job { address, .. } in jobs {

@@ -15,7 +15,7 @@ use crate::work::{Merge, Row};
 /// Reads the result of a job by its address, and checks the file beside it.
 pub type Read<'a> = &'a dyn Fn(&str) -> Result<Outcome, JobError>;
 
-/// Merges the results of a plan, each read one time by `read`.
+/// Merges the results of a plan, each read once by `read`.
 ///
 /// # Errors
 ///
