@@ -10,6 +10,6 @@ pub mod pruned;
 pub mod student;
 // The library's own, which it compiles for its unit tests alone.
 #[cfg(test)]
-#[path = "../../quantizer/actq/src/testing.rs"]
+#[path = "../../crates/actq/src/testing.rs"]
 #[allow(dead_code, reason = "the library's own tests use all of it")]
 mod testing;
