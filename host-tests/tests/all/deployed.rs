@@ -28,7 +28,7 @@ pub(crate) const PUBLISHED: [(&str, &str); 5] = [
     // Its code sends targets beyond the joints' ranges.
     ("kinfer_zbot_walking", "target.limits = \"none\""),
     ("falcon_g1", "action_scale = 0.25\nrate_hz = 50"),
-    ("holosoma_t1_fastsac", include_str!("../../../quantizer/deploy/tests/all/holosoma.toml")),
+    ("holosoma_t1_fastsac", include_str!("../../../crates/actq-deploy/tests/all/holosoma.toml")),
 ];
 
 /// A published bundle: its plan, its compiled form and its reference. `None` without the shared folder.
