@@ -14,7 +14,7 @@ use crate::{PROFILE, firmware};
 /// The oldest supported version of Python.
 const OLDEST: [u32; 2] = [3, 9];
 /// The package, from the workspace's root.
-const PACKAGE: &str = "quantizer/python";
+const PACKAGE: &str = "python";
 /// Requirements of the tests, and of those that only `--optional` runs.
 const REQUIREMENTS: [&str; 2] = ["requirements-test.txt", "requirements-optional.txt"];
 

@@ -50,7 +50,7 @@ def test_a_recording_is_saved_as_documented(tmp_path, monkeypatch):
 
 
 def test_a_head_steps_with_flat_memory(cart_pole, monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "quantizer/python/examples"))
+    monkeypatch.syspath_prepend(str(ROOT / "python/examples"))
     import soak
 
     image = actq.quantize(cart_pole["policy"], bits=8, method="rtn", progress=False)

@@ -11,7 +11,7 @@ from conftest import ROOT
 
 @pytest.fixture(autouse=True)
 def examples(monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "quantizer/python/examples"))
+    monkeypatch.syspath_prepend(str(ROOT / "python/examples"))
 
 
 def test_a_policy_in_lerobots_layout(tmp_path):
