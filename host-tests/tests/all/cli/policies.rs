@@ -1,4 +1,4 @@
-//! Policies: human-readable keys change nothing, and no content controls the terminal. Faults are cases of `quantizer/tests`.
+//! Policies: human-readable keys change nothing, and no content controls the terminal. Faults are cases of `crates/actq-cli/tests`.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! Refusals that are no cases of `quantizer/tests`: damaged images, outputs that cannot be written; and a reader that
+//! Refusals that are no cases of `crates/actq-cli/tests`: damaged images, outputs that cannot be written; and a reader that
 //! closes the output.
 
 use std::fs;
