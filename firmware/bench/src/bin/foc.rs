@@ -1,5 +1,5 @@
 //! The observer and the current loop: ten thousand ticks, of which every hundredth is a counted region. It prints the
-//! CRC-32 of all duty cycles' bits, which the test in `controller/tests/all/foc/motor.rs` computes from the same
+//! CRC-32 of all duty cycles' bits, which the test in `crates/actq-controller/tests/all/foc/motor.rs` computes from the same
 //! inputs.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

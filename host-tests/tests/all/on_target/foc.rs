@@ -25,7 +25,7 @@ fn without_fpu(name: &'static str) -> Result<String> {
     Ok(String::from_utf8(qemu::run(qemu::command_on(Target::NoFpu, &elf, None, "")?, &[])?.stdout)?)
 }
 
-/// The expected bits are those of `controller/tests/all/foc/motor.rs`.
+/// The expected bits are those of `crates/actq-controller/tests/all/foc/motor.rs`.
 #[test]
 fn a_tick_keeps_its_bits_and_instruction_limit() -> Result<()> {
     let (text, mut costs) = counted("foc")?;
