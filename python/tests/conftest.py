@@ -18,7 +18,7 @@ else:
     # The machine's cores are shared with other tests.
     torch.set_num_threads(1)
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 UR3 = ROOT / "examples/ur3/policy"
 FLOW = ROOT / "examples/ur3/flow"
 

@@ -27,7 +27,7 @@ fn content(version: u8, kind: u8, sequence: u32, payload: &[u8]) -> Vec<u8> {
     [&[version, kind][..], &sequence.to_le_bytes(), &7u32.to_le_bytes(), payload].concat()
 }
 
-const DOCUMENTATION: &str = include_str!("../../../docs/LINK.md");
+const DOCUMENTATION: &str = include_str!("../../../../docs/LINK.md");
 
 /// Reads the hexadecimal bytes after `label` in the documentation's example.
 fn example(label: &str) -> Vec<u8> {
