@@ -3,17 +3,17 @@
 //! registers (`target`).
 //!
 //! On the host this crate is the table of boards for cargo's runner, build scripts, tests and measurements. On a target
-//! it has the `device` of the board that a feature selects, the traits of [`seams`], and the shared serial port
+//! it has the `device` of the board that a feature selects, the traits of [`hal`], and the shared serial port
 //! ([`port`]).
 #![cfg_attr(target_os = "none", no_std)]
 #![cfg_attr(not(target_os = "none"), forbid(unsafe_code))]
 
 // On both, so that the host tests them.
+pub mod hal;
 #[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
 pub mod no_stage;
 pub mod port;
 pub mod ram;
-pub mod seams;
 
 // On the host.
 #[cfg(not(target_os = "none"))]

@@ -4,7 +4,7 @@ use core::convert::Infallible;
 
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 
-use crate::seams::Stage;
+use crate::hal::Stage;
 
 /// A power stage that only stores its settings. `TOP` is the duty cycle of a switch that is always on.
 #[derive(Debug, Default)]

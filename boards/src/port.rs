@@ -7,7 +7,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use embedded_io::{ErrorType, Read, ReadReady};
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use crate::seams::Uart;
+use crate::hal::Uart;
 
 /// Memory of a port: two queues of `LEN` bytes, each with one byte always free. `LEN` is a power of two, so that its
 /// remainders are masks.
@@ -159,19 +159,19 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
-    use crate::seams::Lost;
+    use crate::hal::UartError;
 
     /// A UART with these bytes on its line; its transmitter takes `room` bytes.
     #[derive(Default)]
     struct Mock {
-        line: VecDeque<Result<u8, Lost>>,
+        line: VecDeque<Result<u8, UartError>>,
         sent: Vec<u8>,
         room: usize,
         asked: bool,
     }
 
     impl Uart for &mut Mock {
-        fn receive(&mut self) -> Option<Result<u8, Lost>> {
+        fn receive(&mut self) -> Option<Result<u8, UartError>> {
             self.line.pop_front()
         }
 
@@ -197,7 +197,7 @@ mod tests {
         let mut mock = Mock::default();
         let mut buffers = Buffers::<LEN>::new();
         for start in 0..5u32 {
-            let line = |i: u32| if i == 2 { Err(Lost) } else { Ok((start + i) as u8) };
+            let line = |i: u32| if i == 2 { Err(UartError) } else { Ok((start + i) as u8) };
             mock.line = (0..ROOM as u32 + 4).map(line).collect();
             let (mut wire, mut port) = buffers.split(&mut mock, || ());
             assert_eq!(port.read_ready(), Ok(false));

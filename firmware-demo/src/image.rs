@@ -1,6 +1,6 @@
 //! The checks of an image for this controller, and the axes from its contract.
 
-use actq_boards::seams::Watchdog;
+use actq_boards::hal::Watchdog;
 use actq_controller::{Axis, Limits, SafeAction};
 use actq_kernels::{Head, Image};
 use actq_link::code::Refusal;

@@ -4,7 +4,7 @@
 //! For a real motor, replace `Simulated`'s currents and sensor signals in `Motor::measure` by measured ones; the duty
 //! cycles already go to the board's power stage.
 
-use actq_boards::seams::Stage;
+use actq_boards::hal::Stage;
 use actq_controller::foc::{CurrentLoop, Gains, Measured, Observer, Rotor, Stator};
 use actq_controller::{Axis, Output};
 

@@ -1,7 +1,7 @@
 //! The tick's outputs to the power stage: each of the first axes commands a half bridge, whose duty cycle is the
 //! value's position between the limits. `motor.rs` drives a three-phase motor instead.
 
-use actq_boards::seams::Stage;
+use actq_boards::hal::Stage;
 use actq_controller::{Axis, Output};
 use embedded_hal::pwm::SetDutyCycle as _;
 

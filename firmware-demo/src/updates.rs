@@ -1,6 +1,6 @@
 //! Image updates, on boards with memory for them.
 
-use actq_boards::seams::Watchdog;
+use actq_boards::hal::Watchdog;
 use actq_controller::slots::{Authority, Candidate, Layout, Slot, Slots, Updater, Work};
 use actq_controller::update::{NoUpdate, Plan, Update};
 use actq_link::code::Refusal;

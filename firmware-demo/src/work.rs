@@ -1,7 +1,7 @@
 //! The loop below the tick: the link's bytes, slices of the head, update chunks, the watchdog.
 
+use actq_boards::hal::Watchdog;
 use actq_boards::port::Port;
-use actq_boards::seams::Watchdog;
 use actq_controller::progress::Progress;
 use actq_controller::slots::{Authority, Candidate};
 use actq_controller::{Check, Endpoint, Shared};
@@ -177,9 +177,9 @@ pub(crate) mod tests {
     use std::rc::Rc;
     use std::vec::Vec;
 
+    use actq_boards::hal::{Uart, UartError};
     use actq_boards::port::Buffers;
     use actq_boards::ram::Ram;
-    use actq_boards::seams::{Lost, Uart};
     use actq_controller::breadcrumb::Record;
     use actq_controller::endpoint::Facts;
     use actq_controller::slots::Anyone;
@@ -209,7 +209,7 @@ pub(crate) mod tests {
     struct End(Rc<RefCell<Line>>);
 
     impl Uart for End {
-        fn receive(&mut self) -> Option<Result<u8, Lost>> {
+        fn receive(&mut self) -> Option<Result<u8, UartError>> {
             self.0.borrow_mut().sent.pop_front().map(Ok)
         }
 

@@ -5,7 +5,7 @@ use std::task::Poll;
 
 use actq::runtime::{ImageBuffer, with_head};
 use actq_kernels::image::seal;
-use actq_kernels::pace::cost;
+use actq_kernels::cost;
 use libfuzzer_sys::fuzz_target;
 
 /// Instructions of the longest step to run.

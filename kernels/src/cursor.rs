@@ -1,7 +1,7 @@
 //! Progress of a step that runs in slices.
 
+use crate::activations::Scale;
 use crate::layout::Width;
-use crate::x::Scale;
 
 /// Progress of an evaluation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -62,10 +62,18 @@ macro_rules! writer_methods {
 
 // A module that writers need is public with the feature `writer`.
 #[cfg(feature = "writer")]
+pub mod activations;
+#[cfg(not(feature = "writer"))]
+mod activations;
+#[cfg(feature = "writer")]
 pub mod arch;
 #[cfg(not(feature = "writer"))]
 mod arch;
 mod arena;
+#[cfg(feature = "writer")]
+pub mod cost;
+#[cfg(not(feature = "writer"))]
+mod cost;
 mod cursor;
 mod error;
 mod head;
@@ -89,22 +97,14 @@ pub mod ops;
 #[cfg(not(feature = "writer"))]
 mod ops;
 #[cfg(feature = "writer")]
-pub mod pace;
-#[cfg(not(feature = "writer"))]
-mod pace;
-#[cfg(feature = "writer")]
 pub mod round;
 #[cfg(not(feature = "writer"))]
 mod round;
-#[cfg(feature = "writer")]
-pub mod x;
-#[cfg(not(feature = "writer"))]
-mod x;
 
 pub use arch::{BACKEND, Backend};
+pub use cost::Cost;
 pub use error::{Error, HeadError, ImageError, SavedError, StepError};
 pub use head::Head;
 pub use image::{Image, ImageInfo, Kind, Port, PortKind};
 #[cfg(feature = "writer")]
 pub use layout::{Block, BlockShape, Width};
-pub use pace::cost::Cost;

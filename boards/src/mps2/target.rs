@@ -3,8 +3,8 @@
 
 use core::cell::Cell;
 
+use crate::hal::{self, Cause, Clock, Source};
 use crate::ram::Ram;
-use crate::seams::{self, Cause, Clock, Source};
 pub use crate::target::cmsdk::{Uart, Watchdog};
 #[cfg(not(feature = "mps2-an505"))]
 pub use crate::target::mpu::guard_stack;
@@ -50,7 +50,7 @@ pub type Stage = crate::no_stage::NoStage<4200>;
 pub type Flash = Ram<'static, 4, { 128 << 10 }>;
 
 /// The parts of the board.
-pub type Parts = seams::Parts<Uart, Watchdog, Stage>;
+pub type Parts = hal::Parts<Uart, Watchdog, Stage>;
 
 /// Sets the board up, with its serial port at `baud`.
 ///

@@ -3,7 +3,7 @@
 
 use volatile_register::{RW, WO};
 
-use crate::seams::{self, Lost};
+use crate::hal::{self, UartError};
 
 #[repr(C)]
 struct UartRegisters {
@@ -50,8 +50,8 @@ impl Uart {
     }
 }
 
-impl seams::Uart for Uart {
-    fn receive(&mut self) -> Option<Result<u8, Lost>> {
+impl hal::Uart for Uart {
+    fn receive(&mut self) -> Option<Result<u8, UartError>> {
         let registers = self.registers();
         // SAFETY: clearing the interrupts before reading the state loses nothing: a later byte sets them again.
         unsafe { registers.interrupt.write(INTERRUPTS) };
@@ -59,7 +59,7 @@ impl seams::Uart for Uart {
         if state & RX_OVERRUN != 0 {
             // SAFETY: writing the bit clears only this bit.
             unsafe { registers.state.write(RX_OVERRUN) };
-            return Some(Err(Lost));
+            return Some(Err(UartError));
         }
         (state & RX_FULL != 0).then(|| Ok(registers.data.read() as u8))
     }
@@ -126,7 +126,7 @@ impl Watchdog {
     }
 }
 
-impl seams::Watchdog for Watchdog {
+impl hal::Watchdog for Watchdog {
     fn start(&mut self, milliseconds: u16) -> bool {
         let cycles = (self.clock_hz / 1000).checked_mul(milliseconds.into()).filter(|cycles| *cycles > 0);
         let Some(cycles) = cycles else { return false };

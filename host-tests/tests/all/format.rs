@@ -10,9 +10,9 @@ use actq::methods::{Outcome, Quantized};
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::root;
+use actq_kernels::activations::{Plan, max_prepared_words};
 use actq_kernels::image::{Image, Kind, OpKind, Region, block_bytes, checksum, header as h};
 use actq_kernels::layout::{BlockShape, Lanes, MAX_PAIRED_GROUPED, Width, pack};
-use actq_kernels::x::{Plan, max_prepared_words};
 use actq_testkit::Random;
 use half::bf16;
 

@@ -2,10 +2,10 @@
 
 use actq_bench::bits;
 use actq_bench::golden::{self, Case, Draw, Random};
+use actq_kernels::activations::{NotFinite, Plan, Prepared, Scale, prepare};
 use actq_kernels::arch::{BACKEND, Backend, Mismatch, Product, gemv, portable, reference};
 use actq_kernels::image::{RowBlock, header as h, largest_sum_bound, worst_case};
 use actq_kernels::layout::{Block, BlockShape, Lanes, MAX_PAIRED_GROUPED, PackError, STRIP, Width, pack};
-use actq_kernels::x::{NotFinite, Plan, Prepared, Scale, prepare};
 use proptest::prelude::*;
 
 use crate::draft::Draft;

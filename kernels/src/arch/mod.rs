@@ -64,9 +64,9 @@ pub(crate) use floats::{denoise, gru_elements, lstm_elements, normalize, scale, 
 pub(crate) use integers::copy;
 pub use product::{Mismatch, Product};
 
+use crate::activations::{Plan, Prepared, Scale};
 use crate::error::NotFinite;
 use crate::layout::Block;
-use crate::x::{Plan, Prepared, Scale};
 
 /// A backend that can be compiled in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 use core::fmt;
 
+use crate::activations::Prepared;
 use crate::layout::{Block, STRIP};
-use crate::x::Prepared;
 
 /// The block and the prepared vector differ in columns, group size or layout, the rows are not whole strips, or a slice
 /// is too short.

@@ -2,8 +2,8 @@
 //! with it.
 
 use super::product::Product;
+use crate::activations::Prepared;
 use crate::layout::Block;
-use crate::x::Prepared;
 
 /// Computes a GEMV's value for `row`: `sum over groups of scale * sum over columns of level * x`, modulo 2^32.
 pub fn dot(block: &Block<'_>, x: &Prepared<'_>, row: usize) -> i32 {

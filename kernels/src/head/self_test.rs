@@ -1,9 +1,9 @@
 //! The self-test: an image holds observations and the actions that they must give.
 
 use super::Head;
+use crate::cost::budget::Budget;
 use crate::error::{Fault, StepError};
 use crate::ops::elementwise::copy_le;
-use crate::pace::budget::Budget;
 
 impl Head<'_, '_> {
     /// Plays the image's self-test from a reset and compares every action bit for bit; resets again at the end.

@@ -4,13 +4,13 @@ use core::task::Poll;
 
 use super::{Head, Phase, contract};
 use crate::arena::regions;
+use crate::cost::budget::Budget;
 use crate::cursor::Cursor;
 use crate::error::{Fault, StepError};
 use crate::image::{Image, Region};
 use crate::meter::{Meter, Unlimited, Work};
 use crate::ops::elementwise::copy;
 use crate::ops::run;
-use crate::pace::budget::Budget;
 
 impl Head<'_, '_> {
     /// Computes the action for `observation`, after the action contract; with action chunks, the chunk's next action.

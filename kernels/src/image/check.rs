@@ -13,9 +13,9 @@ use super::region::Region;
 use super::text::is_text;
 use super::view::Image;
 use super::words::{low, word};
+use crate::activations::Plan;
 use crate::error::ImageError;
 use crate::layout::Block;
-use crate::x::Plan;
 
 /// The bits of infinity in bf16.
 const BF16_INFINITY: u16 = (f32::INFINITY.to_bits() >> 16) as u16;
@@ -335,17 +335,17 @@ fn check_around(kind: Around, op: &Op<'_>, front: &mut Front<'_>) -> Result<(), 
             front.take(op.data(), 1 + n.div_ceil(2))?;
             (op.half(1) == 0 || op.half(1) == 1 && op.half(0) == 4) && (0..n).all(|i| op.half(2 + i) < op.half(0))
         }
-        Around::Constant | Around::Start => {
+        Around::Constant | Around::Initial => {
             front.take_finite(op.data(), n)?;
             true
         }
-        Around::Row => {
+        Around::TableRow => {
             let rows = op.half(0);
             front.take(op.data(), 2)?;
             front.take_finite(op.data() + 2, rows * n)?;
             op.half(1) < rows && op.half(2) < rows && op.half(3) == 0
         }
-        Around::Stand => {
+        Around::Standstill => {
             let groups = op.half(1);
             front.take(op.data(), 2)?;
             front.take_finite(op.data() + 2, n)?;

@@ -54,13 +54,13 @@ pub enum OpKind {
     /// `dst` = an array of constants.
     Constant,
     /// `dst` = the array in the first step after a reset; in later ones it keeps its values. `third` is one word.
-    Start,
+    Initial,
     /// `dst` = the next row of a table, once in each step. `third` is one word. Data: the rows, the one of the first
     /// step, the one after the last.
-    Row,
-    /// `dst` = an array if the norm of each group of `src` is below a limit. Then [`Self::Row`] with the same `third`
+    TableRow,
+    /// `dst` = an array if the norm of each group of `src` is below a limit. Then [`Self::TableRow`] with the same `third`
     /// continues at row 0. Data: the groups, the limit's square.
-    Stand,
+    Standstill,
     /// `dst` = frames of several steps, of which `src` is the newest; `third` keeps the others in a ring. Data: its
     /// sizes.
     History,
@@ -72,9 +72,9 @@ pub(crate) enum Around {
     Select,
     Clip,
     Constant,
-    Start,
-    Row,
-    Stand,
+    Initial,
+    TableRow,
+    Standstill,
     History,
 }
 
@@ -94,9 +94,9 @@ impl OpKind {
             Self::Select => Around::Select,
             Self::Clip => Around::Clip,
             Self::Constant => Around::Constant,
-            Self::Start => Around::Start,
-            Self::Row => Around::Row,
-            Self::Stand => Around::Stand,
+            Self::Initial => Around::Initial,
+            Self::TableRow => Around::TableRow,
+            Self::Standstill => Around::Standstill,
             Self::History => Around::History,
             // No wildcard: a new operation is decided on here.
             Self::Normalize { .. }
@@ -278,12 +278,12 @@ operations! {
     CLIP = 15 "clip" "high": OpKind::Clip, Uses { src: 1, third: 1, reads_dst: true, ..Uses::NONE }, if "around";
     /// [`OpKind::Constant`]
     CONSTANT = 16 "constant": OpKind::Constant, Uses { arrays: 1, ..Uses::NONE }, if "around";
-    /// [`OpKind::Start`], whose third region is one word.
-    START = 17 "start": OpKind::Start, Uses { third: 1, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
-    /// [`OpKind::Row`], whose third region is one word.
-    ROW = 18 "row": OpKind::Row, Uses { third: 1, constants: 2, arrays: 1, ..Uses::NONE }, if "around";
-    /// [`OpKind::Stand`], whose data has the length of `src`, and whose third region is one word.
-    STAND = 19 "stand": OpKind::Stand, Uses { src: 1, third: 1, constants: 2, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
+    /// [`OpKind::Initial`], whose third region is one word.
+    INITIAL = 17 "initial": OpKind::Initial, Uses { third: 1, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
+    /// [`OpKind::TableRow`], whose third region is one word.
+    TABLE_ROW = 18 "table_row": OpKind::TableRow, Uses { third: 1, constants: 2, arrays: 1, ..Uses::NONE }, if "around";
+    /// [`OpKind::Standstill`], whose data has the length of `src`, and whose third region is one word.
+    STANDSTILL = 19 "standstill": OpKind::Standstill, Uses { src: 1, third: 1, constants: 2, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
     /// [`OpKind::History`], whose data has the lengths of `src` and of the third region.
     HISTORY = 20 "history": OpKind::History, Uses { src: 1, third: 1, constants: 3, ..Uses::NONE }, if "around";
 }

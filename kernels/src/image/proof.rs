@@ -1,8 +1,8 @@
 //! Proof that no sum of a row exceeds int32, for any activations.
 
+use crate::activations::{Plan, Scale, max_prepared_words};
 use crate::arch::gemv;
 use crate::layout::{Block, BlockShape, MAX_GROUP, PAD_COLS, STRIP};
-use crate::x::{Plan, Scale, max_prepared_words};
 
 /// Computes the largest magnitude that an int32 sum of the block's rows can reach for activations up to `x_max`: the
 /// largest row sum of `|level| * scale`, times `x_max`. It is exact, in time linear in the number of weights.

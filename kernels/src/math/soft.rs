@@ -598,9 +598,9 @@ impl<const NARROW: bool> Real for Soft<NARROW> {
 #[cfg(all(test, feature = "writer"))]
 mod tests {
     use super::*;
+    use crate::activations::TINY;
     use crate::math::exp2::{FIXED_ONE, QUARTER};
     use crate::math::{cos, elu, exp, gelu, gelu_tanh, mish, sigmoid, silu, sin, softplus, tanh};
-    use crate::x::TINY;
 
     /// Bits at the ends of all ranges.
     const EDGES: [u32; 22] = [

@@ -63,20 +63,20 @@ pub(super) fn run(kind: Around, op: &Op<'_>, arena: &mut [u32], units: &Range<us
             copy_le(op.part(0, units), part(dst, units));
             return Ok(());
         }
-        Around::Start => {
+        Around::Initial => {
             if count == 0 {
                 copy_le(op.part(0, units), part(dst, units));
             }
             1
         }
-        Around::Row => {
+        Around::TableRow => {
             let (rows, first) = (op.half(0), op.half(1));
             let row = (count as usize).checked_sub(1).unwrap_or(first).min(rows.saturating_sub(1));
             copy_le(op.part(row, units), part(dst, units));
             // 0 is for a step after a reset.
             1 + if row + 1 < rows { row + 1 } else { op.half(2) } as u32
         }
-        Around::Stand => {
+        Around::Standstill => {
             if !stands(op, src) {
                 return Ok(());
             }

@@ -1,6 +1,6 @@
 //! A quantized matrix times a vector, from f32 to f32, in the order of operations of every machine.
 //!
-//! 1. `x` is quantized to integers `q` with one scale ([`crate::x::Scale`]).
+//! 1. `x` is quantized to integers `q` with one scale ([`crate::activations::Scale`]).
 //! 2. Per row, the integer sum `acc = sum_g s_g * sum_c level * q` in int32 ([`crate::arch::gemv`]).
 //! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32. `start` is the bias; if the operation
 //!    accumulates, it is the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
@@ -8,6 +8,7 @@
 use core::ops::Range;
 
 use super::elementwise::copy_le;
+use crate::activations::{Plan, Prepared, Scale};
 use crate::arch;
 use crate::arch::Mismatch;
 use crate::arch::gemv;
@@ -19,7 +20,6 @@ use crate::layout::half::bf16;
 use crate::layout::{QUAD, STRIP};
 use crate::math::{Native, Real};
 use crate::meter::{Meter, OutputStart, RUN, Work};
-use crate::x::{Plan, Prepared, Scale};
 
 /// Borrows `len` outputs from `first` on, with their biases if `start` has any; `None` if there are too few.
 #[inline(always)]

@@ -122,9 +122,9 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         | OpKind::Select
         | OpKind::Clip
         | OpKind::Constant
-        | OpKind::Start
-        | OpKind::Row
-        | OpKind::Stand
+        | OpKind::Initial
+        | OpKind::TableRow
+        | OpKind::Standstill
         | OpKind::History => return Err(Fault::Damaged),
     }
     Ok(units.end == len)

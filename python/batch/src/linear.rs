@@ -5,9 +5,9 @@
 //! without the level's instructions if they are not inlined.
 
 use actq_kernels::StepError;
+use actq_kernels::activations::Scale;
 use actq_kernels::image::{Op, OpKind, Region, RowBlock};
 use actq_kernels::round::ROUND;
-use actq_kernels::x::Scale;
 use fearless_simd::prelude::*;
 
 use crate::product::{HEADS, ROWS, Weights, product};

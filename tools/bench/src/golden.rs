@@ -5,8 +5,8 @@
 //! width of 0.
 
 pub use actq::random::Random;
+use actq_kernels::activations::{Plan, Prepared, prepare};
 use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
-use actq_kernels::x::{Plan, Prepared, prepare};
 
 /// Distribution of a case's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

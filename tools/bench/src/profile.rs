@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use actq_kernels::Image;
-use actq_kernels::pace::cost::Cost;
+use actq_kernels::cost::Cost;
 use anyhow::{Result, bail, ensure};
 
 use crate::cycles::Code;

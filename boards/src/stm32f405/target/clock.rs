@@ -4,7 +4,7 @@
 use stm32f4::stm32f405 as pac;
 
 use super::wait::wait;
-use crate::seams::{Clock, Source};
+use crate::hal::{Clock, Source};
 
 const FALLBACK: Clock = Clock { hz: 16_000_000, source: Source::Fallback };
 const FAST: Clock = Clock { hz: 168_000_000, source: Source::Crystal };

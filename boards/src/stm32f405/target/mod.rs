@@ -22,7 +22,7 @@ pub use pwm::{Phase, Pwm as Stage};
 pub use usart::Usart as Uart;
 pub use watchdog::Iwdg as Watchdog;
 
-use crate::seams::{self, Cause};
+use crate::hal::{self, Cause};
 pub use crate::target::mpu::guard_stack;
 use crate::target::vectors::interrupts;
 
@@ -39,7 +39,7 @@ pub const WATCHDOG_NMI: bool = false;
 pub const FLASH_WHILE_ARMED: bool = false;
 
 /// The parts of the board.
-pub type Parts = seams::Parts<Uart, Watchdog, Stage>;
+pub type Parts = hal::Parts<Uart, Watchdog, Stage>;
 /// The board's flash for updates.
 pub type Flash = super::flash::Flash<Controller>;
 

@@ -11,7 +11,7 @@ use stm32f4::stm32f405 as pac;
 
 use super::adc::Currents;
 use super::wait::wait;
-use crate::seams::Stage;
+use crate::hal::Stage;
 
 /// PWM frequency in Hz.
 const PWM_HZ: u32 = 20_000;

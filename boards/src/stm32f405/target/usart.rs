@@ -2,7 +2,7 @@
 
 use stm32f4::stm32f405 as pac;
 
-use crate::seams::{Lost, Uart};
+use crate::hal::{Uart, UartError};
 
 /// The alternate function of a USART 1 to 3.
 const ALTERNATE: u8 = 7;
@@ -32,7 +32,7 @@ impl Usart {
 }
 
 impl Uart for Usart {
-    fn receive(&mut self) -> Option<Result<u8, Lost>> {
+    fn receive(&mut self) -> Option<Result<u8, UartError>> {
         let state = self.0.sr().read();
         let wrong = state.ore().bit() || state.fe().bit() || state.nf().bit();
         if !state.rxne().bit() && !wrong {
@@ -41,7 +41,7 @@ impl Uart for Usart {
         // Reading the state and then the byte clears the flags. An overrun lost the byte after this one, which also
         // counts as lost.
         let byte = self.0.dr().read().dr().bits() as u8;
-        Some(if wrong { Err(Lost) } else { Ok(byte) })
+        Some(if wrong { Err(UartError) } else { Ok(byte) })
     }
 
     fn transmit(&mut self, byte: u8) -> bool {

@@ -8,7 +8,7 @@ use stm32f4::stm32f405 as pac;
 use stm32f4::stm32f405::iwdg::RegisterBlock;
 
 use super::wait::wait;
-use crate::seams::Watchdog;
+use crate::hal::Watchdog;
 use crate::stm32f405::watchdog_time::{MAX_TICKS, ticks};
 
 const OPEN: u16 = 0x5555;

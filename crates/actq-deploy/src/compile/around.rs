@@ -54,7 +54,7 @@ impl Compiler<'_> {
             if state.start.iter().any(|number| *number != 0.0) {
                 let count = self.to.state(1);
                 let start = state.start.iter().map(|number| *number as f32).collect();
-                self.to.emit(OpKind::Start, place, None, Some(count), StepData::Constants(start));
+                self.to.emit(OpKind::Initial, place, None, Some(count), StepData::Constants(start));
             }
         }
         for (n, network) in plan.networks.iter().enumerate() {
@@ -220,7 +220,7 @@ impl Compiler<'_> {
         let (value, count) = (self.to.value(rows[0].len()), self.to.state(1));
         let mut data = words(&[rows.len(), first, next, 0]);
         data.extend(rows.iter().flatten().map(|number| number.to_bits()));
-        self.to.emit(OpKind::Row, value, None, Some(count), StepData::Words(data));
+        self.to.emit(OpKind::TableRow, value, None, Some(count), StepData::Words(data));
         (value, count)
     }
 
@@ -244,7 +244,7 @@ impl Compiler<'_> {
             data.push(squared.to_bits());
             data.extend(standing.at.iter().map(|phase| (*phase as f32).to_bits()));
             data.extend(words(&parts.iter().map(|part| part.len).collect::<Vec<_>>()));
-            self.to.emit(OpKind::Stand, value, Some(read), Some(count), StepData::Words(data));
+            self.to.emit(OpKind::Standstill, value, Some(read), Some(count), StepData::Words(data));
         }
         Ok(value)
     }

@@ -6,8 +6,8 @@
 //! the order in which they are written, each at the lowest offset that fits. No gaps remain, so whatever a step has
 //! written is a prefix of the arena; the image's check requires this.
 
+use actq_kernels::activations::max_prepared_words;
 use actq_kernels::image::{OpKind, Region, kept_words};
-use actq_kernels::x::max_prepared_words;
 
 use crate::around::{Around, OUTPUT};
 use crate::error::{Result, ensure};

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use actq_kernels::activations::TINY;
 use actq_kernels::round::ROUND;
-use actq_kernels::x::TINY;
 use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, ArrayViewMut2, s};
 
 use crate::simd::wide;

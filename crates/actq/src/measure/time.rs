@@ -1,8 +1,8 @@
-//! Predicted time on the target: the cost model (`actq_kernels::pace::cost`) at a clock.
+//! Predicted time on the target: the cost model (`actq_kernels::cost`) at a clock.
 
 use actq_kernels::Image;
+use actq_kernels::cost::{self, Cost};
 use actq_kernels::image::Op;
-use actq_kernels::pace::cost::{self, Cost};
 use serde::Serialize;
 
 /// Default clock of the processor in Hz: 168 MHz, that of an STM32F405.

@@ -49,8 +49,8 @@ mod app {
     use core::sync::atomic::Ordering;
 
     use actq_boards::device::{self, FLASH_WHILE_ARMED, Interrupt, Parts, SCRATCH, Stage, Uart, Watchdog};
+    use actq_boards::hal::{Source, Watchdog as _};
     use actq_boards::port::{Buffers, Port, Wire};
-    use actq_boards::seams::{Source, Watchdog as _};
     use actq_controller::endpoint::Facts;
     use actq_controller::slots::Candidate;
     use actq_controller::{Check, Endpoint, Guard, Output, Safety, Settings, Shared as _};

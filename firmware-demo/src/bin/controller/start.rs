@@ -3,7 +3,7 @@
 use core::cell::Cell;
 
 use actq_boards::device::WATCHDOG_NMI;
-use actq_boards::seams::Cause;
+use actq_boards::hal::Cause;
 use actq_controller::Limits;
 use actq_controller::breadcrumb::Record;
 use actq_firmware_support::slot;

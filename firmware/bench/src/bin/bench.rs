@@ -18,9 +18,9 @@ mod firmware {
 
     use actq_firmware_bench::random_words;
     use actq_firmware_support::{count, host};
+    use actq_kernels::activations::{Plan, Scale};
     use actq_kernels::image::RowBlock;
     use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
-    use actq_kernels::x::{Plan, Scale};
     use cortex_m::singleton;
 
     const SHAPES: [(usize, usize); 5] = [(64, 256), (256, 256), (512, 512), (128, 1024), (28, 256)];

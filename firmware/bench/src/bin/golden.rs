@@ -13,10 +13,10 @@ mod firmware {
 
     use actq_firmware_support::host::{self, File};
     use actq_firmware_support::machine::{entry, singleton};
+    use actq_kernels::activations::{Plan, Prepared, Scale};
     use actq_kernels::arch::{BACKEND, Product, gemv, portable};
     use actq_kernels::image::RowBlock;
     use actq_kernels::layout::{Block, BlockShape, Lanes, Width};
-    use actq_kernels::x::{Plan, Prepared, Scale};
 
     /// Words of the largest case's weights and activations.
     const WORDS: usize = if cfg!(actq_small) { 1536 } else { 16 * 1024 };

@@ -18,10 +18,10 @@ mod firmware {
     use actq_firmware_bench::random_words;
     use actq_firmware_support::machine::{entry, singleton};
     use actq_firmware_support::{count, host};
+    use actq_kernels::activations::{Plan, Prepared, Scale};
     use actq_kernels::arch::{BACKEND, reference};
     use actq_kernels::image::RowBlock;
     use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
-    use actq_kernels::x::{Plan, Prepared, Scale};
 
     const ROWS: usize = 256;
     const COLS: usize = 256;

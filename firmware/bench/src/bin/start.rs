@@ -19,8 +19,8 @@ mod firmware {
     use core::cell::Cell;
     use core::fmt::Write as _;
 
+    use actq_boards::hal::Watchdog;
     use actq_boards::ram::Ram;
-    use actq_boards::seams::Watchdog;
     use actq_controller::slots::{Key, Layout, Slot, Slots, Updater, Work};
     use actq_controller::update::{Plan, Update as _};
     use actq_firmware_demo::image;

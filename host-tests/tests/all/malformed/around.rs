@@ -17,9 +17,9 @@ fn ports(d: &Draft) -> usize {
 /// An operation of each kind: its code, and its number among those of it.
 const SELECT: (u8, usize) = (op::SELECT, 0);
 const CONSTANT: (u8, usize) = (op::CONSTANT, 0);
-const START: (u8, usize) = (op::START, 0);
-const ROW: (u8, usize) = (op::ROW, 0);
-const STAND: (u8, usize) = (op::STAND, 0);
+const START: (u8, usize) = (op::INITIAL, 0);
+const ROW: (u8, usize) = (op::TABLE_ROW, 0);
+const STAND: (u8, usize) = (op::STANDSTILL, 0);
 const HISTORY: (u8, usize) = (op::HISTORY, 0);
 const CLIP: (u8, usize) = (op::CLIP, 0);
 

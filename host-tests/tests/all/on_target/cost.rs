@@ -15,8 +15,8 @@ use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::networks::{Builder, accumulating};
 use actq_bench::qemu::{self, Counter};
 use actq_bench::{Target, bits, firmware, profile, shared_policies, ur3};
+use actq_kernels::cost::{Cost, of_op, of_step};
 use actq_kernels::image::Kind;
-use actq_kernels::pace::cost::{Cost, of_op, of_step};
 use actq_kernels::{StepError, Width};
 use anyhow::{Context, Result, bail, ensure};
 

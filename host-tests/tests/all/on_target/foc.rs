@@ -8,7 +8,7 @@ use actq_bench::qemu::{self, Counter, Region};
 use actq_bench::{Target, firmware};
 use actq_firmware_bench::functions::hash;
 use actq_firmware_bench::trigonometry::{CASES, Case, LEN, results};
-use actq_kernels::pace::cost::Cost;
+use actq_kernels::cost::Cost;
 use anyhow::{Context as _, Result, ensure};
 
 /// The firmware's output, and the cost of its counted regions.

@@ -11,7 +11,7 @@ use actq_bench::cycles::Code;
 use actq_bench::firmware::{self, built_in};
 use actq_bench::networks::Builder;
 use actq_bench::qemu::{self, Counter, Region};
-use actq_boards::seams::Watchdog;
+use actq_boards::hal::Watchdog;
 use actq_boards::stm32f405::watchdog_time;
 use actq_client::keys;
 use actq_firmware_demo::image;

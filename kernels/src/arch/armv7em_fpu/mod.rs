@@ -9,10 +9,10 @@ use core::slice;
 
 use self::table::quantizer;
 use super::armv7em::copy;
+use crate::activations::Plan;
 use crate::layout::XLayout;
 use crate::math::exp2::{EXP, QUARTER, exp2_constants};
 use crate::round::ROUND;
-use crate::x::Plan;
 
 assembler!("vector.s");
 assembler!("cells.s");

@@ -1,4 +1,4 @@
-@ Between f32 and integers on the FPU of the hard-float target: the arithmetic of kernels/src/x/scale.rs and ops/linear.rs.
+@ Between f32 and integers on the FPU of the hard-float target: the arithmetic of kernels/src/activations/scale.rs and ops/linear.rs.
 
     .syntax unified
     .thumb

@@ -3,9 +3,9 @@
 //! The loops suit a compiler that has few registers and knows the layout. They process a strip's cells together, so
 //! that one load of an activation serves all of them. Lengths that the layout determines are constants.
 
+use crate::activations::Prepared;
 use crate::arch::product::Product;
 use crate::layout::{Block, Format, QUAD, Sums, XLayout, with_format};
-use crate::x::Prepared;
 
 /// Computes a product as [`crate::arch::gemv`] does.
 pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {

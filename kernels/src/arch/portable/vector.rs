@@ -1,9 +1,9 @@
 //! Conversion of vectors between f32 and integers.
 
+#[cfg(not(actq_fpu))]
+use crate::activations::{Plan, lay_out};
 use crate::layout::half::{bf16, half_word};
 use crate::math::{Native, Real};
-#[cfg(not(actq_fpu))]
-use crate::x::{Plan, lay_out};
 
 /// Returns the bits of the largest magnitude.
 pub fn magnitude(x: &[f32]) -> u32 {

@@ -158,14 +158,14 @@ pub(super) fn around(seed: u64) -> Result<Vec<u8>> {
     });
     add(OpKind::Clip, reversed, Some(limits[0]), Some(limits[1]), StepData::None);
     let (kept, count) = (value(len, Lifetime::State), value(1, Lifetime::State));
-    add(OpKind::Start, kept, None, Some(count), StepData::Constants(vec![0.25; len]));
+    add(OpKind::Initial, kept, None, Some(count), StepData::Constants(vec![0.25; len]));
     add(OpKind::Add, kept, Some(reversed), None, StepData::None);
     let (row, count) = (value(len, Lifetime::Step), value(1, Lifetime::State));
     let rows = [pair(3, 0), pair(1, 0)].into_iter().chain((0..3 * len as u32).map(|i| (i as f32).to_bits()));
-    add(OpKind::Row, row, None, Some(count), StepData::Words(rows.collect()));
+    add(OpKind::TableRow, row, None, Some(count), StepData::Words(rows.collect()));
     let limit = len as f32;
     let at = [pair(len, 1), limit.to_bits()].into_iter().chain(vec![0; len]).chain([pair(len, 0)]);
-    add(OpKind::Stand, row, Some(raw), Some(count), StepData::Words(at.collect()));
+    add(OpKind::Standstill, row, Some(raw), Some(count), StepData::Words(at.collect()));
     add(OpKind::Add, row, Some(kept), None, StepData::None);
     let (length, flags) = (3, draw.below(4));
     let slots = 2 * (length - 1);

@@ -14,7 +14,7 @@ const VECTORS: &str = ".vector_table";
 /// Constants that hold no addresses for a call: the built-in image (`firmware-demo/src/bin/controller/start.rs`), the
 /// tables of the cost model, and of the examples in C the image, its golden run and the vectors, which the processor
 /// calls.
-const NUMBERS: [&str; 4] = ["controller::start::BUILT_IN", "actq_kernels::pace::", "policy_", "vectors"];
+const NUMBERS: [&str; 4] = ["controller::start::BUILT_IN", "actq_kernels::cost::", "policy_", "vectors"];
 
 /// A function.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! Bytes and cycles as functions of the rows' widths, for the allocation, and the fewest bytes.
 
 use actq_kernels::Width;
+use actq_kernels::cost;
 use actq_kernels::image::{OpKind, block_bytes};
 use actq_kernels::layout::{BlockShape, STRIP};
 use actq_kernels::math::Function;
-use actq_kernels::pace::cost;
 
 use super::balance::balance_bytes;
 use super::dimension::{Dimension, Widths};

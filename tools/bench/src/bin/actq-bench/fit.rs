@@ -1,7 +1,7 @@
-//! `cargo xtask fit`: the rates of the cost model (`kernels/src/pace/`), from counted operations.
+//! `cargo xtask fit`: the rates of the cost model (`kernels/src/cost/`), from counted operations.
 //!
 //! Images with many shapes of every operation run under QEMU. Every operation and every whole step is a sample: the
-//! count of each feature, and the measured cost. The rates minimize the squared relative errors. A feature that others
+//! count of each item, and the measured cost. The rates minimize the squared relative errors. An item that others
 //! determine, or whose rate would be negative, gets the rate 0.
 
 mod images;
@@ -20,9 +20,9 @@ use actq_bench::qemu::Counter;
 use actq_bench::{Target, firmware, profile, root};
 use actq_cli::outputs::files;
 use actq_kernels::Width;
+use actq_kernels::cost::{self, Cost, CostItem};
 use actq_kernels::image::{Op, OpKind, op};
 use actq_kernels::math::Function;
-use actq_kernels::pace::cost::{self, Cost, Feature};
 use anyhow::Result;
 
 use images::images;
@@ -70,27 +70,27 @@ pub(crate) fn run() -> Result<()> {
     let mut most = most(&samples, &polls, &instructions);
     println!("measuring polls");
     let resumed = resumed(&elf, &counter, &most)?;
-    most.insert(Feature::RESUMED, resumed);
-    let path = root().join("kernels/src/pace/rates.rs");
+    most.insert(CostItem::RESUMED, resumed);
+    let path = root().join("kernels/src/cost/rates.rs");
     files::write(&path, table(&instructions, &cycles, &most).as_bytes())?;
     println!("{}: written", path.display());
     Ok(())
 }
 
-/// Writes the rates as the source of the kernels' table: a feature's debug text is its key.
+/// Writes the rates as the source of the kernels' table: an item's debug text is its key.
 fn table(instructions: &Rates, cycles: &Rates, most: &Rates) -> String {
     let mut text =
         "//! Written by `cargo xtask fit`: expected instructions, expected cycles, instructions at most.\n\n\
-                    use super::feature::{Feature, Gemv, Prepare, Scales::*, Strips::*};\n\
+                    use super::item::{CostItem, Gemv, Prepare, Scales::*, Strips::*};\n\
                     use crate::image::op;\n\
                     use crate::layout::{Lanes::*, Width::*};\n\
                     use crate::math::Function;\n\n\
-                    #[rustfmt::skip]\npub(super) const RATES: &[(Feature, [f64; 3])] = &[\n"
+                    #[rustfmt::skip]\npub(super) const RATES: &[(CostItem, [f64; 3])] = &[\n"
             .to_owned();
-    for feature in Feature::all() {
-        let rate = |rates: &Rates| rates.get(&feature).copied().unwrap_or(0.0);
+    for item in CostItem::all() {
+        let rate = |rates: &Rates| rates.get(&item).copied().unwrap_or(0.0);
         let [a, b, c] = [instructions, cycles, most].map(rate);
-        let _ = writeln!(text, "    ({feature:?}, [{a:.3}, {b:.3}, {c:.3}]),");
+        let _ = writeln!(text, "    ({item:?}, [{a:.3}, {b:.3}, {c:.3}]),");
     }
     text + "];\n"
 }
@@ -106,16 +106,16 @@ fn measure(
     let buffer = ImageBuffer::new(bytes);
     let image = buffer.image(Path::new(name))?;
     let observations = observations(image.obs_len());
-    let frame = features(|add| cost::frame(&image, add));
+    let frame = items(|add| cost::frame(&image, add));
     let ops: Vec<Op<'_>> = image.ops().collect();
-    let of_ops: Vec<_> = ops.iter().map(|op| features(|add| cost::features(op, add))).collect();
+    let of_ops: Vec<_> = ops.iter().map(|op| items(|add| cost::items(op, add))).collect();
     // Before the second chunk there is none to blend with.
     let expected = |step| (usize::from(image.overlap() > 0)..NORMAL_STEPS).contains(&step);
     let steps = profile::steps(elf, counter, bytes, &observations)?;
     for (step, cost) in steps.into_iter().enumerate() {
         let mut all = frame.clone();
-        of_ops.iter().flatten().for_each(|(feature, n)| *all.entry(*feature).or_default() += n);
-        samples.push(Sample { name: format!("{name}, a step"), features: all, cost, expected: expected(step) });
+        of_ops.iter().flatten().for_each(|(item, n)| *all.entry(*item).or_default() += n);
+        samples.push(Sample { name: format!("{name}, a step"), items: all, cost, expected: expected(step) });
     }
     let single = profile::parts(elf, counter, &image, bytes, &observations, u32::MAX)?;
     let limited = profile::parts(elf, counter, &image, bytes, &observations[..1], AMPLE_BUDGET)?;
@@ -123,14 +123,14 @@ fn measure(
         polls.push((cost.instructions as f64 - plain.instructions as f64, pieces(op)));
     }
     for (step, parts) in single.into_iter().enumerate() {
-        let mut sample = |what: String, cost, poll: f64, mut features: BTreeMap<Feature, f64>| {
+        let mut sample = |what: String, cost, poll: f64, mut items: BTreeMap<CostItem, f64>| {
             if poll > 0.0 {
-                features.insert(Feature::POLL_OP, poll);
+                items.insert(CostItem::POLL_OP, poll);
             }
-            samples.push(Sample { name: format!("{name}, {what}"), features, cost, expected: expected(step) });
+            samples.push(Sample { name: format!("{name}, {what}"), items, cost, expected: expected(step) });
         };
-        sample("begin".to_owned(), parts.begin, 0.0, features(|add| cost::begin(&image, add)));
-        sample("action".to_owned(), parts.action, 1.0, features(|add| cost::action(&image, add)));
+        sample("begin".to_owned(), parts.begin, 0.0, items(|add| cost::begin(&image, add)));
+        sample("action".to_owned(), parts.action, 1.0, items(|add| cost::action(&image, add)));
         for ((cost, of_op), op) in parts.ops.into_iter().zip(&of_ops).zip(&ops) {
             let what = match op.matrix() {
                 Some(matrix) => format!("{}x{}", matrix.rows, matrix.cols),
@@ -142,14 +142,14 @@ fn measure(
     Ok(())
 }
 
-fn features(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> BTreeMap<Feature, f64> {
-    let mut features = BTreeMap::new();
-    list(&mut |feature, n| {
+fn items(list: impl FnOnce(&mut dyn FnMut(CostItem, usize))) -> BTreeMap<CostItem, f64> {
+    let mut items = BTreeMap::new();
+    list(&mut |item, n| {
         if n > 0 {
-            *features.entry(feature).or_default() += n as f64;
+            *items.entry(item).or_default() += n as f64;
         }
     });
-    features
+    items
 }
 
 /// Pieces of an operation under an ample budget.
@@ -165,30 +165,30 @@ fn pieces(op: &Op<'_>) -> usize {
 /// Features whose cost is a maximum: values whose code branches on them, and pieces.
 fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
     let mut most = rates.clone();
-    let rate = |feature: Feature| rates.get(&feature).copied().unwrap_or(0.0);
-    let varying: Vec<Feature> = Function::ALL
+    let rate = |item: CostItem| rates.get(&item).copied().unwrap_or(0.0);
+    let varying: Vec<CostItem> = Function::ALL
         .into_iter()
-        .map(Feature::function)
+        .map(CostItem::function)
         .chain([
-            Feature::value(op::NORMALIZE),
-            Feature::value(op::LSTM_CELL),
-            Feature::value(op::GRU_CELL),
-            Feature::value(op::DENOISE),
+            CostItem::value(op::NORMALIZE),
+            CostItem::value(op::LSTM_CELL),
+            CostItem::value(op::GRU_CELL),
+            CostItem::value(op::DENOISE),
             // Only the first step after a reset writes the values.
-            Feature::value(op::START),
-            Feature::LIMITED,
-            Feature::CONTRACT,
-            Feature::PREDICTED_VALUE,
-            Feature::BLENDED,
+            CostItem::value(op::INITIAL),
+            CostItem::LIMITED,
+            CostItem::CONTRACT,
+            CostItem::PREDICTED_VALUE,
+            CostItem::BLENDED,
         ])
         .collect();
-    // Whole steps differ in many features; only their parts tell the cost of a value.
-    for sample in samples.iter().filter(|s| s.features.contains_key(&Feature::POLL_OP)) {
-        for &feature in &varying {
-            let Some(&n) = sample.features.get(&feature).filter(|n| **n >= 30.0) else { continue };
+    // Whole steps differ in many items; only their parts tell the cost of a value.
+    for sample in samples.iter().filter(|s| s.items.contains_key(&CostItem::POLL_OP)) {
+        for &item in &varying {
+            let Some(&n) = sample.items.get(&item).filter(|n| **n >= 30.0) else { continue };
             let excess = sample.cost.instructions as f64 - predicted(sample, rates);
-            let at_most = most.entry(feature).or_default();
-            *at_most = at_most.max(rate(feature) + excess / n);
+            let at_most = most.entry(item).or_default();
+            *at_most = at_most.max(rate(item) + excess / n);
         }
     }
     // The cost that a limit adds to an operation and to each of its pieces.
@@ -198,14 +198,14 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
     let variance: f64 = polls.iter().map(|p| (p.1 as f64 - x).powi(2)).sum();
     let piece = (covariance / variance).max(0.0);
     let entered = polls.iter().map(|p| p.0 - piece * p.1 as f64).fold(0.0, f64::max);
-    most.extend([(Feature::PIECE, piece), (Feature::ENTERED, entered), (Feature::POLL, rate(Feature::POLL_OP))]);
+    most.extend([(CostItem::PIECE, piece), (CostItem::ENTERED, entered), (CostItem::POLL, rate(CostItem::POLL_OP))]);
     most
 }
 
 /// Measures the cost of returning to a linear operation for each of its blocks, from steps in short polls, whose number
 /// tells how often that was. The image's least budget comes from the previous rates, which need not be exact here.
 fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
-    let known: f64 = [Feature::POLL, Feature::ENTERED, Feature::operation(op::LINEAR), Feature::PIECE]
+    let known: f64 = [CostItem::POLL, CostItem::ENTERED, CostItem::operation(op::LINEAR), CostItem::PIECE]
         .map(|f| most[&f])
         .iter()
         .sum();

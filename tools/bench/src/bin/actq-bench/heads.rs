@@ -18,7 +18,7 @@ use actq_bench::{Target, evaluation, firmware, shared_policies, target_dir, ur3}
 use actq_cli::outputs::files;
 use actq_cli::report::table::table;
 use actq_kernels::Width;
-use actq_kernels::pace::cost::Cost;
+use actq_kernels::cost::Cost;
 use anyhow::{Context, Result};
 use serde::Serialize;
 

@@ -101,13 +101,13 @@ fn around() -> Result<(String, Vec<u8>)> {
         });
         add(OpKind::Clip, dst, Some(limits[0]), Some(limits[1]), StepData::None);
         let (kept, count) = (value(len, Lifetime::State), value(1, Lifetime::State));
-        add(OpKind::Start, kept, None, Some(count), StepData::Constants(vec![0.25; len]));
+        add(OpKind::Initial, kept, None, Some(count), StepData::Constants(vec![0.25; len]));
         let (row, count) = (value(len, Lifetime::Step), value(1, Lifetime::State));
         let rows = [pair(3, 0), pair(1, 0)].into_iter().chain((0..3 * len as u32).map(|i| (i as f32).to_bits()));
-        add(OpKind::Row, row, None, Some(count), StepData::Words(rows.collect()));
+        add(OpKind::TableRow, row, None, Some(count), StepData::Words(rows.collect()));
         for read in [len, 8] {
             let at = [pair(read, 1), never_moves].into_iter().chain(vec![0; len]).chain([pair(read, 0)]);
-            add(OpKind::Stand, row, Some(Slice { len: read, ..raw }), Some(count), StepData::Words(at.collect()));
+            add(OpKind::Standstill, row, Some(Slice { len: read, ..raw }), Some(count), StepData::Words(at.collect()));
         }
         for (frame, length) in [(len, 3), (1, len), (len / 4, 8)] {
             let slots = 2 * (length - 1);
@@ -297,7 +297,7 @@ mod tests {
     use std::path::Path;
 
     use actq::runtime::ImageBuffer;
-    use actq_kernels::pace::cost::{Feature, values};
+    use actq_kernels::cost::{CostItem, values};
 
     use super::*;
 
@@ -309,9 +309,10 @@ mod tests {
             let ops = buffer.image(Path::new(&name))?.ops().map(|op| values(&op));
             measured.extend(ops.flat_map(|(operation, value, _)| [operation, value]));
         }
-        let name = |feature: &Feature| format!("{feature:?}");
-        let expected = Feature::all().filter(|f| ["operation(", "function("].iter().any(|kind| name(f).contains(kind)));
-        let missing: Vec<Feature> = expected.filter(|feature| !measured.contains(feature)).collect();
+        let name = |item: &CostItem| format!("{item:?}");
+        let expected =
+            CostItem::all().filter(|f| ["operation(", "function("].iter().any(|kind| name(f).contains(kind)));
+        let missing: Vec<CostItem> = expected.filter(|item| !measured.contains(item)).collect();
         assert!(missing.is_empty(), "no image has {missing:?}");
         Ok(())
     }

@@ -2,30 +2,30 @@
 
 use std::collections::BTreeMap;
 
-use actq_kernels::pace::cost::{Cost, Feature};
+use actq_kernels::cost::{Cost, CostItem};
 
 use super::sample::{Rates, Sample};
 
 /// Computes the non-negative rates with the least sum of squared relative errors (Lawson and Hanson, Solving Least
 /// Squares Problems, 1974, chapter 23, on the normal equations).
 pub(super) fn solve(samples: &[&Sample], of: impl Fn(Cost) -> u64) -> Rates {
-    let mut features: Vec<Feature> = samples.iter().flat_map(|s| s.features.keys().copied()).collect();
-    features.sort();
-    features.dedup();
-    let place: BTreeMap<Feature, usize> = features.iter().enumerate().map(|(i, f)| (*f, i)).collect();
-    let n = features.len();
+    let mut items: Vec<CostItem> = samples.iter().flat_map(|s| s.items.keys().copied()).collect();
+    items.sort();
+    items.dedup();
+    let place: BTreeMap<CostItem, usize> = items.iter().enumerate().map(|(i, f)| (*f, i)).collect();
+    let n = items.len();
     let (mut normal, mut right) = (vec![vec![0.0f64; n]; n], vec![0.0f64; n]);
     for sample in samples {
         let target = of(sample.cost) as f64;
         // Relative errors; short samples may be off by a few instructions.
         let weight = 1.0 / (target + 100.0);
-        let row: Vec<(usize, f64)> = sample.features.iter().map(|(f, count)| (place[f], count * weight)).collect();
+        let row: Vec<(usize, f64)> = sample.items.iter().map(|(f, count)| (place[f], count * weight)).collect();
         for &(i, a) in &row {
             row.iter().for_each(|&(j, b)| normal[i][j] += a * b);
             right[i] += a * target * weight;
         }
     }
-    // Scale the features alike, so that one threshold for small values holds for all.
+    // Scale the items alike, so that one threshold for small values holds for all.
     let scale: Vec<f64> = (0..n).map(|i| normal[i][i].sqrt()).collect();
     for i in 0..n {
         right[i] /= scale[i];
@@ -54,16 +54,16 @@ pub(super) fn solve(samples: &[&Sample], of: impl Fn(Cost) -> u64) -> Rates {
             rates.iter_mut().enumerate().filter(|(i, _)| !used.contains(i)).for_each(|(_, rate)| *rate = 0.0);
         }
     }
-    (0..n).map(|i| (features[i], rates[i] / scale[i])).collect()
+    (0..n).map(|i| (items[i], rates[i] / scale[i])).collect()
 }
 
-/// Solves the normal equations for some of the features by elimination.
+/// Solves the normal equations for some of the items by elimination.
 fn least_squares(normal: &[Vec<f64>], right: &[f64], used: &[usize]) -> Vec<f64> {
     let mut rows: Vec<Vec<f64>> =
         used.iter().map(|&i| used.iter().map(|&j| normal[i][j]).chain([right[i]]).collect()).collect();
     for pivot in 0..rows.len() {
         let row = rows[pivot].clone();
-        // A feature that others determine gets 0.
+        // An item that others determine gets 0.
         let small = row[pivot] < 1e-9;
         for (i, other) in rows.iter_mut().enumerate() {
             match (i == pivot, small) {

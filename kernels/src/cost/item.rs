@@ -8,17 +8,17 @@ use crate::math::Function;
 
 /// An item that the cost model counts. Its debug text is Rust source, as in `rates.rs`.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Feature(u16);
+pub struct CostItem(u16);
 
 macro_rules! singles {
     ($($name:ident $text:literal)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, reason = "only counts the constants")]
         enum Order { $($name,)* END }
         /// Features that exist one time.
-        impl Feature {
+        impl CostItem {
             $(#[doc = $text] pub const $name: Self = Self(Order::$name as u16);)*
         }
-        /// Names and descriptions of these features.
+        /// Names and descriptions of these items.
         const SINGLES: [(&str, &str); Order::END as usize] = [$((stringify!($name), $text),)*];
     };
 }
@@ -71,7 +71,7 @@ macro_rules! kinds {
     };
 }
 kinds! {
-    /// Features of an operation of each code. A linear operation also has the other features; a function has a feature
+    /// Items of an operation of each code. A linear operation also has the other items; a function has an item
     /// of its own for its values.
     Operation {
         Once "once"
@@ -123,21 +123,21 @@ const GEMVS: usize = PREPARES + LAYOUTS * Prepare::ALL.len();
 /// Layouts, each with row scales and with group scales.
 const LAYOUTS: usize = Width::ALL.len() * Lanes::ALL.len() * Scales::ALL.len();
 
-impl Feature {
-    /// Number of features.
+impl CostItem {
+    /// Number of items.
     pub const COUNT: usize = GEMVS + LAYOUTS * Strips::ALL.len() * Gemv::ALL.len();
 
-    /// Iterates over all features.
+    /// Iterates over all items.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..Self::COUNT as u16).map(Self)
     }
 
-    /// Returns the feature of an operation of this code.
+    /// Returns the item of an operation of this code.
     pub const fn operation(code: u8) -> Self {
         Self::of_code(code, Operation::Once)
     }
 
-    /// Returns the feature of a value of an operation of this code.
+    /// Returns the item of a value of an operation of this code.
     pub const fn value(code: u8) -> Self {
         Self::of_code(code, Operation::Value)
     }
@@ -146,7 +146,7 @@ impl Feature {
         Self((OPERATIONS + (code as usize).saturating_sub(1) * Operation::ALL.len() + which as usize) as u16)
     }
 
-    /// Returns the feature of an element of a function.
+    /// Returns the item of an element of a function.
     pub const fn function(function: Function) -> Self {
         Self((FUNCTIONS + function as usize) as u16)
     }
@@ -172,12 +172,12 @@ impl Feature {
         Self::gemv(shape.width, shape.lanes, Scales::of(shape), strips, which)
     }
 
-    /// Returns the feature's index among the rates.
+    /// Returns the item's index among the rates.
     pub const fn index(self) -> usize {
         self.0 as usize
     }
 
-    /// Returns the kind of the feature.
+    /// Returns the kind of the item.
     fn kind(self) -> Option<Kind> {
         let i = self.index();
         let layout = |i: usize| {
@@ -212,7 +212,7 @@ impl Scales {
 /// Width, lanes, and scales with their text.
 type Layout = (Width, Lanes, &'static (Scales, &'static str));
 
-/// Kind of a [`Feature`], with texts.
+/// Kind of a [`CostItem`], with texts.
 enum Kind {
     Single(&'static (&'static str, &'static str)),
     Operation(&'static str, &'static (Operation, &'static str)),
@@ -221,25 +221,25 @@ enum Kind {
     Gemv(Layout, &'static (Strips, &'static str), &'static (Gemv, &'static str)),
 }
 
-impl fmt::Debug for Feature {
+impl fmt::Debug for CostItem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.kind() {
-            Some(Kind::Single((name, _))) => write!(f, "Feature::{name}"),
-            Some(Kind::Operation(name, (Operation::Once, _))) => write!(f, "Feature::operation(op::{name})"),
-            Some(Kind::Operation(name, (Operation::Value, _))) => write!(f, "Feature::value(op::{name})"),
-            Some(Kind::Function(function)) => write!(f, "Feature::function(Function::{function:?})"),
+            Some(Kind::Single((name, _))) => write!(f, "CostItem::{name}"),
+            Some(Kind::Operation(name, (Operation::Once, _))) => write!(f, "CostItem::operation(op::{name})"),
+            Some(Kind::Operation(name, (Operation::Value, _))) => write!(f, "CostItem::value(op::{name})"),
+            Some(Kind::Function(function)) => write!(f, "CostItem::function(Function::{function:?})"),
             Some(Kind::Prepare((width, lanes, (scales, _)), (which, _))) => {
-                write!(f, "Feature::prepare({width:?}, {lanes:?}, {scales:?}, Prepare::{which:?})")
+                write!(f, "CostItem::prepare({width:?}, {lanes:?}, {scales:?}, Prepare::{which:?})")
             }
             Some(Kind::Gemv((width, lanes, (scales, _)), (strips, _), (which, _))) => {
-                write!(f, "Feature::gemv({width:?}, {lanes:?}, {scales:?}, {strips:?}, Gemv::{which:?})")
+                write!(f, "CostItem::gemv({width:?}, {lanes:?}, {scales:?}, {strips:?}, Gemv::{which:?})")
             }
-            None => write!(f, "Feature({})", self.0),
+            None => write!(f, "CostItem({})", self.0),
         }
     }
 }
 
-impl fmt::Display for Feature {
+impl fmt::Display for CostItem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let layout = |f: &mut fmt::Formatter<'_>, (width, lanes, (_, scales)): Layout| {
             let lanes = if lanes == Lanes::Paired { "paired" } else { "single" };
@@ -267,21 +267,21 @@ mod tests {
     use std::collections::HashSet;
 
     use super::*;
-    use crate::pace::rates::RATES;
+    use crate::cost::rates::RATES;
 
     /// Without a rate, an operation's cost would be too low, and its polls too long.
     #[test]
-    fn every_feature_has_a_rate() {
-        let rated: HashSet<Feature> = RATES.iter().map(|(feature, _)| *feature).collect();
-        let missing: Vec<Feature> = Feature::all().filter(|feature| !rated.contains(feature)).collect();
+    fn every_item_has_a_rate() {
+        let rated: HashSet<CostItem> = RATES.iter().map(|(item, _)| *item).collect();
+        let missing: Vec<CostItem> = CostItem::all().filter(|item| !rated.contains(item)).collect();
         assert!(missing.is_empty(), "`cargo xtask fit` measures {missing:?}");
     }
 
     #[test]
     fn names_are_keys_of_the_rates() {
         let text = include_str!("rates.rs");
-        for feature in Feature::all() {
-            assert_eq!(text.matches(&format!("({feature:?}, [")).count(), 1, "{feature:?}, {feature}");
+        for item in CostItem::all() {
+            assert_eq!(text.matches(&format!("({item:?}, [")).count(), 1, "{item:?}, {item}");
         }
     }
 }

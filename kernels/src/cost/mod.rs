@@ -1,22 +1,30 @@
 //! The cost of a step on a Cortex-M4 with FPU (thumbv7em-none-eabihf, zero-wait memory), from the image alone.
 //!
-//! [`Feature`]s describe an operation by the loops of its code: calls of a GEMV, strips, passes through a kernel's
-//! loop, columns, prepared values, scaled rows, elements of a function. A feature's **rate** is the cost of one of it.
+//! [`CostItem`]s describe an operation by the loops of its code: calls of a GEMV, strips, passes through a kernel's
+//! loop, columns, prepared values, scaled rows, elements of a function. An item's **rate** is the cost of one of it.
 //! Rates come from measurements: `cargo xtask fit` counts the instructions of many operations in QEMU, solves for the
 //! rates, and writes `rates.rs`.
 //!
 //! Most code takes the same instructions for all values. Some code branches on values (elu and the action's limits):
 //! its expected cost is that of standard normal values. A third rate is the most that one element takes; slices
 //! ([`crate::Head::poll`]) use it.
+//!
+//! Only this module knows costs: code that runs an image asks a `Meter` (`meter.rs`), and a program without slices
+//! does not include them.
 
-pub use super::feature::Feature;
-use super::feature::{Gemv, Prepare, Strips};
-use super::rates::RATES;
+pub(crate) mod budget;
+mod item;
+#[allow(clippy::approx_constant, reason = "measured values, some of which happen to be near a constant")]
+mod rates;
+
+pub use self::item::CostItem;
+use self::item::{Gemv, Prepare, Strips};
+use self::rates::RATES;
+use crate::activations::{Extent, Plan};
 use crate::image::op;
 use crate::image::{Image, Matrix, Op, OpKind};
 use crate::layout::{BlockShape, QUAD, STRIP};
 use crate::meter::{OutputStart, RUN};
-use crate::x::{Extent, Plan};
 
 /// Modelled instructions and cycles of a Cortex-M4.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,55 +61,55 @@ impl core::iter::Sum for Cost {
 /// 1024ths of an instruction or a cycle.
 const ONE: f64 = 1024.0;
 
-/// Returns a column of the measured rates, in 1024ths. A feature that has been added since the last fit costs nothing.
-const fn column(which: usize) -> [u32; Feature::COUNT] {
-    let (mut column, mut rated) = ([0; Feature::COUNT], [false; Feature::COUNT]);
+/// Returns a column of the measured rates, in 1024ths. An item that has been added since the last fit costs nothing.
+const fn column(which: usize) -> [u32; CostItem::COUNT] {
+    let (mut column, mut rated) = ([0; CostItem::COUNT], [false; CostItem::COUNT]);
     let mut i = 0;
     while i < RATES.len() {
-        let (feature, rates) = RATES[i];
-        assert!(!rated[feature.index()], "rates.rs has a feature twice");
-        rated[feature.index()] = true;
+        let (item, rates) = RATES[i];
+        assert!(!rated[item.index()], "rates.rs has an item twice");
+        rated[item.index()] = true;
         let rate = rates[which] * ONE;
-        column[feature.index()] = if rate < 0.0 { 0 } else { (rate + 0.5) as u32 };
+        column[item.index()] = if rate < 0.0 { 0 } else { (rate + 0.5) as u32 };
         i += 1;
     }
     column
 }
 
-/// Expected instructions of each feature, in 1024ths.
-static INSTRUCTIONS: [u32; Feature::COUNT] = column(0);
-static CYCLES: [u32; Feature::COUNT] = column(1);
-static MOST: [u32; Feature::COUNT] = column(2);
+/// Expected instructions of each item, in 1024ths.
+static INSTRUCTIONS: [u32; CostItem::COUNT] = column(0);
+static CYCLES: [u32; CostItem::COUNT] = column(1);
+static MOST: [u32; CostItem::COUNT] = column(2);
 
-impl Feature {
-    /// Returns the most instructions that one of this feature takes, in 1024ths.
+impl CostItem {
+    /// Returns the most instructions that one of this item takes, in 1024ths.
     pub(super) fn most(self) -> u32 {
         MOST.get(self.index()).copied().unwrap_or(0)
     }
 }
 
-/// Computes the cost of the features that `list` counts.
-fn total(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> Cost {
+/// Computes the cost of the items that `list` counts.
+fn total(list: impl FnOnce(&mut dyn FnMut(CostItem, usize))) -> Cost {
     let mut sums = [0u64; 2];
-    list(&mut |feature, count| {
+    list(&mut |item, count| {
         for (sum, rates) in sums.iter_mut().zip([&INSTRUCTIONS, &CYCLES]) {
-            *sum += count as u64 * u64::from(rates.get(feature.index()).copied().unwrap_or(0));
+            *sum += count as u64 * u64::from(rates.get(item.index()).copied().unwrap_or(0));
         }
     });
     let [instructions, cycles] = sums.map(|sum| (sum + ONE as u64 / 2) / ONE as u64);
     Cost { instructions, cycles }
 }
 
-/// Computes the most that the features of `list` take, in 1024ths of an instruction.
-pub(super) fn most(list: impl FnOnce(&mut dyn FnMut(Feature, usize))) -> u32 {
+/// Computes the most that the items of `list` take, in 1024ths of an instruction.
+pub(super) fn most(list: impl FnOnce(&mut dyn FnMut(CostItem, usize))) -> u32 {
     let mut sum = 0u32;
-    list(&mut |feature, count| sum = sum.saturating_add((count as u32).saturating_mul(feature.most())));
+    list(&mut |item, count| sum = sum.saturating_add((count as u32).saturating_mul(item.most())));
     sum
 }
 
 /// Computes the cost of an operation in a step.
 pub fn of_op(op: &Op<'_>) -> Cost {
-    total(|add| features(op, add))
+    total(|add| items(op, add))
 }
 
 /// Computes the cost of a linear operation with biases, from `cols` values to `rows`, whose blocks have these shapes,
@@ -151,39 +159,39 @@ pub fn of_frame(image: &Image<'_>) -> Cost {
     total(|add| frame(image, add))
 }
 
-/// Counts the features of a step without the network's operations.
-pub fn frame(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the items of a step without the network's operations.
+pub fn frame(image: &Image<'_>, add: &mut dyn FnMut(CostItem, usize)) {
     begin(image, add);
     action(image, add);
 }
 
-/// Counts the features of taking the observation.
-pub fn begin(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
-    add(Feature::STEP, 1);
-    add(Feature::OBSERVATION, image.obs_len());
+/// Counts the items of taking the observation.
+pub fn begin(image: &Image<'_>, add: &mut dyn FnMut(CostItem, usize)) {
+    add(CostItem::STEP, 1);
+    add(CostItem::OBSERVATION, image.obs_len());
     if image.overlap() > 0 {
-        add(Feature::KEPT, 1);
-        add(Feature::KEPT_VALUE, image.kept().len);
+        add(CostItem::KEPT, 1);
+        add(CostItem::KEPT_VALUE, image.kept().len);
     }
 }
 
-/// Counts the features from the network's output to the action.
-pub fn action(image: &Image<'_>, add: &mut dyn FnMut(Feature, usize)) {
-    add(Feature::ACTION, 1);
-    add(Feature::ACTION_VALUE, image.act_len());
-    add(Feature::CONTRACT, image.contract_arrays().iter().map(|array| array.len()).sum::<usize>());
+/// Counts the items from the network's output to the action.
+pub fn action(image: &Image<'_>, add: &mut dyn FnMut(CostItem, usize)) {
+    add(CostItem::ACTION, 1);
+    add(CostItem::ACTION_VALUE, image.act_len());
+    add(CostItem::CONTRACT, image.contract_arrays().iter().map(|array| array.len()).sum::<usize>());
     // Predictions of a new chunk for the periods that an ensemble keeps.
     let predicted = image.horizon().min(image.chunk());
     if predicted > 0 {
-        add(Feature::ENSEMBLE, 1);
-        add(Feature::PREDICTED, predicted);
-        add(Feature::PREDICTED_VALUE, (predicted + 1) * image.act_len());
+        add(CostItem::ENSEMBLE, 1);
+        add(CostItem::PREDICTED, predicted);
+        add(CostItem::PREDICTED_VALUE, (predicted + 1) * image.act_len());
     }
-    add(Feature::BLENDED, image.overlap() * image.act_len());
+    add(CostItem::BLENDED, image.overlap() * image.act_len());
 }
 
-/// Counts the features of an operation.
-pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the items of an operation.
+pub fn items(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
     if let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) {
         linear(&matrix, accumulate, add);
     } else {
@@ -193,42 +201,42 @@ pub fn features(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     }
 }
 
-/// Counts the features of `len` values of an operation. (It takes all denoising steps to be like the first.)
-fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the items of `len` values of an operation. (It takes all denoising steps to be like the first.)
+fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(CostItem, usize)) {
     add(values(op).1, len);
     rest(op.kind, len % EIGHT, add);
     if op.kind == OpKind::History {
-        add(Feature::FRAME, op.dst().len.checked_div(op.src().len).unwrap_or(0));
+        add(CostItem::FRAME, op.dst().len.checked_div(op.src().len).unwrap_or(0));
     }
     squared(op, add);
     if op.kind == OpKind::Denoise {
         let ([sample_x, sample_v, _, _, _, sigma, _], _) = op.coefficients(0);
-        add(Feature::LIMITED, if [sample_x, sample_v] == [0.0; 2] { 0 } else { len });
-        add(Feature::NOISY, if sigma == 0.0 { 0 } else { len });
+        add(CostItem::LIMITED, if [sample_x, sample_v] == [0.0; 2] { 0 } else { len });
+        add(CostItem::NOISY, if sigma == 0.0 { 0 } else { len });
     }
 }
 
 /// Values of a pass, in loops with a slower loop for the rest.
 const EIGHT: usize = 8;
 
-/// Counts the additional features of the last `len` values, fewer than [`EIGHT`].
-fn rest(kind: OpKind, len: usize, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the additional items of the last `len` values, fewer than [`EIGHT`].
+fn rest(kind: OpKind, len: usize, add: &mut dyn FnMut(CostItem, usize)) {
     match kind {
-        OpKind::Denoise => add(Feature::DENOISED_REST, len),
-        OpKind::Normalize { .. } => add(Feature::NORMALIZED_REST, len),
+        OpKind::Denoise => add(CostItem::DENOISED_REST, len),
+        OpKind::Normalize { .. } => add(CostItem::NORMALIZED_REST, len),
         _ => {}
     }
 }
 
 /// Counts the values whose norm an operation computes, in each of its pieces.
-fn squared(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
-    if op.kind == OpKind::Stand || op.kind == OpKind::Select && op.half(1) == 1 {
-        add(Feature::SQUARED, op.src().len);
+fn squared(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
+    if op.kind == OpKind::Standstill || op.kind == OpKind::Select && op.half(1) == 1 {
+        add(CostItem::SQUARED, op.src().len);
     }
 }
 
-/// Counts the features of a piece of an operation's values, without those of each value.
-pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the items of a piece of an operation's values, without those of each value.
+pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
     // Each piece of a norm computes the results of the sums again.
     if op.units() != op.dst().len {
         add(values(op).0, 1);
@@ -237,39 +245,39 @@ pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
     squared(op, add);
 }
 
-/// Counts the features of one value of an operation, in the denoising step with the highest cost.
-pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the items of one value of an operation, in the denoising step with the highest cost.
+pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
     add(values(op).1, 1);
     if op.kind == OpKind::History {
         // A frame may be one value long.
-        add(Feature::FRAME, 1);
+        add(CostItem::FRAME, 1);
     }
     if op.kind == OpKind::Denoise {
-        add(Feature::LIMITED, 1);
-        add(Feature::NOISY, 1);
+        add(CostItem::LIMITED, 1);
+        add(CostItem::NOISY, 1);
     }
 }
 
-/// Returns the feature of an operation, the feature of its values, and their number: 0 for a linear operation, whose
+/// Returns the item of an operation, the item of its values, and their number: 0 for a linear operation, whose
 /// parts are counted one by one.
-pub fn values(op: &Op<'_>) -> (Feature, Feature, usize) {
+pub fn values(op: &Op<'_>) -> (CostItem, CostItem, usize) {
     let values = match op.kind {
         OpKind::Linear { .. } => 0,
         OpKind::History => op.units(),
         _ => op.dst().len,
     };
-    (Feature::operation(op.code()), value(op.kind, op.code()), values)
+    (CostItem::operation(op.code()), value(op.kind, op.code()), values)
 }
 
-/// Returns the feature of a value of an operation of this code.
-fn value(kind: OpKind, code: u8) -> Feature {
+/// Returns the item of a value of an operation of this code.
+fn value(kind: OpKind, code: u8) -> CostItem {
     match kind {
-        OpKind::Function(function) => Feature::function(function),
-        _ => Feature::value(code),
+        OpKind::Function(function) => CostItem::function(function),
+        _ => CostItem::value(code),
     }
 }
 
-fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, usize)) {
+fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(CostItem, usize)) {
     let in_place = matrix.start_values(accumulate).is_some();
     let apart = (!in_place).then(|| OutputStart::of(accumulate, !matrix.bias.is_empty()));
     begin_linear([matrix.rows, matrix.cols], apart, add);
@@ -284,40 +292,40 @@ fn linear(matrix: &Matrix<'_>, accumulate: bool, add: &mut dyn FnMut(Feature, us
     }
 }
 
-/// Counts the features of a linear operation before its blocks; `apart` says how outputs are initialized that the
+/// Counts the items of a linear operation before its blocks; `apart` says how outputs are initialized that the
 /// blocks do not initialize themselves.
-fn begin_linear([rows, cols]: [usize; 2], apart: Option<OutputStart>, add: &mut dyn FnMut(Feature, usize)) {
-    add(Feature::operation(op::LINEAR), 1);
+fn begin_linear([rows, cols]: [usize; 2], apart: Option<OutputStart>, add: &mut dyn FnMut(CostItem, usize)) {
+    add(CostItem::operation(op::LINEAR), 1);
     magnitude(cols, add);
     if let Some(apart) = apart {
-        add(Feature::BIASED, 1);
+        add(CostItem::BIASED, 1);
         start(apart, rows, add);
     }
 }
 
-/// Counts the features of entering an operation, at its start or inside it.
-pub(super) fn enter(op: &Op<'_>, add: &mut dyn FnMut(Feature, usize)) {
-    add(Feature::ENTERED, 1);
+/// Counts the items of entering an operation, at its start or inside it.
+pub(super) fn enter(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
+    add(CostItem::ENTERED, 1);
     add(values(op).0, 1);
     if let Some(matrix) = op.matrix() {
-        add(Feature::RESUMED, matrix.block_count());
+        add(CostItem::RESUMED, matrix.block_count());
     }
 }
 
-/// Counts the features of initializing outputs before rows are added to them.
-pub(super) fn start(start: OutputStart, outputs: usize, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the items of initializing outputs before rows are added to them.
+pub(super) fn start(start: OutputStart, outputs: usize, add: &mut dyn FnMut(CostItem, usize)) {
     match start {
-        OutputStart::Zero => add(Feature::ZEROED, outputs),
-        OutputStart::Bias => add(Feature::BIAS, outputs),
-        OutputStart::Added => add(Feature::ADDED, outputs),
+        OutputStart::Zero => add(CostItem::ZEROED, outputs),
+        OutputStart::Bias => add(CostItem::BIAS, outputs),
+        OutputStart::Added => add(CostItem::ADDED, outputs),
         OutputStart::Kept => {}
     }
 }
 
-/// Counts the features of finding the scale of an input.
-pub(super) fn magnitude(cols: usize, add: &mut dyn FnMut(Feature, usize)) {
-    add(Feature::MAGNITUDE_EIGHT, cols / 8);
-    add(Feature::MAGNITUDE_REST, cols % 8);
+/// Counts the items of finding the scale of an input.
+pub(super) fn magnitude(cols: usize, add: &mut dyn FnMut(CostItem, usize)) {
+    add(CostItem::MAGNITUDE_EIGHT, cols / 8);
+    add(CostItem::MAGNITUDE_REST, cols % 8);
 }
 
 /// Returns the extent of a prepared vector. Blocks in an image have valid shapes.
@@ -325,8 +333,8 @@ fn extent(shape: BlockShape) -> Extent {
     Plan::new(shape).map(|plan| plan.extent()).unwrap_or_default()
 }
 
-/// Counts the features of preparing an input for blocks of this shape.
-pub(super) fn prepare(shape: BlockShape, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the items of preparing an input for blocks of this shape.
+pub(super) fn prepare(shape: BlockShape, add: &mut dyn FnMut(CostItem, usize)) {
     let Extent { columns, groups, chunks, .. } = extent(shape);
     let filled = columns != shape.cols;
     for (which, count) in [
@@ -337,40 +345,40 @@ pub(super) fn prepare(shape: BlockShape, add: &mut dyn FnMut(Feature, usize)) {
         (Prepare::Filled, usize::from(filled)),
         (Prepare::FilledValue, if filled { columns } else { 0 }),
     ] {
-        add(Feature::prepare_of(shape, which), count);
+        add(CostItem::prepare_of(shape, which), count);
     }
 }
 
-/// Counts the features of a block's products and their scaling. With `start`, the output starts from the biases.
-fn block(shape: BlockShape, in_order: bool, start: bool, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the items of a block's products and their scaling. With `start`, the output starts from the biases.
+fn block(shape: BlockShape, in_order: bool, start: bool, add: &mut dyn FnMut(CostItem, usize)) {
     let whole = match (in_order && start, shape.rows.is_multiple_of(QUAD)) {
         (false, _) => 0,
         (true, true) => shape.rows,
         (true, false) => shape.rows & !(STRIP - 1),
     };
     if whole > 0 {
-        add(Feature::IN_PLACE, 1);
-        add(Feature::SCALED_EIGHT, whole / STRIP);
-        add(Feature::SCALED_REST, whole % STRIP);
+        add(CostItem::IN_PLACE, 1);
+        add(CostItem::SCALED_EIGHT, whole / STRIP);
+        add(CostItem::SCALED_REST, whole % STRIP);
         products(shape, whole, 1, add);
     }
     let left = shape.rows - whole;
     if left > 0 {
         let runs = left.div_ceil(RUN);
-        add(Feature::STACK, 1);
-        add(Feature::RUN, runs);
+        add(CostItem::STACK, 1);
+        add(CostItem::RUN, runs);
         products(shape, left, runs, add);
         if in_order {
-            add(Feature::SCALED_EIGHT, left / STRIP);
-            add(Feature::SCALED_REST, left % STRIP);
+            add(CostItem::SCALED_EIGHT, left / STRIP);
+            add(CostItem::SCALED_REST, left % STRIP);
         } else {
-            add(Feature::SCALED_STEPPED, left);
+            add(CostItem::SCALED_STEPPED, left);
         }
     }
 }
 
-/// Counts the features of GEMVs of `rows` rows in `calls` calls.
-pub(super) fn products(shape: BlockShape, rows: usize, calls: usize, add: &mut dyn FnMut(Feature, usize)) {
+/// Counts the items of GEMVs of `rows` rows in `calls` calls.
+pub(super) fn products(shape: BlockShape, rows: usize, calls: usize, add: &mut dyn FnMut(CostItem, usize)) {
     let quads = rows.div_ceil(QUAD);
     let eights = if shape.strip_rows() == STRIP { quads / 2 } else { 0 };
     let extent = extent(shape);
@@ -387,7 +395,7 @@ pub(super) fn products(shape: BlockShape, rows: usize, calls: usize, add: &mut d
                 (Gemv::Chunk, strips * chunks),
                 (Gemv::Column, strips * columns),
             ] {
-                add(Feature::gemv_of(shape, height, which), count);
+                add(CostItem::gemv_of(shape, height, which), count);
             }
         }
     }
@@ -396,14 +404,14 @@ pub(super) fn products(shape: BlockShape, rows: usize, calls: usize, add: &mut d
 /// Computes the most that a piece of a block's rows takes, first at any length, then for each [`STRIP`] of rows, in
 /// 1024ths of an instruction.
 pub(super) fn strips(shape: BlockShape, in_order: bool, start: bool) -> (u32, u32) {
-    let row = if in_order { Feature::SCALED_REST } else { Feature::SCALED_STEPPED };
+    let row = if in_order { CostItem::SCALED_REST } else { CostItem::SCALED_STEPPED };
     let first = most(|add| {
         // The last piece may need a separate run for the rest of the rows.
-        add(Feature::IN_PLACE, 1);
-        add(Feature::STACK, 1);
-        add(Feature::RUN, 1);
+        add(CostItem::IN_PLACE, 1);
+        add(CostItem::STACK, 1);
+        add(CostItem::RUN, 1);
         for height in [Strips::Eight, Strips::Four] {
-            add(Feature::gemv_of(shape, height, Gemv::Call), 1);
+            add(CostItem::gemv_of(shape, height, Gemv::Call), 1);
         }
         if in_order {
             add(row, STRIP - 1);
@@ -412,14 +420,14 @@ pub(super) fn strips(shape: BlockShape, in_order: bool, start: bool) -> (u32, u3
     let each = most(|add| {
         products(shape, STRIP, 0, add);
         match (in_order, start) {
-            (true, true) => add(Feature::SCALED_EIGHT, 1),
+            (true, true) => add(CostItem::SCALED_EIGHT, 1),
             (true, false) => {
-                add(Feature::SCALED_EIGHT, 1);
-                add(Feature::RUN, 1);
+                add(CostItem::SCALED_EIGHT, 1);
+                add(CostItem::RUN, 1);
             }
             (false, _) => {
                 add(row, STRIP);
-                add(Feature::RUN, 1);
+                add(CostItem::RUN, 1);
             }
         }
     });

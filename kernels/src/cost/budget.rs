@@ -4,7 +4,8 @@
 //! of a function, of a recurrent cell, of a copy. Preparing a matrix's input is two pieces, its scale and its integers:
 //! neither takes longer than a strip of the rows that it is prepared for.
 
-use super::cost::{self, Feature};
+use super::CostItem;
+use crate::cost;
 use crate::image::{Image, Op, OpKind, RowBlock};
 use crate::meter::{Meter, OutputStart, Work};
 
@@ -32,7 +33,7 @@ struct PieceCost {
 impl PieceCost {
     /// Converts costs in 1024ths of an instruction.
     fn new(first: u32, each: u32) -> Self {
-        let first = first.saturating_add(Feature::PIECE.most());
+        let first = first.saturating_add(CostItem::PIECE.most());
         Self { first: parts(first), each: parts(each) }
     }
 
@@ -47,7 +48,7 @@ impl PieceCost {
                 cost::most(|add| cost::most_expensive_element(op, add)),
             ),
             Work::Magnitude(cols) => Self::new(cost::most(|add| cost::magnitude(cols, add)), 0),
-            Work::Start(start) => Self::new(Feature::BIASED.most(), cost::most(|add| cost::start(start, 1, add))),
+            Work::Start(start) => Self::new(CostItem::BIASED.most(), cost::most(|add| cost::start(start, 1, add))),
             Work::Prepare(shape) => Self::new(cost::most(|add| cost::prepare(shape, add)), 0),
             Work::Strips { shape, in_order, start } => {
                 let (first, each) = cost::strips(shape, in_order, start);
@@ -96,7 +97,7 @@ impl Meter for Budget {
 
 /// Returns the cost of a poll without its pieces.
 fn poll() -> u32 {
-    parts(Feature::POLL.most())
+    parts(CostItem::POLL.most())
 }
 
 /// Returns the cost of the shortest piece of a kind of work.

@@ -4,13 +4,13 @@ use embedded_hal::pwm::SetDutyCycle;
 
 /// Received bytes were lost, or had a wrong frame or parity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lost;
+pub struct UartError;
 
 /// Non-blocking access to single bytes of a serial port, for the handler of its interrupt, which comes with every
 /// received byte.
 pub trait Uart {
     /// Returns the received byte, if any.
-    fn receive(&mut self) -> Option<Result<u8, Lost>>;
+    fn receive(&mut self) -> Option<Result<u8, UartError>>;
 
     /// Transmits a byte; returns `false` without any change if the transmitter is full.
     fn transmit(&mut self, byte: u8) -> bool;
