@@ -48,7 +48,7 @@ impl<S: Stage> Bridges<S> {
             let most = phase.max_duty_cycle();
             accepted &= phase.set_duty_cycle(((duty * f32::from(most)) as u16).min(most)).is_ok();
         }
-        // It is switched on one time: after a break it stays off until the controller is disarmed.
+        // It is switched on once: after a break it stays off until the controller is disarmed.
         let on = if self.on { self.stage.is_on() } else { self.stage.enable() };
         self.on = true;
         accepted && on

@@ -26,7 +26,7 @@ def step(image: actq.Image, robots: int, steps: int, most_growth: int) -> float:
     random = np.random.default_rng(0)
     observations = random.normal(size=(robots, image.obs_len)).astype(np.float32)
     rounds = -(-steps // robots)
-    # What is allocated one time is there after a tenth.
+    # What is allocated once is there after a tenth.
     warm, begun = max(1, rounds // 10), time.perf_counter()
     before = 0
     for i in range(rounds):

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use actq::budget::{Budget, TimeLimit};
 use actq::data::{Recording, Recordings, Sizes, joined};
 use actq::measure::{check, eval, recorded};
-use actq::methods::{Activations, Effort, MOST_MINUTES, Method, Options};
+use actq::methods::{Activations, Effort, MAX_MINUTES, Method, Options};
 use actq::pipeline::{Quantizer, check_budget, minutes_of_image};
 use actq::runtime::ImageBuffer;
 use actq_cli::importers::{learned, learned_from, recorded_sizes};
@@ -81,8 +81,8 @@ impl Request {
     pub(crate) fn options(&self, method: Method) -> PyResult<Options> {
         let forced = self.widths.iter().map(|(name, bits)| Ok((name.clone(), width(name, *bits)?)));
         let minutes = self.minutes.map(|minutes| positive("minutes", minutes)).transpose()?;
-        if minutes.is_some_and(|minutes| minutes > MOST_MINUTES) {
-            return Err(error!("minutes is {}; use at most {MOST_MINUTES}, a week", minutes.unwrap_or_default()));
+        if minutes.is_some_and(|minutes| minutes > MAX_MINUTES) {
+            return Err(error!("minutes is {}; use at most {MAX_MINUTES}, a week", minutes.unwrap_or_default()));
         }
         let options = Options {
             group: self.group.unwrap_or(method.default_group()),

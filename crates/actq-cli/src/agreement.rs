@@ -49,7 +49,7 @@ pub(crate) fn verdict(difference: f64, in_float64: impl FnOnce() -> Result<InFlo
             error_text(policy),
             error_text(onnxruntime)
         )),
-        (false, true) => bail!("{errors}; this is an error of this program, please report it"),
+        (false, true) => bail!("{errors}; internal error; please report it"),
         (false, false) => bail!(
             "{errors}: no two of the three runs agree, so the check cannot show which is right; pass recorded observations \
              with --calib if the drawn ones are outside the policy's range"
@@ -103,7 +103,7 @@ mod tests {
             ours.contains("actions are off by 3.0e-2 of the largest action, onnxruntime's are off by 1.0e-7"),
             "{ours}"
         );
-        assert!(ours.ends_with("this is an error of this program, please report it"), "{ours}");
+        assert!(ours.ends_with("internal error; please report it"), "{ours}");
     }
 
     #[test]
@@ -114,7 +114,7 @@ mod tests {
                 said.contains("no two of the three runs agree") || said.ends_with("right: No module named 'onnx'"),
                 "{said}"
             );
-            assert!(!said.contains("error of this program"), "{said}");
+            assert!(!said.contains("internal error"), "{said}");
         }
     }
 

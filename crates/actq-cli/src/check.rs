@@ -56,7 +56,7 @@ fn compare(model: &Path, imported: &Imported, policy: &Policy, observations: &[V
         if let Ok(values) = &run {
             ensure!(
                 values.len() == ours.len(),
-                "the file gives {} values, the policy {}; this is an error of this program, please report it",
+                "the file gives {} values, the policy {}; internal error; please report it",
                 values.len(),
                 ours.len()
             );

@@ -7,39 +7,39 @@ use std::thread;
 use std::time::Duration;
 
 /// `true` while the work ends by itself after a signal.
-static ENDS_ITSELF: AtomicBool = AtomicBool::new(false);
+static GRACEFUL: AtomicBool = AtomicBool::new(false);
 /// The signal that the work was told of; 0 for none.
-static TOLD: AtomicI32 = AtomicI32::new(0);
+static STOP_SIGNAL: AtomicI32 = AtomicI32::new(0);
 
 /// Time between two looks at the signal, for work that waits for input.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// While this lives, the first signal ends the work, which asks [`told`], and a second one the process.
+/// While this lives, the first signal ends the work, which asks [`stop_signal`], and a second one the process.
 #[derive(Debug)]
 pub(crate) struct EndsItself(());
 
 impl EndsItself {
     pub(crate) fn begin() -> Self {
-        ENDS_ITSELF.store(true, Ordering::SeqCst);
+        GRACEFUL.store(true, Ordering::SeqCst);
         Self(())
     }
 }
 
 impl Drop for EndsItself {
     fn drop(&mut self) {
-        ENDS_ITSELF.store(false, Ordering::SeqCst);
+        GRACEFUL.store(false, Ordering::SeqCst);
     }
 }
 
 /// Tells the work of a signal. Returns `false` if it does not end by itself, or has been told before.
 #[cfg(unix)]
-pub(crate) fn tell(signal: i32) -> bool {
-    ENDS_ITSELF.load(Ordering::SeqCst) && TOLD.swap(signal, Ordering::SeqCst) == 0
+pub(crate) fn request_stop(signal: i32) -> bool {
+    GRACEFUL.load(Ordering::SeqCst) && STOP_SIGNAL.swap(signal, Ordering::SeqCst) == 0
 }
 
 /// Returns the signal that the work was told of, if any.
-pub(crate) fn told() -> Option<i32> {
-    Some(TOLD.load(Ordering::SeqCst)).filter(|signal| *signal != 0)
+pub(crate) fn stop_signal() -> Option<i32> {
+    Some(STOP_SIGNAL.load(Ordering::SeqCst)).filter(|signal| *signal != 0)
 }
 
 /// Standard input that ends at a signal, also while nothing arrives. While it lives, the work [`EndsItself`].
@@ -75,7 +75,7 @@ impl Input {
 impl Read for Input {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         while self.block.position() == self.block.get_ref().len() as u64 {
-            if told().is_some() {
+            if stop_signal().is_some() {
                 return Ok(0);
             }
             match self.blocks.recv_timeout(LOOK) {

@@ -18,7 +18,7 @@ pub(crate) fn watch() -> Result<()> {
     let mut signals = Signals::new(caught).context("cannot catch signals")?;
     thread::spawn(move || {
         while let Some(signal) = signals.forever().next() {
-            if !ending::tell(signal) {
+            if !ending::request_stop(signal) {
                 end(signal, || signals.pending().next().is_some());
             }
         }

@@ -47,7 +47,7 @@ pub fn run_work(work: impl FnOnce() -> Result<()>) -> ExitCode {
     let outcome = work();
     // If a signal ends the process, the signal decides the exit status.
     let _held = unfinished::hold();
-    if let (Ok(()), Some(signal)) = (&outcome, ending::told()) {
+    if let (Ok(()), Some(signal)) = (&outcome, ending::stop_signal()) {
         eprintln!("actq: interrupted");
         return ExitCode::from(128 + signal as u8);
     }

@@ -2,7 +2,7 @@
 //!
 //! A slot is whole sectors: a record of 128 bytes, 128 bytes of marks, and the image. The record is written last, after
 //! the image was read back, so a slot with a valid record was complete. Marks are words that are programmed one after
-//! another, each one time: a trial begins, the image is confirmed, the image is rejected. The confirmed slot with the
+//! another, each once: a trial begins, the image is confirmed, the image is rejected. The confirmed slot with the
 //! highest generation runs; an update erases the other one. So the running slot is never touched, no word is programmed
 //! twice, and the loss of any single word leaves one of the slots valid.
 //!

@@ -9,9 +9,9 @@ use flate2::read::GzDecoder;
 use tempfile::TempDir;
 
 /// Most bytes of all files of an archive, unpacked.
-const MOST_BYTES: u64 = 256 << 20;
+const MAX_BYTES: u64 = 256 << 20;
 /// Most files of an archive.
-const MOST_FILES: usize = 100;
+const MAX_FILES: usize = 100;
 /// First bytes of a gzipped file.
 const MAGIC: [u8; 2] = [0x1f, 0x8b];
 
@@ -35,7 +35,7 @@ impl Archive {
         if first != MAGIC {
             return Ok(None);
         }
-        let unpacked = GzDecoder::new(File::open(path)?).take(MOST_BYTES);
+        let unpacked = GzDecoder::new(File::open(path)?).take(MAX_BYTES);
         let (mut archive, folder) = (tar::Archive::new(unpacked), TempDir::new()?);
         let (mut names, mut bytes) = (Vec::new(), 0u64);
         let damaged = "it is gzipped, and no tar archive, or damaged";
@@ -45,11 +45,11 @@ impl Archive {
             let is_plain = !name.is_empty() && !name.starts_with('.') && !name.contains(['/', '\\', ':']);
             ensure!(is_plain && entry.header().entry_type().is_file(), "its entry {name:?} is not a file by itself");
             ensure!(
-                !names.contains(&name) && names.len() < MOST_FILES,
-                "{name:?} occurs twice, or it has over {MOST_FILES} files"
+                !names.contains(&name) && names.len() < MAX_FILES,
+                "{name:?} occurs twice, or it has over {MAX_FILES} files"
             );
             bytes = entry.size().saturating_add(bytes);
-            ensure!(bytes <= MOST_BYTES, "it has over {MOST_BYTES} bytes, unpacked");
+            ensure!(bytes <= MAX_BYTES, "it has over {MAX_BYTES} bytes, unpacked");
             let mut content = Vec::new();
             entry.read_to_end(&mut content).context(damaged)?;
             File::create(folder.path().join(&name))?.write_all(&content)?;

@@ -18,9 +18,9 @@ use crate::sources::{Array, Compute, Sources};
 /// Ending of files that may be archives.
 const ARCHIVE: &str = ".kinfer";
 /// The most bytes of a text file.
-const MOST_TEXT: u64 = 4 << 20;
+const MAX_TEXT: u64 = 4 << 20;
 /// The most files and folders of a bundle.
-const MOST_FILES: usize = 10_000;
+const MAX_FILES: usize = 10_000;
 
 /// A folder with a policy's files, or one file.
 #[derive(Clone, Debug)]
@@ -58,11 +58,7 @@ impl Bundle {
             for entry in fs::read_dir(path.join(&folder)).with_context(shown)? {
                 let entry = entry.with_context(shown)?;
                 seen += 1;
-                ensure!(
-                    seen <= MOST_FILES,
-                    "{}: it has more than {MOST_FILES} files; name the policy's folder",
-                    shown()
-                );
+                ensure!(seen <= MAX_FILES, "{}: it has more than {MAX_FILES} files; name the policy's folder", shown());
                 let Some(name) = entry.file_name().to_str().map(str::to_owned) else { continue };
                 let name = if folder.is_empty() { name } else { format!("{folder}/{name}") };
                 let kind = entry.file_type().with_context(shown)?;
@@ -201,7 +197,7 @@ impl Bundle {
         let path = self.path(file)?;
         let read = || -> Result<String> {
             let bytes = fs::metadata(&path)?.len();
-            ensure!(bytes <= MOST_TEXT, "it has {bytes} bytes; at most {MOST_TEXT} are allowed");
+            ensure!(bytes <= MAX_TEXT, "it has {bytes} bytes; at most {MAX_TEXT} are allowed");
             Ok(fs::read_to_string(&path)?)
         };
         read().with_context(|| file.to_owned())

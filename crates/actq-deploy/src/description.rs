@@ -36,7 +36,7 @@ pub struct Description {
     pub schema: u32,
     /// Name of the policy.
     pub name: String,
-    /// Ticks a second.
+    /// Ticks per second.
     pub rate_hz: f64,
     /// Value that is the action as the network gives it, for reports and comparisons.
     pub action: String,
@@ -77,7 +77,7 @@ pub struct Description {
 }
 
 impl Description {
-    /// Returns the files that it names: networks, then motions; each one time.
+    /// Returns the files that it names: networks, then motions; each once.
     pub fn files(&self) -> Vec<&str> {
         let networks = self.networks.iter().map(|network| network.file.as_str());
         let mut files = Vec::new();

@@ -13,7 +13,7 @@ use crate::families::Schema;
 use crate::yaml::Node;
 
 /// Most places of a key that a question lists.
-const MOST_PLACES: usize = 3;
+const MAX_PLACES: usize = 3;
 
 /// Fixed rules of a family, as data: its file is a `profile.toml`.
 #[derive(Clone, Debug, Deserialize)]
@@ -265,7 +265,7 @@ impl Facts {
     /// As [`Self::value_or_default`], or if there is none of this name.
     pub(crate) fn choose_one_of(&mut self, key: &str, choices: &[&str]) -> Result<String> {
         let name = self.value(key)?.or_else(|| choices.first().map(|&name| name.to_owned())).unwrap_or_default();
-        ensure!(choices.contains(&name.as_str()), "{key} = {name:?}: there are {}", choices.join(", "));
+        ensure!(choices.contains(&name.as_str()), "{key} = {name:?}: expected one of {}", choices.join(", "));
         Ok(name)
     }
 
@@ -307,7 +307,7 @@ impl Facts {
     /// # Errors
     ///
     /// If the answer is another than `true`.
-    pub(crate) fn of_application(&mut self, key: &str, meaning: &str) -> Result<()> {
+    pub(crate) fn require_from_application(&mut self, key: &str, meaning: &str) -> Result<()> {
         let given = self.missing::<bool>(key, meaning)?;
         ensure!(given != Some(false), "answer {key} = false: nothing else can compute it; describe it in deploy.toml");
         Ok(())
@@ -350,11 +350,11 @@ impl Facts {
             }
         }
         for (name, places) in asked {
-            let more = places.len().saturating_sub(MOST_PLACES);
+            let more = places.len().saturating_sub(MAX_PLACES);
             let more = if more > 0 { format!("; {more} more") } else { String::new() };
             let meaning = format!(
                 "nothing reads {}{more}, which could change a number; the family was read in {}. Does the deployment do without (\"unused\")?",
-                places[..places.len().min(MOST_PLACES)].join("; "),
+                places[..places.len().min(MAX_PLACES)].join("; "),
                 if profile.versions.is_empty() { profile.family.clone() } else { profile.versions.join(", ") }
             );
             self.confirmed(&format!("unread.{name}"), &meaning, "unused")?;

@@ -17,19 +17,19 @@ pub(crate) trait Family: Sync {
     /// # Errors
     ///
     /// If a file that decides it cannot be read.
-    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>>;
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Recognized>>;
 
     /// Makes the description.
     ///
     /// # Errors
     ///
     /// If the files contradict each other or lack something that no answer can give.
-    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description>;
+    fn read(&self, bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description>;
 }
 
 /// The files of a bundle that a family reads.
 #[derive(Debug, Default)]
-pub(crate) struct Found {
+pub(crate) struct Recognized {
     /// YAML files, the main one first.
     pub documents: Vec<Document>,
     /// ONNX files, the policy's first.

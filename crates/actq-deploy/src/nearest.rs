@@ -9,7 +9,7 @@ use crate::families::metadata_document;
 use crate::yaml::Node;
 
 /// Most bundle files that are looked at.
-const MOST_FILES: usize = 100;
+const MAX_FILES: usize = 100;
 
 /// Names the families most of whose keys a file has: the family, the file, and the keys found and missing.
 pub(crate) fn nearest(bundle: &Bundle, profiles: &[Profile]) -> Vec<String> {
@@ -48,7 +48,7 @@ pub(crate) fn nearest(bundle: &Bundle, profiles: &[Profile]) -> Vec<String> {
 /// Reads the files with an ending; those that cannot be read have no keys.
 fn read(bundle: &Bundle, ending: &str) -> Vec<Document> {
     let endings: &[&str] = if ending == "yaml" { &["yaml", "yml"] } else { &[ending] };
-    let files = endings.iter().flat_map(|ending| bundle.with_ending(ending)).take(MOST_FILES);
+    let files = endings.iter().flat_map(|ending| bundle.with_ending(ending)).take(MAX_FILES);
     let document = |file: &str| {
         if ending == "onnx" {
             let signature = bundle.signature(file).ok()?;

@@ -15,7 +15,7 @@ const OFFSET: f64 = 1e-4;
 /// Ticks that tell columns from each other.
 const FEWEST_TICKS: usize = 8;
 /// Most values of an order that are listed.
-const MOST_LISTED: usize = 8;
+const MAX_LISTED: usize = 8;
 
 /// Finds values that the reference has in another order than the description: each column of a term or target of the
 /// reference is, but for a factor and an offset, another column of it in the description. Finds other offsets, too, which
@@ -97,9 +97,9 @@ fn order(labels: &[Label], own: &[Column], given: &[Column]) -> Option<String> {
 
 /// Lists the first texts; nothing if there are none.
 fn list(texts: Vec<String>) -> Option<String> {
-    let more = texts.len().saturating_sub(MOST_LISTED);
+    let more = texts.len().saturating_sub(MAX_LISTED);
     let more = if more > 0 { format!(", and {more} more") } else { String::new() };
-    (!texts.is_empty()).then(|| format!("{}{more}", texts[..texts.len().min(MOST_LISTED)].join(", ")))
+    (!texts.is_empty()).then(|| format!("{}{more}", texts[..texts.len().min(MAX_LISTED)].join(", ")))
 }
 
 /// A value over all ticks, without its mean.

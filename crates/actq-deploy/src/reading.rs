@@ -8,7 +8,7 @@ use crate::bundle::Bundle;
 use crate::description::{Description, Numbers, Op, Operand};
 use crate::facts::{Answers, Facts, Profile, Question};
 use crate::families::{FAMILIES, Stack};
-use crate::family::{Family, Found};
+use crate::family::{Family, Recognized};
 use crate::nearest::nearest;
 
 /// File of a description, in a bundle's folder. Where it is, no reader is needed.
@@ -51,7 +51,13 @@ fn limit_clipped(description: &mut Description, facts: &mut Facts) {
 }
 
 /// Reads a bundle as one of a family.
-fn read_as(family: &dyn Family, bundle: &Bundle, found: &Found, accepted: bool, answers: Answers) -> Result<Reading> {
+fn read_as(
+    family: &dyn Family,
+    bundle: &Bundle,
+    found: &Recognized,
+    accepted: bool,
+    answers: Answers,
+) -> Result<Reading> {
     let profile = Profile::parse(family.profile())?;
     let (name, upstream) = (profile.family.clone(), [profile.upstream.clone(), profile.commit.clone()]);
     let upstream = (!profile.upstream.is_empty()).then_some(upstream);

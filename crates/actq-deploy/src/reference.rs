@@ -55,7 +55,7 @@ impl Raw {
         for (name, len) in inputs {
             let array = self.arrays.get(name).with_context(|| {
                 let all = self.arrays.keys().cloned().collect::<Vec<_>>().join(", ");
-                format!("{}: there is no raw array {name:?}; there are {all}", self.name)
+                format!("{}: there is no raw array {name:?}; expected one of {all}", self.name)
             })?;
             let (_, row) = array.rows()?;
             ensure!(

@@ -16,7 +16,7 @@ pub struct Row {
 }
 
 /// Most numbers of a list that are shown.
-const MOST_NUMBERS: usize = 3;
+const MAX_NUMBERS: usize = 3;
 
 impl Description {
     /// Returns its parts in the order of the file.
@@ -125,6 +125,6 @@ fn operand_text(operand: &Operand) -> String {
 }
 
 fn numbers_text(numbers: &[String]) -> String {
-    let shown = numbers[..numbers.len().min(MOST_NUMBERS)].join(", ");
-    if numbers.len() > MOST_NUMBERS { format!("[{shown} .. {} values]", numbers.len()) } else { format!("[{shown}]") }
+    let shown = numbers[..numbers.len().min(MAX_NUMBERS)].join(", ");
+    if numbers.len() > MAX_NUMBERS { format!("[{shown} .. {} values]", numbers.len()) } else { format!("[{shown}]") }
 }

@@ -22,7 +22,7 @@ pub struct Tick {
     pub targets: Vec<(TargetKind, Vec<f64>)>,
 }
 
-/// A description at work.
+/// Executes a plan tick by tick.
 pub struct Runner {
     plan: Plan,
     values: Vec<Vec<f64>>,

@@ -17,7 +17,7 @@ impl Description {
         toml::from_str(text).map_err(|error| Error::input(error.to_string()))
     }
 
-    /// Formats the description for people: one line a key, with each part's source as a comment.
+    /// Formats the description as human-readable text: one line a key, with each part's source as a comment.
     ///
     /// # Errors
     ///

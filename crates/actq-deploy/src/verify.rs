@@ -24,7 +24,7 @@ type Raw = Vec<Vec<f64>>;
 /// Ticks of drawn raw values.
 const TICKS: usize = 48;
 /// Most ticks that are compared: errors that feed themselves grow with every tick.
-const MOST_TICKS: usize = 200;
+const MAX_TICKS: usize = 200;
 /// Errors of values and outputs in f32, several times the rounding of an operation.
 pub const ROUNDING: [f64; 2] = [1e-6; 2];
 /// Runs with errors, if a difference may be what small errors grow to.
@@ -166,7 +166,7 @@ impl Deployment {
         // A description that fits no image in 4 bits may fit one in other bits; quantization reports why.
         let Ok(rounded) = self.rounded() else { return Ok(()) };
         let Ok(image) = rounded.whole_image() else { return Ok(()) };
-        let raw = &raw[..raw.len().min(MOST_TICKS)];
+        let raw = &raw[..raw.len().min(MAX_TICKS)];
         let mut found = in_f32(&rounded, &image, raw).context("compare an image with the description")?;
         // An image gives no action that is not finite, and starts anew after it.
         let end = found.iter().position(|target| target.iter().any(|x| !x.is_finite())).map_or(found.len(), |t| t + 1);
@@ -176,7 +176,7 @@ impl Deployment {
         {
             bail!(
                 "tick {tick}: {what} is {got:.6} in an image, and {expected:.6} by the description; \
-                 this is an error of this program, please report it"
+                 internal error; please report it"
             );
         }
         Ok(())

@@ -6,9 +6,9 @@ use actq::text::printable;
 use saphyr_parser::{Event, Parser, ScalarStyle};
 
 /// Most values of a file, with those that aliases repeat.
-const MOST_NODES: usize = 100_000;
+const MAX_NODES: usize = 100_000;
 /// Most levels.
-const MOST_LEVELS: usize = 64;
+const MAX_LEVELS: usize = 64;
 
 /// A value.
 #[derive(Clone, Debug, PartialEq)]
@@ -213,7 +213,7 @@ impl Reader {
     }
 
     fn begin(&mut self, line: usize, anchor: usize, data: Data) -> Result<()> {
-        ensure!(self.open.len() < MOST_LEVELS, "line {line}: more than {MOST_LEVELS} levels");
+        ensure!(self.open.len() < MAX_LEVELS, "line {line}: more than {MAX_LEVELS} levels");
         self.open.push(Open { line, anchor, data, key: None });
         Ok(())
     }
@@ -221,7 +221,7 @@ impl Reader {
     fn add(&mut self, node: Node, anchor: usize) -> Result<()> {
         let line = node.line;
         self.nodes += node.count();
-        ensure!(self.nodes <= MOST_NODES, "line {line}: more than {MOST_NODES} values, with those that aliases repeat");
+        ensure!(self.nodes <= MAX_NODES, "line {line}: more than {MAX_NODES} values, with those that aliases repeat");
         if anchor > 0 {
             self.anchors.push((anchor, node.clone()));
         }

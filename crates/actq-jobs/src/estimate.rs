@@ -6,7 +6,7 @@ use actq::methods::distill::schedule::most_steps;
 use actq::methods::{Effort, Method};
 
 /// Seconds of a job that does almost nothing: the start of the process, and reading.
-const LEAST_SECONDS: f64 = 0.02;
+const MIN_SECONDS: f64 = 0.02;
 /// Seconds per weight of rounding and packing, of these with statistics of a recording, and of two-sided error
 /// feedback.
 const ROUNDING: f64 = 3e-6;
@@ -35,12 +35,12 @@ pub fn quantize_seconds(graph: &Graph, method: &Method, steps: Option<usize>, ef
         }
         Method::Gptq | Method::Custom(_) => STATISTICS,
     };
-    LEAST_SECONDS + weights * work
+    MIN_SECONDS + weights * work
 }
 
 /// Returns the seconds of a measurement on this many observations.
 pub fn evaluate_seconds(graph: &Graph, observations: usize) -> f64 {
-    LEAST_SECONDS + graph.weights() as f64 * graph.denoising_steps().max(1) as f64 * observations as f64 * OBSERVATION
+    MIN_SECONDS + graph.weights() as f64 * graph.denoising_steps().max(1) as f64 * observations as f64 * OBSERVATION
 }
 
 /// Returns the memory of a job, in MiB, with `recordings` bytes of recordings.
@@ -50,5 +50,5 @@ pub fn memory_mib(graph: &Graph, recordings: u64) -> u64 {
 
 /// Returns the seconds of a job that merges this many results.
 pub fn merge_seconds(results: usize) -> f64 {
-    LEAST_SECONDS + 1e-4 * results as f64
+    MIN_SECONDS + 1e-4 * results as f64
 }

@@ -11,7 +11,7 @@ use crate::work::Episodes;
 /// An image.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Made {
+pub struct JobResult {
     /// SHA-256 of the image.
     pub image: String,
     /// Its bytes.

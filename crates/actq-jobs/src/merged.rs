@@ -5,7 +5,7 @@ use actq::measure::eval::ErrorReport;
 use actq::measure::interval::wilson;
 use serde::{Deserialize, Serialize};
 
-use crate::figures::{Driven, Made};
+use crate::figures::{Driven, JobResult};
 use crate::frontier::{Curve, frontier, knee};
 
 /// The results of a plan.
@@ -58,7 +58,7 @@ pub struct MergedImage {
 #[serde(deny_unknown_fields)]
 pub struct Figures {
     /// The image.
-    pub image: Made,
+    pub image: JobResult,
     /// Error on the held-out recording (NMSE).
     pub nmse: f64,
     /// Largest ratio of a dimension.
@@ -75,7 +75,7 @@ pub struct Figures {
 
 impl Figures {
     /// Takes an image's errors and episodes.
-    pub(crate) fn new(image: Made, report: ErrorReport, driven: Option<Driven>) -> Self {
+    pub(crate) fn new(image: JobResult, report: ErrorReport, driven: Option<Driven>) -> Self {
         let counts = driven.as_ref().and_then(|driven| Some((driven.successes?, driven.episodes)));
         let interval = counts.map(|(successes, episodes)| wilson(successes as f64, episodes as f64));
         let ErrorReport { nmse, worst_nmse, max_abs, steps: observations, .. } = report;
@@ -137,7 +137,7 @@ impl MergedPolicy {
     }
 
     fn find_knee(&self) -> Option<usize> {
-        // Every curve has each budget one time, in the same order.
+        // Every curve has each budget once, in the same order.
         let curves = self.named();
         let point = |&i: &usize| self.images[i].made.as_ref().map(|made| (made.image.bytes as f64, made.nmse));
         let points: Vec<Curve> = curves.iter().map(|(_, images)| images.iter().map(point).collect()).collect();

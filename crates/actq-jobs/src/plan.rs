@@ -12,7 +12,7 @@ use crate::host::Host;
 use crate::job::{Input, Job, Role, address};
 use crate::order;
 use crate::source::Source;
-use crate::spec::{self, MOST_JOBS, Spec};
+use crate::spec::{self, MAX_JOBS, Spec};
 use crate::work::{Drive, Episodes, Evaluate, Learn, Make, Merge, Row, Work};
 
 /// Returns the jobs of a spec, each after those that it depends on; the last one merges the results.
@@ -89,9 +89,9 @@ impl Jobs {
     ///
     /// # Errors
     ///
-    /// If the job cannot be formatted, or the plan has [`MOST_JOBS`].
+    /// If the job cannot be formatted, or the plan has [`MAX_JOBS`].
     pub fn add(&mut self, title: String, work: Work, inputs: Vec<Input>, size: Size) -> Result<String> {
-        ensure!(self.list.len() < MOST_JOBS, "the plan has more than {MOST_JOBS} jobs; divide the spec");
+        ensure!(self.list.len() < MAX_JOBS, "the plan has more than {MAX_JOBS} jobs; divide the spec");
         let address = address(&work, &inputs)?;
         let deps = work.deps();
         let stage = match work {

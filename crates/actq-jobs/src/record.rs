@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::figures::{CustomResult, Driven, Evaluated, Made};
+use crate::figures::{CustomResult, Driven, Evaluated, JobResult};
 use crate::merged::Merged;
 
 /// The version of the files: 2 since results end in their checksum.
@@ -27,7 +27,7 @@ pub struct Record {
 #[serde(tag = "kind", content = "value", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Outcome {
     /// An image, in `ADDRESS.actq`.
-    Made(Made),
+    JobResult(JobResult),
     /// The reason why no image is within the budget. Jobs that need the image have the same result.
     Impossible(String),
     /// Errors on the held-out recording.

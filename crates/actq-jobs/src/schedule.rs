@@ -60,7 +60,7 @@ pub struct Counts {
 
 impl<'a> Schedule<'a> {
     /// Begins with the jobs of a checked plan ([`crate::order::check`]). `is_done` returns `true` for those with
-    /// results; it is called one time for each, since another process may be writing some. A job is tried at most
+    /// results; it is called once for each, since another process may be writing some. A job is tried at most
     /// `tries` times.
     pub fn new(jobs: &'a [Job], is_done: impl Fn(&Job) -> bool, tries: usize) -> Self {
         let index: BTreeMap<&str, usize> = jobs.iter().enumerate().map(|(i, job)| (job.address.as_str(), i)).collect();

@@ -18,7 +18,7 @@ pub use drive::{Drive, Learn};
 use quantities::{clock, sizes, widths};
 
 /// The most jobs of a plan.
-pub const MOST_JOBS: usize = 1_000_000;
+pub const MAX_JOBS: usize = 1_000_000;
 
 /// Policies, methods, budgets, seeds and episodes of a sweep. Every combination becomes an image.
 #[derive(Clone, Debug, Deserialize)]

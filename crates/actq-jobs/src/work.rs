@@ -201,7 +201,7 @@ impl Work {
         }
     }
 
-    /// Returns the addresses of the jobs whose results are read, each one time.
+    /// Returns the addresses of the jobs whose results are read, each once.
     pub fn deps(&self) -> Vec<String> {
         let mut deps: Vec<String> = match self {
             Self::Quantize(_) => Vec::new(),

@@ -25,7 +25,7 @@ struct Part {
 
 /// The most repetitions of an element in one operand, each of which is a copy. A longer operand repeats an op with this
 /// many copies.
-const MOST_COPIES: usize = 64;
+const MAX_COPIES: usize = 64;
 
 /// The ops and tensors.
 pub(crate) struct Lowered {
@@ -110,14 +110,14 @@ impl Lowered {
     /// Repeats an element `n` times.
     fn spread(&mut self, x: Id, n: usize) -> Result<Vec<Part>> {
         let one = self.place(x);
-        if n <= MOST_COPIES {
+        if n <= MAX_COPIES {
             return Ok(vec![one; n].concat());
         }
-        let most = MOST_COPIES * MOST_COPIES;
+        let most = MAX_COPIES * MAX_COPIES;
         ensure!(n <= most, "repeats a value {n} times; the limit is {most}");
-        let copies = self.push(JsonOp::new("identity"), vec![one; MOST_COPIES].concat(), None, MOST_COPIES);
-        let rest = copies.iter().map(|part| Part { len: n % MOST_COPIES, ..*part }).filter(|part| part.len > 0);
-        Ok(vec![copies.clone(); n / MOST_COPIES].concat().into_iter().chain(rest).collect())
+        let copies = self.push(JsonOp::new("identity"), vec![one; MAX_COPIES].concat(), None, MAX_COPIES);
+        let rest = copies.iter().map(|part| Part { len: n % MAX_COPIES, ..*part }).filter(|part| part.len > 0);
+        Ok(vec![copies.clone(); n / MAX_COPIES].concat().into_iter().chain(rest).collect())
     }
 
     fn place(&self, id: Id) -> Vec<Part> {
@@ -181,7 +181,7 @@ impl Lowered {
                 )
             }
             Expr::Sum(_) | Expr::Input(_) | Expr::Integers(_) | Expr::Pick(_) | Expr::Spread(_) => {
-                bail!("has no op; this is an error of this program, please report it")
+                bail!("has no op; internal error; please report it")
             }
         })
     }

@@ -22,7 +22,7 @@ mod thinning;
 pub use arrays::arrays;
 pub use dataset::Dataset;
 pub(crate) use dataset::mean_and_variance;
-pub use joined::{Learned, MOST_FRAMES, Share, joined, longest_piece};
+pub use joined::{Learned, MAX_FRAMES, Share, joined, longest_piece};
 pub use npy::npy_header;
 pub(crate) use origin::is_link_log;
 pub use origin::{CRC32, driven_by};

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 pub(crate) const COLS: usize = 16;
 /// Rows of a tile of f32: with two registers a row, 12 accumulators. A tile of f64 has half as many.
 const ROWS: usize = 6;
-/// Rows of `B` that a tile takes at one time: 16 KB of a panel.
+/// Rows of `B` that a tile takes at once: 16 KB of a panel.
 const DEPTH: usize = 256;
 /// Rows that a thread takes together.
 const STRIP: usize = 8 * ROWS;

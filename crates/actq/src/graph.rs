@@ -1,6 +1,6 @@
 //! The network: operations over values, their computation in f32 forwards and backwards, and their form in an image.
 //!
-//! Each operation is defined one time, in its file in [`ops`]; everything else uses it through
+//! Each operation is defined once, in its file in [`ops`]; everything else uses it through
 //! [`operation::Operation`].
 
 mod append;

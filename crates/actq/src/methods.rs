@@ -13,8 +13,8 @@ pub mod scale;
 
 pub use crate::calibrate::allowance::Sampled;
 pub use crate::calibrate::imagined::Imagined;
-pub use learning::{Choice, Learning, Recipe, Tried};
-pub use options::{CustomMethod, CustomStatistics, Effort, MOST_MINUTES, Method, Options};
+pub use learning::{Choice, Learning, Recipe, Trial};
+pub use options::{CustomMethod, CustomStatistics, Effort, MAX_MINUTES, Method, Options};
 pub use packing::{Activations, Packing};
 pub use prepared::{PreparedMethod, least_bytes, quantize};
 pub use progress::Progress;

@@ -14,7 +14,7 @@ macro_rules! singles {
     ($($name:ident $text:literal)*) => {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, reason = "only counts the constants")]
         enum Order { $($name,)* END }
-        /// Features that exist one time.
+        /// Features that exist once.
         impl CostItem {
             $(#[doc = $text] pub const $name: Self = Self(Order::$name as u16);)*
         }

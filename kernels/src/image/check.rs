@@ -1,4 +1,4 @@
-//! The check of an image: everything in it, one time. `docs/FORMAT.md` has the list.
+//! The check of an image: everything in it, once. `docs/FORMAT.md` has the list.
 
 use super::contract::{ARRAY_BINARISE, CONTRACT_ARRAYS};
 use super::front::Front;

@@ -4,7 +4,7 @@ use super::words::section;
 use crate::error::ImageError;
 
 /// Takes sections in their order in the image. No two share a word. Constants that several operations have in common
-/// are in the image one time, and are checked one time: so the check is linear in the image's length.
+/// are in the image once, and are checked once: so the check is linear in the image's length.
 pub(super) struct Front<'a> {
     pub(super) words: &'a [u32],
     /// End of the last section.

@@ -108,7 +108,7 @@ header! { |header|
     /// u16 number of matrices, u16 chunks that a temporal ensemble averages for an action, or 0.
     W_MATRIX_COUNT = 29: matrix_count Low = header.matrices.count, horizon High = header.horizon;
     /// u16 first operation that every denoising step runs, u16 denoising steps; both 0 if an evaluation runs the
-    /// network one time.
+    /// network once.
     W_DENOISING = 30: first_denoising_op Low = header.first_denoising_op, denoising_steps High = header.denoising_steps;
     /// u16 actions that blend one chunk into the next, u16 age from which on an action never plays; 0 for none.
     W_PLAYBACK = 31: overlap Low = header.overlap, deadline High = header.deadline;
@@ -195,7 +195,7 @@ pub struct Header {
     pub ops: Records,
     /// First operation that every denoising step runs; 0 without denoising steps.
     pub first_denoising_op: usize,
-    /// Denoising steps; 0 if an evaluation runs the network one time.
+    /// Denoising steps; 0 if an evaluation runs the network once.
     pub denoising_steps: usize,
     /// Offset of the action contract's arrays.
     pub contract: u32,

@@ -193,7 +193,7 @@ impl<'a> Matrix<'a> {
         !self.bias.is_empty()
     }
 
-    /// Returns the bits of the biases if the output starts from them and every row is written one time, in order.
+    /// Returns the bits of the biases if the output starts from them and every row is written once, in order.
     pub fn start_values(&self, accumulate: bool) -> Option<&[u32]> {
         if accumulate || self.bias.is_empty() || !self.is_whole() { None } else { Some(self.bias) }
     }

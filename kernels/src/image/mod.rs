@@ -1,4 +1,4 @@
-//! The image: a sequence of little-endian words, checked one time. `docs/FORMAT.md` has the byte tables.
+//! The image: a sequence of little-endian words, checked once. `docs/FORMAT.md` has the byte tables.
 //!
 //! [`Image::new_checked`] verifies everything; afterwards no accessor panics or fails. Offsets in the image count
 //! 32-bit words from its start; offsets in the arena (the scratch memory) count words, too. Sums of offsets wrap: if

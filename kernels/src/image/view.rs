@@ -78,7 +78,7 @@ impl<'a> Image<'a> {
         }
     }
 
-    /// Returns the number of denoising steps; 1 if an evaluation runs the network one time.
+    /// Returns the number of denoising steps; 1 if an evaluation runs the network once.
     pub fn denoising_steps(&self) -> usize {
         self.header.denoising_steps().max(1)
     }

@@ -1,4 +1,4 @@
-//! Packed weight layouts: the weights in flash, defined one time for the packer, the reference and the kernels.
+//! Packed weight layouts: the weights in flash, defined once for the packer, the reference and the kernels.
 //!
 //! A [`Block`] is successive rows of one [`Width`]. Its rows are interleaved in **strips** of 4 or 8, so that one load
 //! of activations serves all of them and the weights are read strictly forward. A layout packs **cells**: a few rows by

@@ -164,7 +164,7 @@ impl Matrix<'_> {
             None if budget.take(1, Work::Magnitude(self.cols)) == 0 => return Ok(false),
             None => *at.scale.insert(Scale::new(x, self.x_max)?),
         };
-        // One pass over the output is enough if every row has its bias and is written one time, in order.
+        // One pass over the output is enough if every row has its bias and is written once, in order.
         let start = self.start_values(accumulate);
         if start.is_none() && at.started < y.len() {
             let work = Work::Start(OutputStart::of(accumulate, !self.bias.is_empty()));

@@ -132,8 +132,8 @@ impl Choices {
             ("head", _) => self.head = Some(width().ok_or(wrong("2, 3, 4 or 8, or free"))?),
             ("samples", _) => self.fisher.samples = number(1)?,
             ("batch", _) => {
-                let batch = value.parse().ok().filter(|n| (1..=MOST_BATCH).contains(n));
-                self.fisher.batch = batch.ok_or(wrong(&format!("1 to {MOST_BATCH}")))?;
+                let batch = value.parse().ok().filter(|n| (1..=MAX_BATCH).contains(n));
+                self.fisher.batch = batch.ok_or(wrong(&format!("1 to {MAX_BATCH}")))?;
             }
             ("signs", "random") => self.fisher.signs = Signs::Random,
             ("signs", "loss") => self.fisher.signs = Signs::Loss,
@@ -155,7 +155,7 @@ impl Choices {
 }
 
 /// Most frames whose gradients are averaged before they are squared.
-const MOST_BATCH: usize = 1024;
+const MAX_BATCH: usize = 1024;
 
 /// Parses `KEY=VALUE,KEY=VALUE`; in the first place, `authors` selects all of the authors' choices.
 impl FromStr for Choices {

@@ -16,7 +16,7 @@ pub enum Bandwidth {
 }
 
 /// Least `sigma` of [`Bandwidth::SquaredMedian`].
-const LEAST_SIGMA: f64 = 1e-2;
+const MIN_SIGMA: f64 = 1e-2;
 
 /// A centred kernel matrix `H K H` of n samples.
 #[derive(Clone, Debug)]
@@ -41,7 +41,7 @@ impl Kernel {
         }
         let sigma2 = match bandwidth {
             Bandwidth::Median => median,
-            Bandwidth::SquaredMedian => median.max(LEAST_SIGMA).powi(2),
+            Bandwidth::SquaredMedian => median.max(MIN_SIGMA).powi(2),
         };
         kernel.mapv_inplace(|d| (-d / (2.0 * sigma2)).exp());
         // K is symmetric: its row means are its column means.

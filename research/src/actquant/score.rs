@@ -11,7 +11,7 @@ use super::choices::ScoreOf;
 use super::hsic::{Bandwidth, Kernel, hsic};
 
 /// Most frames of a kernel. Time and memory grow with the square; this many take 512 MiB per kernel.
-pub const MOST_FRAMES: usize = 8192;
+pub const MAX_FRAMES: usize = 8192;
 
 /// Weight of the dependence on the network's input (the paper's lambda_x).
 const LAMBDA_X: f64 = 1.0;
@@ -75,7 +75,7 @@ impl Score {
 /// frame is scored by the mean of its inputs and outputs. Biases are ignored, since no kernel depends on them.
 pub fn scores(graph: &Graph, dataset: &Dataset, most: usize, bandwidth: Bandwidth) -> Result<Vec<Score>> {
     let frames = dataset.frames();
-    let step = frames.div_ceil(most.clamp(1, MOST_FRAMES)).max(1);
+    let step = frames.div_ceil(most.clamp(1, MAX_FRAMES)).max(1);
     ensure!(frames.div_ceil(step) >= 2, "{}: too few frames; at least 2 frames are needed", dataset.path.display());
     let samples = Samples::collect(graph, dataset, step)?;
     let actions = Kernel::linear(&standardized(&samples.actions));

@@ -4,7 +4,7 @@ use actq::calibrate::widening::Widening;
 use actq::calibrate::windows::Windows;
 use actq::graph::{Derivatives, Graph, Network, State, Weights};
 use actq::methods::distill::adam::{Adam, Stride};
-use actq::methods::distill::lessons::{Lesson, Lessons, Source};
+use actq::methods::distill::lessons::{Lessons, Source, TrainingBatch};
 use actq::methods::distill::objective::{Frames, Objective};
 use actq::methods::distill::train::{batch_size, clip, gradient, renews_states};
 use actq::random::Random;
@@ -51,7 +51,7 @@ pub fn fit(
             match source {
                 Source::New(seed) => {
                     let batch = windows.batch(samples / parts, Some(by.widening), &mut Random::new(seed));
-                    let lesson = Lesson::of(windows, batch, graph, &states);
+                    let lesson = TrainingBatch::of(windows, batch, graph, &states);
                     learned.push(gradient(&network, &weights, &objective, &lesson).1);
                     drawn.push(lesson);
                 }

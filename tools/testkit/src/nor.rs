@@ -1,4 +1,4 @@
-//! NOR flash with its rules: an erase gives ones, a write clears bits, and a unit is written one time after an erase.
+//! NOR flash with its rules: an erase gives ones, a write clears bits, and a unit is written once after an erase.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 

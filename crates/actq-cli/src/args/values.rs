@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use actq::methods::{Effort, MOST_MINUTES};
+use actq::methods::{Effort, MAX_MINUTES};
 use actq::units;
 use actq_kernels::Width;
 use actq_kernels::layout::is_group;
@@ -87,8 +87,8 @@ pub(super) fn effort(text: &str) -> Result<Effort, String> {
 }
 
 pub(super) fn minutes(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| *x > 0.0 && *x <= MOST_MINUTES);
-    number.ok_or_else(|| format!("use a number above 0 and at most {MOST_MINUTES}, a week"))
+    let number = text.parse().ok().filter(|x: &f64| *x > 0.0 && *x <= MAX_MINUTES);
+    number.ok_or_else(|| format!("use a number above 0 and at most {MAX_MINUTES}, a week"))
 }
 
 pub(super) fn clock(text: &str) -> Result<f64, String> {

@@ -30,7 +30,7 @@ const CONSTANTS: [&str; 2] = ["rs", "h"];
 /// Checksums of the bundle's files at its import.
 const IMPORTED: &str = "policy.bundle.txt";
 /// Most files that differ and are named.
-const MOST_NAMED: usize = 4;
+const MAX_NAMED: usize = 4;
 
 /// Imports a bundle, checks it, quantizes it, checks the image, and builds firmware. Results of an earlier run with the
 /// same options are kept.
@@ -127,8 +127,8 @@ fn check_imported(args: &DeployArgs, policy: &Path, imported: &str, checksums: &
     let [before, now]: [BTreeSet<&str>; 2] = [imported, checksums].map(|text| text.lines().collect());
     let names: BTreeSet<&str> =
         before.symmetric_difference(&now).filter_map(|line| Some(line.split_once(' ')?.1)).collect();
-    let named: Vec<&str> = names.iter().copied().take(MOST_NAMED).collect();
-    let more = if names.len() > MOST_NAMED { " and others" } else { "" };
+    let named: Vec<&str> = names.iter().copied().take(MAX_NAMED).collect();
+    let more = if names.len() > MAX_NAMED { " and others" } else { "" };
     ensure!(
         names.is_empty(),
         "{}: has changed since {} was made of it: {}{more}; remove {1} to import the bundle again, or choose another --out",

@@ -67,7 +67,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
 /// Refuses to replace files without --force.
 pub(super) fn refuse_existing(args: &ImportArgs, files: &[&Path]) -> Result<()> {
     for path in files {
-        ensure!(args.force || !path.exists(), "{}: exists; pass --force to replace it", path.display());
+        ensure!(args.force || !path.exists(), "{}: already exists; use --force to overwrite", path.display());
     }
     Ok(())
 }

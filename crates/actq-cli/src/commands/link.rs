@@ -118,7 +118,7 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     let _ends_itself = EndsItself::begin();
     let (progress, mut log) = (Progress::new(false, "streaming")?, Log::default());
     let observations =
-        recording.observations().take_while(|_| ending::told().is_none()).enumerate().map(|(i, observation)| {
+        recording.observations().take_while(|_| ending::stop_signal().is_none()).enumerate().map(|(i, observation)| {
             progress.set_share(i as f64 / frames as f64);
             // The noise of an iterative head follows the observation; the controller makes its own.
             observation.iter().take(image.obs_len()).copied().collect()

@@ -14,9 +14,9 @@ use anyhow::{Context, Result, bail, ensure};
 use super::unfinished::{Part, hold};
 
 /// The longest chain of symbolic links that is followed, as in Linux.
-const MOST_LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 /// The highest number that is appended to a taken name.
-const MOST_NUMBERS: usize = 9999;
+const MAX_NUMBERS: usize = 9999;
 
 /// Writes `bytes` to `path`. A failure or the end of the process leaves no partial file there. (A process that is
 /// killed while it writes can leave a hidden file of this name with the ending .part.)
@@ -40,7 +40,7 @@ pub fn write_new(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Res
         let mut part = Part::new(folder, name)?;
         fill(part.file())?;
         part.file().sync_all()?;
-        for number in 1..=MOST_NUMBERS {
+        for number in 1..=MAX_NUMBERS {
             let place = numbered(path, number);
             match part.persist_new(&place) {
                 Ok(()) => return Ok(place),
@@ -48,7 +48,7 @@ pub fn write_new(path: &Path, fill: impl FnOnce(&mut File) -> Result<()>) -> Res
                 Err((error, _)) => return Err(error.into()),
             }
         }
-        bail!("all names up to {} exist; choose another name", numbered(path, MOST_NUMBERS).display())
+        bail!("all names up to {} exist; choose another name", numbered(path, MAX_NUMBERS).display())
     };
     create().with_context(|| cannot_write(path))
 }
@@ -142,7 +142,7 @@ pub fn refuse_unlike(output: &Path, content: &str, force: bool) -> Result<()> {
     };
     ensure!(
         old.is_empty() || is_like,
-        "{}: exists, and actq did not write it; choose another name, or pass --force to replace it",
+        "{}: already exists, and actq did not write it; choose another name, or use --force to overwrite",
         output.display()
     );
     Ok(())
@@ -219,7 +219,7 @@ fn identity(path: &Path) -> Option<Identity> {
 /// file, to which `/dev/stdout` leads.
 fn follow(path: &Path) -> Result<PathBuf> {
     let mut path = path.to_owned();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         let name = path.file_name().context("the path has no file name")?;
         let parent = match path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -232,7 +232,7 @@ fn follow(path: &Path) -> Result<PathBuf> {
             _ => return Ok(place),
         }
     }
-    bail!("the chain of symbolic links is longer than {MOST_LINKS}");
+    bail!("the chain of symbolic links is longer than {MAX_LINKS}");
 }
 
 /// Returns `true` if the folder's entries are the open files of a process.

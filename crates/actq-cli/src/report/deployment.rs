@@ -10,7 +10,7 @@ use actq_deploy::{Array, Comparison, Question, Reading, TOLERANCE};
 use super::table::table;
 
 /// Most keys that a note lists.
-const MOST_KEYS: usize = 40;
+const MAX_KEYS: usize = 40;
 
 /// Formats the parts of a description, each with its source.
 pub fn summary(reading: &Reading) -> String {
@@ -46,9 +46,9 @@ pub fn questions(questions: &[Question]) -> String {
 
 /// Formats the keys that nothing reads, as a note.
 pub fn unread(keys: &[String]) -> Option<String> {
-    let more = keys.len().saturating_sub(MOST_KEYS);
+    let more = keys.len().saturating_sub(MAX_KEYS);
     let more = if more > 0 { format!("; and {more} more") } else { String::new() };
-    let listed = keys[..keys.len().min(MOST_KEYS)].join("; ");
+    let listed = keys[..keys.len().min(MAX_KEYS)].join("; ");
     (!keys.is_empty()).then(|| format!("nothing reads these keys of the bundle: {listed}{more}"))
 }
 

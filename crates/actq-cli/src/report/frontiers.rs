@@ -61,7 +61,7 @@ fn places(made: &Figures, clock_hz: f64) -> [f64; 2] {
     [made.image.bytes as f64 / 1e3, made.milliseconds(clock_hz)]
 }
 
-/// Returns a line for each curve, from small values of x to large ones, each image one time.
+/// Returns a line for each curve, from small values of x to large ones, each image once.
 fn series(policy: &MergedPolicy, clock_hz: f64, y: impl Fn(&Figures) -> Option<f64>) -> Vec<Series> {
     let line = |(name, images): (String, Vec<&actq_jobs::merged::MergedImage>)| {
         let made = || images.iter().filter_map(|image| image.made.as_ref());

@@ -73,13 +73,13 @@ mod tests {
     use std::collections::BTreeMap;
 
     use actq::budget::Budget;
-    use actq_jobs::figures::Made;
+    use actq_jobs::figures::JobResult;
 
     use super::*;
     use crate::report::frontiers;
 
     fn image(bits: f64, bytes: usize, nmse: f64) -> MergedImage {
-        let image = Made {
+        let image = JobResult {
             image: String::new(),
             bytes,
             cycles: 84 * bytes as u64,

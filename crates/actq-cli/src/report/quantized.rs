@@ -2,7 +2,7 @@
 
 use actq::measure::eval::ErrorReport;
 use actq::methods::distill::balance::balance_bytes;
-use actq::methods::{Choice, Imagined, Learning, Sampled, Tried};
+use actq::methods::{Choice, Imagined, Learning, Sampled, Trial};
 use actq::pipeline::{QuantizedPolicy, Search, Try};
 use actq::text::count;
 use comfy_table::Table;
@@ -66,7 +66,7 @@ pub fn learning(learning: &Learning) -> String {
     };
     if !tried.is_empty() {
         let mut rows = table(&["setting", "error", "with noise"]);
-        for Tried { choice, recorded, widened } in tried {
+        for Trial { choice, recorded, widened } in tried {
             rows.add_row([choice.to_string(), format!("{recorded:.2e}"), format!("{widened:.2e}")]);
         }
         text += &format!("\n{rows}\n");

@@ -17,16 +17,16 @@ use super::recorders;
 use crate::outputs::files;
 
 /// The fewest new frames at which the file is written again.
-const LEAST_NEW: usize = 256;
+const MIN_NEW: usize = 256;
 /// Divisor of the saved frames that gives the fewest new frames of a long recording. It bounds both the loss when the
 /// process is killed and the number of times that a frame is written.
 const NEW_SHARE: usize = 20;
 /// The most requests in the queue of the recorder. If labels take longer than replies, replies wait when it is full, so
 /// that a killed process loses little.
 const QUEUE: usize = 256;
-/// The most bytes of a recording's arrays. The quantizer keeps [`actq::data::MOST_FRAMES`] frames, and reads no
+/// The most bytes of a recording's arrays. The quantizer keeps [`actq::data::MAX_FRAMES`] frames, and reads no
 /// archive of 4 GiB.
-const MOST_BYTES: usize = 1 << 30;
+const MAX_BYTES: usize = 1 << 30;
 
 /// File of a recording, and the policy that labels it.
 #[derive(Clone, Copy, Debug)]
@@ -135,9 +135,9 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
                     self.begin();
                 }
                 Event::Observation(observation) => {
-                    if self.episodes.bytes_with_next() > MOST_BYTES {
+                    if self.episodes.bytes_with_next() > MAX_BYTES {
                         self.save()?;
-                        let mib = MOST_BYTES >> 20;
+                        let mib = MAX_BYTES >> 20;
                         let name = self.plan.path.display();
                         (self.note)(format!("{name}: recording stops at its limit of {mib} MiB; serving continues"));
                         return Ok(());
@@ -145,7 +145,7 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
                     self.observe(&observation)?;
                 }
             }
-            if self.episodes.frames() >= self.saved + LEAST_NEW.max(self.saved / NEW_SHARE) {
+            if self.episodes.frames() >= self.saved + MIN_NEW.max(self.saved / NEW_SHARE) {
                 self.save()?;
             }
         }

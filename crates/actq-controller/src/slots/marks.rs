@@ -1,6 +1,6 @@
 //! The marks after a record: the history of the image.
 //!
-//! A mark is one unit of writing (at least 4 bytes), programmed one time, in the first erased unit. An interrupted one
+//! A mark is one unit of writing (at least 4 bytes), programmed once, in the first erased unit. An interrupted one
 //! is never a valid code: all codes have the same number of ones, and programming only clears ones.
 
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};

@@ -271,7 +271,7 @@ impl Compiler<'_> {
         let rows: Vec<Vec<f32>> =
             array.values.chunks_exact(len).map(|row| row.iter().map(|number| *number as f32).collect()).collect();
         let late = lag.saturating_add(count);
-        ensure!(late <= usize::from(u16::MAX), "the motion has {count} rows and a lag of {lag}; 65535 are possible");
+        ensure!(late <= usize::from(u16::MAX), "the motion has {count} rows and a lag of {lag}; give at most 65535");
         let rows: Vec<Vec<f32>> = (0..late).map(|tick| rows[tick.saturating_sub(lag)].clone()).collect();
         let next = if end == End::Repeat { lag } else { rows.len() - 1 };
         Ok(self.row(&rows, 0, next).0)

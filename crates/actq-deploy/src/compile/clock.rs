@@ -6,7 +6,7 @@ use crate::clock::Phases;
 use crate::description::{Clock, When};
 
 /// Most rows of a table.
-const MOST_ROWS: usize = 4096;
+const MAX_ROWS: usize = 4096;
 /// Phases that wrap are the same if they differ by less than this share of the interval: their sums in f64 never are.
 const SAME: f64 = 1e-9;
 
@@ -37,8 +37,8 @@ pub(super) fn rows(clock: &Clock) -> Result<Rows> {
         if let Some(known) = rows.iter().position(same) {
             break known;
         }
-        if rows.len() == MOST_ROWS {
-            bail!("its phases do not repeat within {MOST_ROWS} ticks, the most that an image keeps");
+        if rows.len() == MAX_ROWS {
+            bail!("its phases do not repeat within {MAX_ROWS} ticks, the most that an image keeps");
         }
         rows.push(row);
     };

@@ -16,7 +16,7 @@ pub struct Input {
     /// Order of its values: a list of `joints`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joints: Option<String>,
-    /// Unit, for people.
+    /// Unit, human-readable.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
     /// Lowest and highest value that a guard accepts.

@@ -20,7 +20,7 @@ use crate::bundle::Bundle;
 use crate::description::Description;
 use crate::document::Document;
 use crate::facts::Facts;
-use crate::family::{Family, Found};
+use crate::family::{Family, Recognized};
 use crate::yaml::Node;
 
 /// Reader of humanoidverse bundles.
@@ -35,7 +35,7 @@ impl Family for Humanoidverse {
         include_str!("humanoidverse/profile.toml")
     }
 
-    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Recognized>> {
         let mut documents = Vec::new();
         for file in bundle.with_ending("yaml").chain(bundle.with_ending("yml")) {
             // Other YAML files of a folder decide nothing, even if they are damaged.
@@ -52,10 +52,10 @@ impl Family for Humanoidverse {
         let files: Vec<&str> = documents.iter().map(|document| document.file.as_str()).collect();
         ensure!(files.len() == 1, "several files describe a robot: {}; name the folder of one", files.join(", "));
         let networks = bundle.with_ending("onnx").map(str::to_owned).collect();
-        Ok(Some(Found { documents, networks, others: Vec::new() }))
+        Ok(Some(Recognized { documents, networks, others: Vec::new() }))
     }
 
-    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+    fn read(&self, bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
         let yaml = found.documents.first().context("there is no YAML file")?;
         let robot = Robot::read(yaml, facts)?;
         let asap = yaml.peek("obs_dict").is_none() && yaml.peek("obs_list").is_none();

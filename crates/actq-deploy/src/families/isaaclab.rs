@@ -24,7 +24,7 @@ use crate::bundle::{Bundle, beside};
 use crate::description::{Description, Network};
 use crate::document::Document;
 use crate::facts::Facts;
-use crate::family::{Family, Found};
+use crate::family::{Family, Recognized};
 use crate::sources::Sources as _;
 use crate::yaml::Node;
 
@@ -44,7 +44,7 @@ impl Family for IsaacLab {
         include_str!("isaaclab/profile.toml")
     }
 
-    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Recognized>> {
         let (mut exported, mut environments) = (Vec::new(), Vec::new());
         for file in bundle.with_ending("yaml").chain(bundle.with_ending("yml")) {
             // Only files that name its modules can be of this family; the others need not be YAML that this reader
@@ -91,10 +91,10 @@ impl Family for IsaacLab {
             let root = bundle.text(&file).and_then(|text| Node::parse(&text).context(file.clone()))?;
             documents.push(Document::of(&file, root.numbered()));
         }
-        Ok(Some(Found { documents, networks: vec![network.to_owned()], others: Vec::new() }))
+        Ok(Some(Recognized { documents, networks: vec![network.to_owned()], others: Vec::new() }))
     }
 
-    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+    fn read(&self, bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
         let file = &found.networks[0];
         let signature = bundle.signature(file)?;
         let graph = Graph::of(file, &signature)?;

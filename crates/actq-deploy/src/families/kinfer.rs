@@ -21,7 +21,7 @@ use crate::bundle::Bundle;
 use crate::description::{Description, Op, Operand, TargetKind};
 use crate::document::Document;
 use crate::facts::Facts;
-use crate::family::{Family, Found};
+use crate::family::{Family, Recognized};
 use crate::yaml::{Data, Node};
 
 /// Reader of kinfer bundles.
@@ -38,7 +38,7 @@ impl Family for Kinfer {
         include_str!("kinfer/profile.toml")
     }
 
-    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Recognized>> {
         let mut files: Vec<&str> = bundle.with_ending("kinfer").collect();
         if files.is_empty() {
             // Files of other families that cannot be read are their readers' concern.
@@ -64,10 +64,10 @@ impl Family for Kinfer {
             }
         }
         let document = metadata(file, &signature.metadata)?;
-        Ok(Some(Found { documents: vec![document], networks: vec![file.to_owned()], others }))
+        Ok(Some(Recognized { documents: vec![document], networks: vec![file.to_owned()], others }))
     }
 
-    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+    fn read(&self, bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
         let (meta, file) = (&found.documents[0], &found.networks[0]);
         if file.ends_with(packed::STEP) {
             return packed::read(bundle, found, facts);

@@ -14,7 +14,7 @@ use crate::bundle::Bundle;
 use crate::description::Description;
 use crate::document::Document;
 use crate::facts::Facts;
-use crate::family::{Family, Found};
+use crate::family::{Family, Recognized};
 use crate::yaml::Node;
 
 /// Reader of LEAPP bundles.
@@ -29,7 +29,7 @@ impl Family for Leapp {
         include_str!("leapp/profile.toml")
     }
 
-    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Recognized>> {
         let mut documents = Vec::new();
         for file in bundle.with_ending("yaml") {
             // Only files with its keys can be of this family; the others need not be YAML that this reader knows.
@@ -43,14 +43,14 @@ impl Family for Leapp {
         }
         match &documents[..] {
             [] => Ok(None),
-            [_] => Ok(Some(Found { documents, ..Found::default() })),
+            [_] => Ok(Some(Recognized { documents, ..Recognized::default() })),
             [first, second, ..] => {
                 bail!("several policies of this family: {} and {}; name the folder of one", first.file, second.file)
             }
         }
     }
 
-    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+    fn read(&self, bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
         let yaml = &found.documents[0];
         let models = model::models(bundle, yaml)?;
         let pipeline = Pipeline::of(yaml, &models)?;

@@ -23,7 +23,7 @@ use crate::bundle::Bundle;
 use crate::description::{Description, History, Op, Order, TargetKind};
 use crate::document::Document;
 use crate::facts::Facts;
-use crate::family::{Family, Found};
+use crate::family::{Family, Recognized};
 use crate::yaml::Node;
 
 /// Reader of LeRobot bundles.
@@ -33,14 +33,14 @@ pub(super) struct Lerobot;
 /// File of the policy's configuration.
 const CONFIG: &str = "config.json";
 /// Most observations of a history.
-const MOST_FRAMES: usize = 1000;
+const MAX_FRAMES: usize = 1000;
 
 impl Family for Lerobot {
     fn profile(&self) -> &str {
         include_str!("lerobot/profile.toml")
     }
 
-    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Recognized>> {
         let is_config = |file: &&str| {
             Path::new(file).ends_with(CONFIG)
                 && bundle.text(file).is_ok_and(|text| KEYS.iter().all(|key| text.contains(&format!("\"{key}\""))))
@@ -58,10 +58,10 @@ impl Family for Lerobot {
             }
         }
         let networks = bundle.with_ending("onnx").map(str::to_owned).collect();
-        Ok(Some(Found { documents, networks, others: Vec::new() }))
+        Ok(Some(Recognized { documents, networks, others: Vec::new() }))
     }
 
-    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+    fn read(&self, bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
         let config = &found.documents[0];
         let folder = folder(&config.file);
         let features = Feature::observations(config)?;
@@ -149,7 +149,7 @@ fn check_policy(config: &Document, facts: &mut Facts) -> Result<usize> {
     }
     let key = "n_obs_steps";
     let frames = config.optional(key, "a number of observations from 1 to 1000", |node| {
-        count(node).filter(|n| (1..=MOST_FRAMES).contains(n))
+        count(node).filter(|n| (1..=MAX_FRAMES).contains(n))
     })?;
     Ok(frames.unwrap_or(1))
 }

@@ -8,7 +8,7 @@ use crate::bundle::Bundle;
 use crate::description::{Clock, Description, Gains, Op, Operand, Order, TargetKind, When};
 use crate::document::Document;
 use crate::facts::Facts;
-use crate::family::{Family, Found};
+use crate::family::{Family, Recognized};
 
 /// Reader of LimX bundles.
 #[derive(Debug)]
@@ -22,17 +22,17 @@ impl Family for Limx {
         include_str!("limx/profile.toml")
     }
 
-    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Recognized>> {
         let Some(file) = bundle.find("params.yaml")? else { return Ok(None) };
         let document = Document::read(bundle, file)?;
         if document.peek("PointfootCfg.joint_names").is_none() {
             return Ok(None);
         }
         let networks: Vec<String> = bundle.with_ending("onnx").map(str::to_owned).collect();
-        Ok(Some(Found { documents: vec![document], networks, others: Vec::new() }))
+        Ok(Some(Recognized { documents: vec![document], networks, others: Vec::new() }))
     }
 
-    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+    fn read(&self, bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
         let yaml = &found.documents[0];
         let variant = variant(&found.networks, facts)?;
         let [encoder, policy] = ["encoder.onnx", "policy.onnx"].map(|name| {

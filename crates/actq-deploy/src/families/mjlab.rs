@@ -21,7 +21,7 @@ use crate::bundle::Bundle;
 use crate::description::Description;
 use crate::document::Document;
 use crate::facts::Facts;
-use crate::family::{Family, Found};
+use crate::family::{Family, Recognized};
 
 /// Reader of mjlab bundles.
 #[derive(Debug)]
@@ -35,7 +35,7 @@ impl Family for Mjlab {
         include_str!("mjlab/profile.toml")
     }
 
-    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Recognized>> {
         let mut networks = Vec::new();
         for file in bundle.with_ending("onnx") {
             // A file that cannot be read is of no family, or its reader says why.
@@ -64,7 +64,7 @@ impl Family for Mjlab {
             ([((yaml, _), network)], ..) => (*network, Some(*yaml)),
             ([], [], [only]) => (only, None),
             ([], [(yaml, node), ..], _) => bail!(
-                "{yaml}: {}.ros__parameters.model = {:?} is none of the files {}",
+                "{yaml}: {}.ros__parameters.model = {:?} matches none of the files {}",
                 printable(&node.name),
                 printable(&node.model),
                 networks.iter().map(|(file, _)| *file).collect::<Vec<_>>().join(", ")
@@ -79,10 +79,10 @@ impl Family for Mjlab {
         if let Some(yaml) = yaml {
             documents.push(Document::read(bundle, yaml)?);
         }
-        Ok(Some(Found { documents, networks: vec![(*file).to_owned()], others: Vec::new() }))
+        Ok(Some(Recognized { documents, networks: vec![(*file).to_owned()], others: Vec::new() }))
     }
 
-    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+    fn read(&self, bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
         let (meta, file) = (&found.documents[0], &found.networks[0]);
         let graph = Graph::of(file, &bundle.signature(file)?)?;
         let node = match found.documents.get(1) {

@@ -20,7 +20,7 @@ use crate::bundle::Bundle;
 use crate::description::Description;
 use crate::document::Document;
 use crate::facts::Facts;
-use crate::family::{Family, Found};
+use crate::family::{Family, Recognized};
 
 /// Reader of rl_sar bundles.
 #[derive(Debug)]
@@ -34,7 +34,7 @@ impl Family for RlSar {
         include_str!("rl_sar/profile.toml")
     }
 
-    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Recognized>> {
         let mut documents = Vec::new();
         for file in bundle.with_ending("yaml") {
             // Other YAML files of a folder decide nothing, even if they are damaged.
@@ -49,10 +49,10 @@ impl Family for RlSar {
         for file in bundle.with_ending("yaml").filter(|file| Path::new(file).ends_with("base.yaml")) {
             documents.push(Document::read(bundle, file)?);
         }
-        Ok(Some(Found { documents, networks: Vec::new(), others: Vec::new() }))
+        Ok(Some(Recognized { documents, networks: Vec::new(), others: Vec::new() }))
     }
 
-    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+    fn read(&self, bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
         let Some(own) = chosen(&found.documents, facts)? else { return Ok(Parts::new("policy", 1.0).finish()) };
         let config = Config { own, base: base(&found.documents, own)? };
         require_base(&config)?;

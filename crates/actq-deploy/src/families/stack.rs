@@ -17,7 +17,7 @@ use crate::bundle::Bundle;
 use crate::description::{Description, Order};
 use crate::document::Document;
 use crate::facts::{Facts, Profile};
-use crate::family::{Family, Found};
+use crate::family::{Family, Recognized};
 use crate::yaml::{Data, Node};
 
 /// Reader of the stack that a profile describes.
@@ -29,7 +29,7 @@ impl Family for Stack<'_> {
         self.0
     }
 
-    fn recognize(&self, bundle: &Bundle) -> Result<Option<Found>> {
+    fn recognize(&self, bundle: &Bundle) -> Result<Option<Recognized>> {
         let (profile, schema) = parse(self.0)?;
         match &schema.file {
             Some(file) => of_file(bundle, &profile, &schema, file),
@@ -37,7 +37,7 @@ impl Family for Stack<'_> {
         }
     }
 
-    fn read(&self, bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+    fn read(&self, bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
         let (profile, schema) = parse(self.0)?;
         let (document, file) = (&found.documents[0], &found.networks[0]);
         let signature = bundle.signature(file)?;
@@ -77,7 +77,7 @@ fn parse(text: &str) -> Result<(Profile, Schema)> {
 }
 
 /// Finds the file of a name with the profile's keys.
-fn of_file(bundle: &Bundle, profile: &Profile, schema: &Schema, file: &str) -> Result<Option<Found>> {
+fn of_file(bundle: &Bundle, profile: &Profile, schema: &Schema, file: &str) -> Result<Option<Recognized>> {
     let Some(file) = bundle.find(file)? else { return Ok(None) };
     let root = bundle.text(file).and_then(|text| Node::parse(&text).context(file.to_owned()))?;
     let document = Document::of(file, root.numbered());
@@ -98,11 +98,11 @@ fn of_file(bundle: &Bundle, profile: &Profile, schema: &Schema, file: &str) -> R
             _ => bail!("{file}: there are several ONNX files with it; name the folder of one policy"),
         },
     };
-    Ok(Some(Found { documents: vec![document], networks: vec![network.to_owned()], others: Vec::new() }))
+    Ok(Some(Recognized { documents: vec![document], networks: vec![network.to_owned()], others: Vec::new() }))
 }
 
 /// Finds the ONNX file whose metadata have the profile's keys.
-fn of_metadata(bundle: &Bundle, profile: &Profile) -> Result<Option<Found>> {
+fn of_metadata(bundle: &Bundle, profile: &Profile) -> Result<Option<Recognized>> {
     let (mut networks, mut documents) = (Vec::new(), Vec::new());
     for file in bundle.with_ending("onnx") {
         // A file that is not ONNX decides nothing.
@@ -119,7 +119,7 @@ fn of_metadata(bundle: &Bundle, profile: &Profile) -> Result<Option<Found>> {
         }
     }
     ensure!(networks.len() <= 1, "several files are policies: {}; name one of them", networks.join(", "));
-    Ok((!networks.is_empty()).then(|| Found { documents, networks, others: Vec::new() }))
+    Ok((!networks.is_empty()).then(|| Recognized { documents, networks, others: Vec::new() }))
 }
 
 /// Returns the ticks per second, and where they are from.

@@ -11,14 +11,14 @@ use actq::text::printable;
 use crate::bundle::Bundle;
 
 /// Most bytes of a file: more than the weights of a network that fits a microcontroller.
-const MOST_BYTES: u64 = 256 << 20;
+const MAX_BYTES: u64 = 256 << 20;
 
 /// Reads the tensors with some names.
 pub(super) fn tensors(bundle: &Bundle, file: &str, keep: impl Fn(&str) -> bool) -> Result<BTreeMap<String, Tensor>> {
     let path = bundle.path(file)?;
     let read = || -> Result<_> {
         let bytes = fs::metadata(&path).context("cannot read the file")?.len();
-        ensure!(bytes <= MOST_BYTES, "it has {bytes} bytes; at most {MOST_BYTES} are allowed");
+        ensure!(bytes <= MAX_BYTES, "it has {bytes} bytes; at most {MAX_BYTES} are allowed");
         let bytes = fs::read(&path).context("cannot read the file")?;
         let tensors = TensorFile::new(&bytes).context("not a .safetensors file, or a truncated one")?;
         let names = tensors.names().into_iter().filter(|name| keep(name));

@@ -16,7 +16,7 @@ use crate::sources::Sources;
 /// Most values that one name may have; an image can address no more.
 pub(super) const MOST: usize = u16::MAX as usize;
 /// Most values of all names together.
-const MOST_IN_ALL: usize = 1 << 18;
+const MAX_IN_ALL: usize = 1 << 18;
 
 impl Plan {
     /// Checks a description and opens its files.
@@ -201,7 +201,7 @@ impl Builder<'_> {
         joints: Option<String>,
     ) -> Result<ValueIndex> {
         self.in_all += labels.len();
-        ensure!(self.in_all <= MOST_IN_ALL, "{name:?}: with it there are more than {MOST_IN_ALL} values");
+        ensure!(self.in_all <= MAX_IN_ALL, "{name:?}: with it there are more than {MAX_IN_ALL} values");
         let index = self.plan.values.len();
         self.plan.values.push(Planned { source, labels, joints });
         self.plan.names.push(name.to_owned());
@@ -255,7 +255,7 @@ impl Builder<'_> {
             self.network(network)?;
             return self.values.get(name).copied().with_context(|| format!("{key}: {name:?} is not computed"));
         }
-        bail!("{key} = {name:?}: there is no value of this name; there are {}", self.names.listed())
+        bail!("{key} = {name:?}: there is no value of this name; expected one of {}", self.names.listed())
     }
 
     fn clock(&mut self, clock: &Clock) -> Result<ValueIndex> {

@@ -8,9 +8,9 @@ use actq::text::printable;
 use crate::description::{Description, Op, Operand};
 
 /// Most names of a description, which also bounds how deep one value may depend on others.
-const MOST_NAMES: usize = 1000;
+const MAX_NAMES: usize = 1000;
 /// Most names in a message.
-const MOST_LISTED: usize = 20;
+const MAX_LISTED: usize = 20;
 
 /// Names of a description, and the outputs that they read.
 pub(crate) struct Names<'a> {
@@ -31,7 +31,7 @@ impl<'a> Names<'a> {
             .chain(description.motions.iter().map(|motion| motion.name.as_str()))
             .chain(description.values.iter().map(|value| value.name.as_str()))
             .collect();
-        ensure!(own.len() <= MOST_NAMES, "there are {} names; at most {MOST_NAMES} are allowed", own.len());
+        ensure!(own.len() <= MAX_NAMES, "there are {} names; at most {MAX_NAMES} are allowed", own.len());
         let networks = description.networks.iter().map(|network| network.name.as_str());
         let mut seen = BTreeSet::new();
         for name in own.iter().copied().chain(networks) {
@@ -94,8 +94,8 @@ impl<'a> Names<'a> {
     /// Lists the names for a message.
     pub(super) fn listed(&self) -> String {
         let count = self.all().count();
-        let more = if count > MOST_LISTED { format!(" and {} more", count - MOST_LISTED) } else { String::new() };
-        self.all().take(MOST_LISTED).collect::<Vec<_>>().join(", ") + &more
+        let more = if count > MAX_LISTED { format!(" and {} more", count - MAX_LISTED) } else { String::new() };
+        self.all().take(MAX_LISTED).collect::<Vec<_>>().join(", ") + &more
     }
 }
 

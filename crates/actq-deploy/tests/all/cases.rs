@@ -42,7 +42,7 @@ struct Case {
     /// Files that are removed.
     #[serde(default)]
     remove: Vec<String>,
-    /// File, text that occurs one time in it, and its replacement.
+    /// File, text that occurs once in it, and its replacement.
     #[serde(default)]
     edit: Vec<[String; 3]>,
     /// Files that are added or replaced, and their texts.
@@ -67,7 +67,7 @@ impl Case {
         for [name, from, to] in &self.edit {
             let bytes = files.get_mut(name).with_context(|| format!("{}: there is no file {name}", self.name))?;
             let text = String::from_utf8_lossy(bytes).into_owned();
-            ensure!(text.matches(from.as_str()).count() == 1, "{}: {from:?} must occur one time in {name}", self.name);
+            ensure!(text.matches(from.as_str()).count() == 1, "{}: {from:?} must occur once in {name}", self.name);
             *bytes = text.replace(from, to).into_bytes();
         }
         files.extend(self.add.iter().map(|[name, text]| (name.clone(), text.clone().into_bytes())));

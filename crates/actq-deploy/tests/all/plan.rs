@@ -166,7 +166,7 @@ fn mistakes_are_refused_by_their_keys() {
         ("rate_hz = 50.0", "rate_hz = nan", "rate_hz = NaN"),
         ("rate_hz = 50.0", "rate = 50.0", "unknown field `rate`"),
         ("action = \"net.out\"", "action = \"net.none\"", "there is no output"),
-        ("action = \"net.out\"", "action = \"none\"", "there is no value of this name; there are"),
+        ("action = \"net.out\"", "action = \"none\"", "there is no value of this name; expected one of"),
         ("[\"right\", \"left\"]", "[\"right\", \"right\"]", "joints.policy: \"right\" occurs twice"),
         ("[\"right\", \"left\"]", "[\"right\", \"center\"]", "joints.robot has no \"center\""),
         (

@@ -12,7 +12,7 @@ use actq::policy::Policy;
 use super::inputs::{self, Kept, path_of};
 use crate::digest::of_bytes;
 use crate::error::JobError;
-use crate::figures::{Driven, Made};
+use crate::figures::{Driven, JobResult};
 use crate::host::Host;
 use crate::job::{Input, Job, Role};
 use crate::record::Outcome;
@@ -104,7 +104,7 @@ fn made(
     };
     let buffer = quantized.buffer();
     let image = buffer.image(&store.image(&job.address))?;
-    let result = Made {
+    let result = JobResult {
         image: of_bytes(&quantized.image),
         bytes: image.bytes(),
         cycles: StepTime::new(&image, CLOCK).cycles,
@@ -116,5 +116,5 @@ fn made(
         scores: quantizer.method().scores(),
     };
     let kept = Kept { path: store.image(&job.address), bytes: quantized.image };
-    Ok((Outcome::Made(result), Some(kept)))
+    Ok((Outcome::JobResult(result), Some(kept)))
 }

@@ -8,7 +8,7 @@ use actq::runtime::ImageBuffer;
 
 use crate::digest::of_file;
 use crate::error::JobError;
-use crate::figures::Made;
+use crate::figures::JobResult;
 use crate::job::{Input, Job, Role};
 use crate::record::Outcome;
 use crate::store::Store;
@@ -40,9 +40,9 @@ pub(super) fn path_of(path: Option<&Path>) -> Result<&Path, Error> {
 }
 
 /// Reads an image of the store; the inner error says why there is none.
-pub(super) fn image(address: &str, store: &Store) -> Result<Result<(Made, ImageBuffer), String>, JobError> {
+pub(super) fn image(address: &str, store: &Store) -> Result<Result<(JobResult, ImageBuffer), String>, JobError> {
     match store.read(address)? {
-        Outcome::Made(made) => {
+        Outcome::JobResult(made) => {
             let bytes = store.read_blob(&store.image(address), &made.image)?;
             Ok(Ok((made, ImageBuffer::new(&bytes))))
         }

@@ -6,7 +6,7 @@ use actq::error::{Error, Result};
 use actq::measure::eval::ErrorSums;
 
 use crate::error::JobError;
-use crate::figures::{Driven, Made};
+use crate::figures::{Driven, JobResult};
 use crate::merged::{Figures, Merged, MergedImage, MergedPolicy};
 use crate::record::Outcome;
 use crate::store::Results;
@@ -53,7 +53,7 @@ pub fn merge_finished(plan: &Merge, results: &Results<'_>) -> Result<Option<Merg
 
 fn image(row: &Row, read: Read<'_>) -> Result<MergedImage, JobError> {
     let figures = match read(&row.image)? {
-        Outcome::Made(made) => Some(figures(row, made, read)?),
+        Outcome::JobResult(made) => Some(figures(row, made, read)?),
         Outcome::Impossible(_) => None,
         _ => return Err(unexpected(&row.image)),
     };
@@ -61,7 +61,7 @@ fn image(row: &Row, read: Read<'_>) -> Result<MergedImage, JobError> {
     Ok(MergedImage { method, budget, seed, round, address: image, made: figures })
 }
 
-fn figures(row: &Row, made: Made, read: Read<'_>) -> Result<Figures, JobError> {
+fn figures(row: &Row, made: JobResult, read: Read<'_>) -> Result<Figures, JobError> {
     let mut sums: Option<ErrorSums> = None;
     for address in &row.evaluations {
         let Outcome::Evaluated(part) = read(address)? else { return Err(unexpected(address)) };

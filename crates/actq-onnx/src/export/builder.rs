@@ -3,7 +3,7 @@
 use actq::error::{Context as _, Result};
 use actq_kernels::image::Region;
 
-/// A graph. Values have the shape [batch, length]; a name is given one time.
+/// A graph. Values have the shape [batch, length]; a name is given once.
 #[derive(Clone, Debug, Default)]
 pub struct Network {
     /// Inputs with their lengths: `obs`, and if the network has them `state` and `noise`.

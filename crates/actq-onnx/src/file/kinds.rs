@@ -97,7 +97,7 @@ pub(crate) fn elements(tensor: &proto::Tensor, kind: i32, raw: Option<Bytes>, n:
                 ),
             }
         }
-        _ => bail!("the type {} has no elements here; this is an error of this program, please report it", name(kind)),
+        _ => bail!("the type {} has no elements here; internal error; please report it", name(kind)),
     })
 }
 

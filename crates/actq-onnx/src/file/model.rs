@@ -14,18 +14,18 @@ use crate::file::{kinds, proto};
 use crate::values::tensor::{Tensor, count};
 
 /// The most nodes, initializers, inputs or outputs of a graph, and attributes of a node.
-const MOST_ENTRIES: usize = 1 << 16;
+const MAX_ENTRIES: usize = 1 << 16;
 /// The most bytes of a file, which is protobuf's limit.
-const MOST_BYTES: u64 = 1 << 31;
+const MAX_BYTES: u64 = 1 << 31;
 
 /// The most bytes of the file's metadata: names and gains take a few thousand.
-const MOST_METADATA: usize = 1 << 20;
+const MAX_METADATA: usize = 1 << 20;
 
 /// The most nested graphs and functions.
-pub(crate) const MOST_DEPTH: usize = 16;
+pub(crate) const MAX_DEPTH: usize = 16;
 
 /// The first operator set whose arithmetic broadcasts as numpy does.
-const LEAST_OPSET: i64 = 7;
+const MIN_OPSET: i64 = 7;
 
 /// A node.
 #[derive(Clone, Debug)]
@@ -83,7 +83,7 @@ pub(crate) struct Model {
     folder: PathBuf,
 }
 
-/// Reads the texts of a file; refuses keys that occur twice and texts of more than [`MOST_METADATA`] bytes.
+/// Reads the texts of a file; refuses keys that occur twice and texts of more than [`MAX_METADATA`] bytes.
 fn metadata(entries: &[Bytes]) -> Result<BTreeMap<String, String>> {
     let mut texts = BTreeMap::new();
     let mut bytes = 0;
@@ -91,8 +91,8 @@ fn metadata(entries: &[Bytes]) -> Result<BTreeMap<String, String>> {
         let (key, value) = (entry.key.unwrap_or_default(), entry.value.unwrap_or_default());
         bytes += key.len() + value.len();
         ensure!(
-            bytes <= MOST_METADATA,
-            "the file has more than {MOST_METADATA} bytes of metadata; remove metadata_props"
+            bytes <= MAX_METADATA,
+            "the file has more than {MAX_METADATA} bytes of metadata; remove metadata_props"
         );
         let before = texts.insert(key.clone(), value);
         ensure!(before.is_none(), "the metadata has the key {:?} twice; remove one", printable(&key));
@@ -107,7 +107,7 @@ fn decode<M: Message + Default>(bytes: &Bytes, what: &str) -> Result<M> {
 }
 
 fn all<M: Message + Default>(list: &[Bytes], what: &str) -> Result<Vec<M>> {
-    ensure!(list.len() <= MOST_ENTRIES, "{what} have {} entries; the limit is {MOST_ENTRIES}", list.len());
+    ensure!(list.len() <= MAX_ENTRIES, "{what} have {} entries; the limit is {MAX_ENTRIES}", list.len());
     list.iter().map(|bytes| decode(bytes, what)).collect()
 }
 
@@ -115,7 +115,7 @@ impl Model {
     /// Reads a file.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let size = fs::metadata(path).context("cannot read the file")?.len();
-        ensure!(size <= MOST_BYTES, "the file has {size} bytes; the limit for an ONNX file is {MOST_BYTES}");
+        ensure!(size <= MAX_BYTES, "the file has {size} bytes; the limit for an ONNX file is {MAX_BYTES}");
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Self::parse(fs::read(path).context("cannot read the file")?.into(), folder)
     }
@@ -140,8 +140,8 @@ impl Model {
             .and_then(|set| set.version)
             .context("the file does not give the version of its ONNX operators (opset_import); export it again")?;
         ensure!(
-            opset >= LEAST_OPSET,
-            "the file uses opset {opset}, whose operators broadcast by other rules; export it with opset {LEAST_OPSET} or above"
+            opset >= MIN_OPSET,
+            "the file uses opset {opset}, whose operators broadcast by other rules; export it with opset {MIN_OPSET} or above"
         );
         let [name, version] = [&model.producer_name, &model.producer_version].map(|t| t.as_deref().unwrap_or_default());
         let producer = format!("{}, opset {opset}", printable(format!("{name} {version}").trim()));
@@ -179,14 +179,14 @@ impl Model {
         let mut files = BTreeSet::new();
         let functions = self.functions.values().map(|function| &function.graph);
         for graph in [&self.graph].into_iter().chain(functions) {
-            self.add_external_files(graph, &mut files, MOST_DEPTH)?;
+            self.add_external_files(graph, &mut files, MAX_DEPTH)?;
         }
         Ok(files)
     }
 
     /// Adds the files of a graph's tensors, and of the graphs in its nodes.
     fn add_external_files(&self, graph: &Graph, files: &mut BTreeSet<PathBuf>, depth: usize) -> Result<()> {
-        ensure!(depth > 0, "more than {MOST_DEPTH} graphs are nested");
+        ensure!(depth > 0, "more than {MAX_DEPTH} graphs are nested");
         let attributes = || graph.nodes.iter().flat_map(|node| node.attributes.values());
         for bytes in graph.initializers.values().chain(attributes().filter_map(|attribute| attribute.t.as_ref())) {
             files.extend(self.external_file(bytes)?);
@@ -315,8 +315,8 @@ impl Graph {
         let graph: proto::Graph = decode(bytes, "the graph")?;
         let nodes = nodes(&graph.node)?;
         ensure!(
-            graph.initializer.len() <= MOST_ENTRIES,
-            "the graph has {} initializers; the limit is {MOST_ENTRIES}",
+            graph.initializer.len() <= MAX_ENTRIES,
+            "the graph has {} initializers; the limit is {MAX_ENTRIES}",
             graph.initializer.len()
         );
         let mut initializers = HashMap::new();

@@ -6,7 +6,7 @@ use actq::text::printable;
 use crate::file::model::{Graph, Port};
 
 /// The most names in a message.
-const MOST_LISTED: usize = 20;
+const MAX_LISTED: usize = 20;
 
 /// Choices of the caller; none by default.
 #[derive(Clone, Debug, Default)]
@@ -66,7 +66,7 @@ impl Choice {
 
 /// Lists names for a message.
 fn listed(ports: &[Port]) -> String {
-    let names: Vec<_> = ports.iter().take(MOST_LISTED).map(|port| printable(&port.name)).collect();
+    let names: Vec<_> = ports.iter().take(MAX_LISTED).map(|port| printable(&port.name)).collect();
     let more = ports.len() - names.len();
     names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }

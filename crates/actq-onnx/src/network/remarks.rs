@@ -10,7 +10,7 @@ use crate::values::compare::uniform;
 use crate::values::expr::{Exprs, Guard};
 
 /// The most nodes between a test and the choice by it.
-const MOST_BETWEEN: usize = 6;
+const MAX_BETWEEN: usize = 6;
 
 /// Operators of the importer that are younger than the oldest set it reads, with their first operator sets.
 const FIRST_SETS: [(&str, i64); 29] = [
@@ -55,7 +55,7 @@ pub(super) fn guards(model: &Model, exprs: &Exprs, outputs: &[String]) -> Result
             let what = if guard == Guard::Nan { "NaN" } else { "infinity" };
             let mut by = BTreeSet::new();
             let name = node.outputs.first()?;
-            replacements(model, name, &mut by, MOST_BETWEEN);
+            replacements(model, name, &mut by, MAX_BETWEEN);
             let verb = match &by.into_iter().collect::<Vec<_>>()[..] {
                 _ if matches!(node.op.as_str(), "Clip" | "Max" | "Min") => format!("limits {what} to a finite number"),
                 [] => format!("tests for {what}"),

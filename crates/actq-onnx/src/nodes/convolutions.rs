@@ -12,7 +12,7 @@ use crate::values::expr::{Exprs, Matrix};
 use crate::values::tensor::{Data, Element, Tensor, count};
 
 /// The most positions times groups, each of which is an operation in the image.
-const MOST_PRODUCTS: usize = 64;
+const MAX_PRODUCTS: usize = 64;
 
 /// An axis that the kernel moves along.
 pub(crate) struct Axis {
@@ -60,8 +60,8 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     let shape: Vec<usize> = axes.iter().map(|axis| axis.positions).collect();
     let positions = count(&shape)?;
     ensure!(
-        (1..=MOST_PRODUCTS).contains(&positions.saturating_mul(groups)),
-        "has {positions} positions with {groups} groups; the limit of positions times groups is {MOST_PRODUCTS}; export the part \
+        (1..=MAX_PRODUCTS).contains(&positions.saturating_mul(groups)),
+        "has {positions} positions with {groups} groups; the limit of positions times groups is {MAX_PRODUCTS}; export the part \
          after the encoder as a separate policy"
     );
     let (rows, cols, size) = (outputs / groups, w.len() / outputs, count(kernel)?);

@@ -41,8 +41,7 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     let (right, of_b) = turned(y, &b, [&summed, &of_b])?;
     let result = product(exprs, &left, &right, 1.0, budget)?.reshaped([&of_a[0][..], &of_b[1]].concat())?;
     let order = output.iter().map(|c| joined.iter().position(|other| other == c));
-    let order: Vec<usize> =
-        order.collect::<Option<_>>().context("lost an axis; this is an error of this program, please report it")?;
+    let order: Vec<usize> = order.collect::<Option<_>>().context("lost an axis; internal error; please report it")?;
     transposed(&result, &order).map(Some)
 }
 
@@ -54,7 +53,7 @@ fn turned(x: &Tensor, axes: &[char], sides: [&[char]; 2]) -> Result<(Tensor, [Ve
         .iter()
         .map(place)
         .collect::<Option<_>>()
-        .context("lost an axis; this is an error of this program, please report it")?;
+        .context("lost an axis; internal error; please report it")?;
     let turned = transposed(x, &order)?;
     let (rows, cols) = turned.shape.split_at(sides[0].len());
     let matrix = turned.reshaped(vec![count(rows)?, count(cols)?])?;

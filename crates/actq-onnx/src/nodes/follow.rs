@@ -7,7 +7,7 @@ use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 
 use crate::file::kinds;
-use crate::file::model::{Graph, MOST_DEPTH, Model, Node, Port};
+use crate::file::model::{Graph, MAX_DEPTH, Model, Node, Port};
 use crate::file::proto;
 use crate::nodes::call::Call;
 use crate::nodes::cells;
@@ -73,14 +73,14 @@ impl<'m> Follower<'m> {
     pub(crate) fn value(&mut self, name: &str) -> Result<Tensor> {
         let mut scope = Scope::new();
         let model = self.model;
-        self.run(&model.graph, &mut scope, &[name.to_owned()], MOST_DEPTH)?;
+        self.run(&model.graph, &mut scope, &[name.to_owned()], MAX_DEPTH)?;
         let value = scope.get(name).with_context(|| format!("no node gives the value {:?}", printable(name)))?;
         Ok(Tensor::clone(value))
     }
 
     /// Converts the nodes that `targets` need.
     fn run(&mut self, graph: &'_ Graph, scope: &mut Scope, targets: &[String], depth: usize) -> Result<()> {
-        ensure!(depth > 0, "more than {MOST_DEPTH} graphs or functions are nested");
+        ensure!(depth > 0, "more than {MAX_DEPTH} graphs or functions are nested");
         let needed = needed(graph, scope, targets)?;
         let top = std::ptr::eq(graph, &self.model.graph);
         for name in &needed.names {
@@ -292,7 +292,7 @@ pub(crate) fn needed(graph: &Graph, scope: &Scope, targets: &[String]) -> Result
             && found.nodes.insert(i)
         {
             open.extend(graph.nodes[i].inputs.iter().filter(|name| !name.is_empty()).cloned());
-            captured(&graph.nodes[i], &mut open, MOST_DEPTH)?;
+            captured(&graph.nodes[i], &mut open, MAX_DEPTH)?;
         }
     }
     Ok(found)
@@ -300,7 +300,7 @@ pub(crate) fn needed(graph: &Graph, scope: &Scope, targets: &[String]) -> Result
 
 /// Collects the names that graphs in a node's attributes read, including those from outside.
 fn captured(node: &Node, names: &mut Vec<String>, depth: usize) -> Result<()> {
-    ensure!(depth > 0, "more than {MOST_DEPTH} graphs are nested");
+    ensure!(depth > 0, "more than {MAX_DEPTH} graphs are nested");
     for bytes in node.attributes.values().filter_map(|attribute| attribute.g.as_ref()) {
         let inner = Graph::parse(bytes)?;
         names.extend(inner.outputs.iter().map(|port| port.name.clone()));

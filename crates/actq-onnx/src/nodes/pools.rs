@@ -6,7 +6,7 @@ use crate::nodes::arithmetic::two;
 use crate::nodes::call::Call;
 use crate::nodes::convolutions::{axes, window};
 use crate::nodes::moves::transposed;
-use crate::nodes::reductions::MOST_COMPARED;
+use crate::nodes::reductions::MAX_COMPARED;
 use crate::values::expr::Exprs;
 use crate::values::tensor::{Data, Element, Tensor, count, room};
 
@@ -29,8 +29,8 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Opt
     let kernel = kernel.with_context(|| format!("its kernel does not fit the shape {:?}", x.shape))?;
     let size = count(&kernel)?;
     ensure!(
-        (1..=MOST_COMPARED).contains(&size),
-        "has windows of {size} values; the limit is {MOST_COMPARED}; export the part after the encoder as a separate policy"
+        (1..=MAX_COMPARED).contains(&size),
+        "has windows of {size} values; the limit is {MAX_COMPARED}; export the part after the encoder as a separate policy"
     );
     let axes = axes(call, lens, &kernel)?;
     ensure!(

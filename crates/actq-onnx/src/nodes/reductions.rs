@@ -13,7 +13,7 @@ use crate::values::expr::{Exprs, Id, Unary};
 use crate::values::tensor::{Data, Element, Tensor, count};
 
 /// The most values of a maximum, each of which takes several operations.
-pub(crate) const MOST_COMPARED: usize = 64;
+pub(crate) const MAX_COMPARED: usize = 64;
 
 /// Returns the output, if the node is such an operator.
 pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> {
@@ -182,8 +182,8 @@ fn reduce(op: &str, x: &Tensor, reduced: Reduced, exprs: &mut Exprs) -> Result<T
     let largest = matches!(op, "ReduceMax" | "ReduceMin");
     if largest || matches!(op, "ReduceSum" | "ReduceMean") && elements.chunks(each).all(of_different_values) {
         ensure!(
-            !largest || each <= MOST_COMPARED,
-            "takes the maximum or minimum of {each} values; the limit is {MOST_COMPARED}; export the part after it"
+            !largest || each <= MAX_COMPARED,
+            "takes the maximum or minimum of {each} values; the limit is {MAX_COMPARED}; export the part after it"
         );
         return slices_joined(op, exprs, &elements, each, reduced.shape);
     }

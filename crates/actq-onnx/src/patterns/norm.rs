@@ -16,11 +16,11 @@ pub(crate) struct Norm {
 }
 
 /// The least epsilon, the smallest normal number of f32.
-const LEAST_EPS: f64 = 1.2e-38;
+const MIN_EPS: f64 = 1.2e-38;
 /// The largest epsilon after a factor has moved out of a norm.
-const MOST_EPS: f64 = 1.0;
+const MAX_EPS: f64 = 1.0;
 /// Largest limit in a division by `max(length, limit)`; vectors must be much longer than it.
-const MOST_LIMIT: f64 = 1e-8;
+const MAX_LIMIT: f64 = 1e-8;
 
 impl Exprs {
     /// Finds the norm of `v` in `v * s`, for an s of one element.
@@ -32,13 +32,13 @@ impl Exprs {
         let (root, limit) = match self.affine_of(root) {
             (relu, 1.0, limit) if limit > 0.0 && self.known_of(relu, Function::Relu).is_some() => {
                 let (root, one, off) = self.affine_of(self.known_of(relu, Function::Relu)?);
-                if one != 1.0 || !near(-off, limit) || limit > MOST_LIMIT {
+                if one != 1.0 || !near(-off, limit) || limit > MAX_LIMIT {
                     return None;
                 }
                 (root, limit)
             }
             // `length + limit` differs from that by at most the limit.
-            (root, 1.0, limit) if (0.0..=MOST_LIMIT).contains(&limit) => (root, limit),
+            (root, 1.0, limit) if (0.0..=MAX_LIMIT).contains(&limit) => (root, limit),
             _ => (root, 0.0),
         };
         let (square, a, e) = self.affine_of(self.operand_of(root, Unary::Sqrt)?);
@@ -53,7 +53,7 @@ impl Exprs {
         if scale <= 0.0 || added < 0.0 || limited.is_some() && (k < 0.0 || rest < 0.0) {
             return None;
         }
-        Some(Norm { factor: factor / scale.sqrt(), eps: (added / scale).max(LEAST_EPS), centred })
+        Some(Norm { factor: factor / scale.sqrt(), eps: (added / scale).max(MIN_EPS), centred })
     }
 
     /// Returns the u for which `v = u - mean(u)`.
@@ -82,7 +82,7 @@ impl Exprs {
     fn unscaled(&self, x: Id, eps: f64) -> (Id, f64, f64) {
         let (of, k, _) = self.affine_of(x);
         let eps_of = eps / (k * k);
-        if (LEAST_EPS..=MOST_EPS).contains(&eps_of) { (of, k.signum(), eps_of) } else { (x, 1.0, eps) }
+        if (MIN_EPS..=MAX_EPS).contains(&eps_of) { (of, k.signum(), eps_of) } else { (x, 1.0, eps) }
     }
 
     /// Returns the layer norm of `x`. A common offset of all elements cancels, as it is in the mean, too.

@@ -9,7 +9,7 @@ use crate::values::expr::{Expr, Exprs, Id, Run};
 use crate::values::tensor::Element;
 
 /// The most rows, each of which takes separate operations.
-const MOST_ROWS: usize = 256;
+const MAX_ROWS: usize = 256;
 /// The most operations between sums and a number that is computed from them.
 const DEPTH: usize = 16;
 
@@ -30,7 +30,7 @@ fn rows(exprs: &mut Exprs, at: &[usize], operand: &[Element]) -> Option<Vec<Vec<
         let row = *row_of.entry(number).or_insert(rows.len());
         match rows.get_mut(row) {
             Some((_, places)) => places.push(place),
-            None if row < MOST_ROWS => rows.push((number, vec![place])),
+            None if row < MAX_ROWS => rows.push((number, vec![place])),
             None => return None,
         }
     }
@@ -70,7 +70,7 @@ impl Exprs {
         let lone = match *self.get(of) {
             Expr::Sum(_) => Some(of),
             Expr::Spread(one) => at(self, one, 0),
-            Expr::Pick(ref runs) if runs.len() <= MOST_ROWS => {
+            Expr::Pick(ref runs) if runs.len() <= MAX_ROWS => {
                 let run = *cut(runs, Run { of, from: i, len: 1 }).first()?;
                 at(self, run.of, run.from)
             }

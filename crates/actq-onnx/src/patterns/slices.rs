@@ -4,7 +4,7 @@ use crate::values::elements::value;
 use crate::values::expr::{Expr, Exprs, Id, Run};
 
 /// The most elements of a row that becomes a sum of slices.
-const MOST_SLICES: usize = 64;
+const MAX_SLICES: usize = 64;
 
 /// Converts sums of adjacent runs to a sum of slices, if that takes fewer operations. `new` maps expressions to their
 /// replacements.
@@ -47,7 +47,7 @@ struct RowOfSum {
 fn row_of_sum(exprs: &Exprs, id: Id) -> Option<RowOfSum> {
     let (sum, factor, offset) = exprs.affine_of(id);
     let &Expr::Sum(row) = exprs.get(sum) else { return None };
-    if exprs.len_of(row) > MOST_SLICES {
+    if exprs.len_of(row) > MAX_SLICES {
         return None;
     }
     let elements = exprs.elements(row).iter().map(value).collect::<Option<_>>()?;

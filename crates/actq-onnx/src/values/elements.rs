@@ -69,5 +69,5 @@ pub(crate) fn open_vector(exprs: &mut Exprs, elements: &[Element]) -> Result<Id>
     }
     let mut constants = constants.into_iter();
     let values: Option<Vec<(Id, usize)>> = elements.iter().map(|e| value(e).or_else(|| constants.next())).collect();
-    Ok(exprs.vector(&values.context("lost a constant; this is an error of this program, please report it")?))
+    Ok(exprs.vector(&values.context("lost a constant; internal error; please report it")?))
 }

@@ -1,4 +1,4 @@
-//! Expressions over vectors, each stored one time, in the order of the graph.
+//! Expressions over vectors, each stored once, in the order of the graph.
 
 use std::collections::{BTreeSet, HashMap};
 use std::mem::discriminant;

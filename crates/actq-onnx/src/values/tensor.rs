@@ -35,11 +35,11 @@ pub(crate) struct Tensor {
 }
 
 /// The most elements of a tensor, with empty axes counted as 1. It bounds the work along an axis.
-const MOST_ELEMENTS: usize = 1 << 28;
+const MAX_ELEMENTS: usize = 1 << 28;
 
 /// Returns the number of elements of a shape.
 pub(crate) fn count(shape: &[usize]) -> Result<usize> {
-    let product = shape.iter().try_fold(1usize, |n, &d| n.checked_mul(d.max(1)).filter(|&n| n <= MOST_ELEMENTS));
+    let product = shape.iter().try_fold(1usize, |n, &d| n.checked_mul(d.max(1)).filter(|&n| n <= MAX_ELEMENTS));
     let empty = shape.contains(&0);
     let fits = product.filter(|&n| !empty || n <= 1 << 16);
     ensure!(fits.is_some(), "shape {shape:?} exceeds the limit of a tensor's elements");
@@ -136,7 +136,7 @@ impl Tensor {
             Data::Int(v) => pick(v, places).map(Data::Int),
             Data::Open(v) => return Ok(Self::of_elements(shape, pick(v, places).unwrap_or_default())),
         };
-        ensure!(data.is_some(), "a place is outside the tensor; this is an error of this program, please report it");
+        ensure!(data.is_some(), "a place is outside the tensor; internal error; please report it");
         Ok(Self::new(shape, data.unwrap_or(Data::Int(Vec::new()))))
     }
 }

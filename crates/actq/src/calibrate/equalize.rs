@@ -28,7 +28,7 @@ const FRAMES: usize = 1024;
 const RANDOM_FRAMES: usize = 256;
 /// Least mean square of an element, as a share of the largest in its unit: a relu that hardly ever lets its sum through
 /// counts as one that does so now and then.
-const LEAST_SHARE: f64 = 1.0 / 1024.0;
+const MIN_SHARE: f64 = 1.0 / 1024.0;
 /// Largest exponent of a factor, to the base of 2: `eps` of a norm, which takes its square, stays a normal number.
 const MAX_EXPONENT: f64 = 40.0;
 
@@ -207,7 +207,7 @@ impl Elements {
                 let input = self.range(graph, node.inputs[0]);
                 let roots: Vec<usize> = input.map(|element| roots[element]).collect();
                 let values = squares[node.inputs[0]].iter().zip(&roots);
-                let h: Vec<f64> = values.map(|(square, &root)| square.max(LEAST_SHARE * largest[root])).collect();
+                let h: Vec<f64> = values.map(|(square, &root)| square.max(MIN_SHARE * largest[root])).collect();
                 let a = relative_energies(&graph.matrices[product.matrix], &h);
                 let of_fixed = |of: &[f64]| -> f64 {
                     of.iter().zip(&roots).filter(|(_, root)| self.fixed[**root]).map(|(value, _)| value).sum()

@@ -30,7 +30,7 @@ const MAX_MULTIPLICATIONS: usize = 1 << 34;
 const MAX_VALUES: usize = 1_024;
 /// Share of the next observation's variance above which the model's rollouts are learned from. What it predicts beyond
 /// that is their share of the widened windows: at most half of them.
-const LEAST_PREDICTED: f64 = 0.5;
+const MIN_PREDICTED: f64 = 0.5;
 /// Largest share of the difference of two recorded observations that a rollout begins beside the recording.
 const LARGEST_SHIFT: f32 = 0.5;
 /// Deviation of the answers' errors, in deviations of the answers, and the share of a residual that is added. A
@@ -73,7 +73,7 @@ impl Imagined {
 
     /// Draws the rollout of a widened window; `None` for a recorded one.
     pub(super) fn draw(&self, random: &mut Random) -> Option<&Rollout> {
-        let share = (self.predicted - LEAST_PREDICTED) as f32;
+        let share = (self.predicted - MIN_PREDICTED) as f32;
         let is_imagined = !self.rollouts.is_empty() && random.share() < share;
         is_imagined.then(|| &self.rollouts[random.below(self.rollouts.len())])
     }
@@ -108,7 +108,7 @@ impl Recorded<'_> {
         let answers: Vec<Array2<f32>> = (0..self.episodes.len()).map(|episode| self.answers(episode)).collect();
         let model = Dynamics::fit(self.episodes, &answers)?;
         let predicted = model.predicted;
-        let rollouts = match predicted > LEAST_PREDICTED {
+        let rollouts = match predicted > MIN_PREDICTED {
             true => self.rollouts(&model, &answers, &mut Random::new(seed)),
             false => Vec::new(),
         };
@@ -309,7 +309,7 @@ mod tests {
         let dataset = driven(&graph, 4, 120);
         let Imagined { rollouts, predicted } =
             with(&graph, &dataset, |recorded| recorded.imagine(1)).expect("a model of the robot");
-        assert!(predicted > LEAST_PREDICTED, "{predicted}");
+        assert!(predicted > MIN_PREDICTED, "{predicted}");
         let (mut steps, mut moved) = (0, 0.0f32);
         for Rollout { episode, start, frames } in &rollouts {
             assert!(start + frames.nrows() <= 120 && frames.nrows() <= STEPS);
@@ -340,7 +340,7 @@ mod tests {
     fn random_frames_have_no_rollouts() {
         let graph = mlp();
         let imagined = with(&graph, &dataset(&graph, 4, 60), |recorded| recorded.imagine(1)).expect("a model");
-        assert!(imagined.predicted < LEAST_PREDICTED && imagined.frames() == 0, "{imagined:?}");
+        assert!(imagined.predicted < MIN_PREDICTED && imagined.frames() == 0, "{imagined:?}");
         assert!((0..20).all(|seed| imagined.draw(&mut Random::new(seed)).is_none()));
     }
 

@@ -19,7 +19,7 @@ use crate::random::Random;
 const BATCHES: usize = 24;
 const SAMPLES: usize = 128;
 /// Least batches, however short the time.
-const LEAST_BATCHES: usize = 2;
+const MIN_BATCHES: usize = 2;
 /// Frames of [`drawn_moments`].
 const DRAWN: usize = 12_288;
 /// Damping of an input's moment: added to its diagonal, as a share of the diagonal's mean.
@@ -42,7 +42,7 @@ pub fn output_moments(windows: &Windows, allowance: Option<Allowance>, seed: u64
         }
     };
     let batches = match allowance {
-        Some(allowance) => allowance.fits(1, &mut one, LEAST_BATCHES, BATCHES),
+        Some(allowance) => allowance.fits(1, &mut one, MIN_BATCHES, BATCHES),
         None => BATCHES,
     };
     let done = usize::from(allowance.is_some());

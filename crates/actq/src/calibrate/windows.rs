@@ -14,7 +14,7 @@ use crate::random::Random;
 const WINDOW: usize = 64;
 /// Share of the windows that start from the zero state, wherever they are.
 const FROM_ZERO: f32 = 0.15;
-/// Episodes that a thread runs at one time.
+/// Episodes that a thread runs at once.
 const EPISODES: usize = 8;
 /// One episode in this many is held out to measure choices.
 const HELD_OUT: usize = 4;
@@ -230,7 +230,7 @@ impl Windows {
     }
 }
 
-/// Runs a network over some episodes at one time; returns its states before each step.
+/// Runs a network over some episodes at once; returns its states before each step.
 fn states_of(network: &Network<'_>, weights: &Weights, episodes: &[(&Array2<f32>, &State)]) -> Vec<State> {
     let graph = network.graph;
     let mut state = zero_state(graph, episodes.len());

@@ -14,9 +14,9 @@ use crate::policy::Policy;
 
 /// Most frames to learn from; a larger recording is thinned to the most diverse frames (`docs/QUANTIZER.md`,
 /// Recordings). Statistics are collected frame by frame, in order.
-pub const MOST_FRAMES: usize = 400_000;
+pub const MAX_FRAMES: usize = 400_000;
 /// Most bytes of a joined recording, padding counted.
-const MOST_BYTES: usize = 4 << 30;
+const MAX_BYTES: usize = 4 << 30;
 
 /// The recording to learn from, and its sources.
 #[derive(Clone, Debug)]
@@ -55,7 +55,7 @@ impl Learned {
     /// Joins recordings that fit the network. Episodes are padded to the longest. If only some have actions, the f32
     /// network fills in the others (in `parts` as well); if only some have states, the others are zero.
     pub fn join(parts: &mut [Dataset], graph: &Graph) -> Result<Self> {
-        Self::at_most(MOST_FRAMES, parts, graph)
+        Self::at_most(MAX_FRAMES, parts, graph)
     }
 
     fn at_most(most: usize, parts: &mut [Dataset], graph: &Graph) -> Result<Self> {
@@ -109,13 +109,13 @@ fn gather(parts: &[Dataset], chosen: &[Vec<Place>], state_len: usize) -> Result<
     let widths = [Some(&first.obs), first.action.as_ref()].into_iter().flatten().map(|array| array.dim().2);
     let bytes = widths.sum::<usize>().saturating_mul(chosen.len()).saturating_mul(longest).saturating_mul(4);
     ensure!(
-        bytes <= MOST_BYTES,
+        bytes <= MAX_BYTES,
         "{} and the recordings joined with it: {} episodes, padded to the longest of {longest} steps, take {} MiB, {} are the \
          most; cut the longest into windows that begin with their \"state\"",
         first.path.display(),
         chosen.len(),
         bytes >> 20,
-        MOST_BYTES >> 20
+        MAX_BYTES >> 20
     );
     let rows = |array: &dyn Fn(&Dataset) -> Option<&Array3<f32>>| -> Option<Array3<f32>> {
         let arrays = parts.iter().map(array).collect::<Option<Vec<_>>>()?;

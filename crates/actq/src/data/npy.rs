@@ -10,7 +10,7 @@ use crate::import::values::{Tensor, Values};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// Most bytes of a header's text; numpy writes about a hundred, and reads at most 10,000.
-const MOST_HEADER: usize = 1 << 16;
+const MAX_HEADER: usize = 1 << 16;
 
 /// Content of a header.
 #[derive(Debug, PartialEq)]
@@ -34,7 +34,7 @@ pub(super) fn read(source: &mut impl Read, bytes: u64) -> Result<Tensor> {
     };
     source.read_exact(&mut front[8..8 + length_bytes]).context("truncated in its header")?;
     let header_len = u32::from_le_bytes([front[8], front[9], front[10], front[11]]) as usize;
-    ensure!(header_len <= MOST_HEADER, "its header takes {header_len} bytes, but at most {MOST_HEADER} are allowed");
+    ensure!(header_len <= MAX_HEADER, "its header takes {header_len} bytes, but at most {MAX_HEADER} are allowed");
     let mut text = vec![0; header_len];
     source.read_exact(&mut text).context("truncated in its header")?;
     let text = String::from_utf8(text).context("its header is not UTF-8 text")?;
@@ -72,7 +72,7 @@ pub fn npy_header(descr: &str, shape: &[usize]) -> Vec<u8> {
 }
 
 impl Header {
-    /// Parses `{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }`, with the keys in any order, each one time.
+    /// Parses `{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }`, with the keys in any order, each once.
     fn parse(text: &str) -> Option<Self> {
         let mut rest = Literal(text);
         let (mut descr, mut fortran_order, mut shape) = (None, None, None);

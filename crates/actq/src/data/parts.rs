@@ -10,7 +10,7 @@ use crate::graph::{Evaluator, Graph};
 /// Frames to hold out in all parts together: fewer successive frames are a few situations, whose error is chance.
 const HELD_OUT_FRAMES: usize = 400;
 /// Least parts: images that learned from other frames differ by chance.
-const LEAST_PARTS: usize = 2;
+const MIN_PARTS: usize = 2;
 /// Frames of a recording below which a part is a fifth, else a tenth.
 const SHORT: usize = 1000;
 
@@ -30,7 +30,7 @@ impl Dataset {
     pub fn parts(&self, graph: &Graph, least: usize) -> Vec<Part> {
         let frames = self.frames();
         let divisor = if frames < SHORT && frames - frames.div_ceil(5) >= least { 5 } else { 10 };
-        let count = (HELD_OUT_FRAMES * divisor).div_ceil(frames.max(1)).clamp(LEAST_PARTS, 5);
+        let count = (HELD_OUT_FRAMES * divisor).div_ceil(frames.max(1)).clamp(MIN_PARTS, 5);
         let parts = (0..count).map(|i| self.part(graph, (2 * i + 1) * divisor / (2 * count), divisor));
         parts.filter(|part| part.learned.frames() >= least && part.held_out.frames() > 0).collect()
     }

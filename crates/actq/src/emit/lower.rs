@@ -25,7 +25,7 @@ pub struct Program {
     pub state: Region,
     /// Observation.
     pub observation: Region,
-    /// First operation of the denoising steps. Earlier ones run one time per evaluation; 0 if all run every time.
+    /// First operation of the denoising steps. Earlier ones run once per evaluation; 0 if all run every time.
     pub first_denoising_op: usize,
     /// The network's output.
     pub output: Region,

@@ -54,7 +54,7 @@ impl Denoising {
         Iterates { x: array(x), y: array(y) }
     }
 
-    /// Goes back through a step. From the derivatives by the iterate and the network's input after it, it computes
+    /// Backpropagates through a step. From the derivatives by the iterate and the network's input after it, it computes
     /// those by the iterate before it and by the network's output.
     pub(super) fn back(&self, step: usize, at: &Iterates, v: &Array2<f32>, d: Iterates) -> (Array2<f32>, Array2<f32>) {
         let by = &self.steps[step];

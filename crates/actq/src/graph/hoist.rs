@@ -1,7 +1,7 @@
 //! Turns a network of observation, time and iterate into an iterative head that computes nothing twice.
 //!
 //! Values that depend on the time alone become a table, since the steps are known when the image is built. Values that
-//! depend on the observation alone are computed one time per output. A linear layer over several of these,
+//! depend on the observation alone are computed once per output. A linear layer over several of these,
 //! concatenated, is split into their columns.
 
 use ndarray::Array2;

@@ -28,7 +28,7 @@ impl Node {
 pub struct Graph {
     /// Length of an observation.
     pub obs_len: usize,
-    /// Weight matrices; each is quantized one time, however many nodes use it.
+    /// Weight matrices; each is quantized once, however many nodes use it.
     pub matrices: Vec<WeightMatrix>,
     /// Nodes in the order of evaluation; the last one's output is the network's.
     pub nodes: Vec<Node>,

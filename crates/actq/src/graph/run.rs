@@ -1,6 +1,6 @@
 //! The network on batches, forwards and backwards: the only interpreter of a graph in f32.
 //!
-//! Values are matrices `[sample, element]`, or, if several steps run at one time, `[frame, element]`: all samples of
+//! Values are matrices `[sample, element]`, or, if several steps run at once, `[frame, element]`: all samples of
 //! the first step, then all of the second. Only nodes with a state see the difference; for all others a sequence is a
 //! larger batch. The gradient runs back through all steps. The tests compare the derivatives with finite differences.
 
@@ -17,7 +17,7 @@ use super::weights::{Derivatives, State, Weights};
 /// Values of a forward pass.
 #[derive(Debug)]
 pub struct Pass {
-    /// The observation, then every node's output; for an iterative head, only nodes that run one time.
+    /// The observation, then every node's output; for an iterative head, only nodes that run once.
     pub values: Vec<Array2<f32>>,
     saved: Vec<Saved>,
     /// Values of each denoising step.
@@ -41,7 +41,7 @@ struct OfStep<'v> {
     step: usize,
     /// Value that the network reads of the iterate.
     iterate: &'v Array2<f32>,
-    /// Values of the nodes that run one time.
+    /// Values of the nodes that run once.
     once: &'v [Array2<f32>],
 }
 
@@ -51,7 +51,7 @@ impl Pass {
         self.denoised.as_ref().unwrap_or_else(|| &self.values[self.values.len() - 1])
     }
 
-    /// Returns every value with its identifier; those of denoising steps one time for each step.
+    /// Returns every value with its identifier; those of denoising steps once for each step.
     pub fn all_values(&self) -> impl Iterator<Item = (ValueId, &Array2<f32>)> {
         let of_step = |step: &'_ StepPass| self.values.len()..self.values.len() + step.values.len();
         let of_steps = self.steps.iter().flat_map(move |step| of_step(step).zip(&step.values));
@@ -162,7 +162,7 @@ impl<'a> Network<'a> {
         nodes.iter().zip(&pass.saved).chain(of_steps).flat_map(of_node)
     }
 
-    /// Goes back through a pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state
+    /// Backpropagates through a pass. `d_output` is the loss's derivative by the network's output; `d_state`, by the state
     /// after the pass, becomes that by the state before it. Returns the derivatives by the weights.
     pub fn backward(&self, weights: &Weights, pass: Pass, d_output: Array2<f32>, d_state: &mut State) -> Derivatives {
         let nodes = self.graph.nodes.len();
@@ -201,7 +201,7 @@ struct Back<'a, 'n> {
 }
 
 impl Back<'_, '_> {
-    /// Goes back through the nodes from `first` on: those of a denoising step, or those that run one time. Returns the
+    /// Backpropagates through the nodes from `first` on: those of a denoising step, or those that run once. Returns the
     /// derivative by the value that the network reads of the iterate.
     fn through(&mut self, first: usize, values: Values<'_>, saved: Vec<Saved>, step: usize) -> Option<Array2<f32>> {
         let mut d_iterate = None;

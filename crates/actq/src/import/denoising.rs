@@ -8,7 +8,7 @@ use crate::graph::Denoising;
 use crate::numbers::positive;
 
 /// Most steps of a policy; an image has room for 65535.
-const MOST_STEPS: usize = 1000;
+const MAX_STEPS: usize = 1000;
 
 /// Keys of `policy.json` for the kinds flow and diffusion.
 #[derive(Debug, Default, Deserialize, Serialize)]
@@ -154,7 +154,7 @@ impl JsonDenoising {
     /// eta 0. The cosine schedule is that of Nichol and Dhariwal, arXiv 2102.09672, equation 17.
     pub(super) fn diffusion(&self, len: usize) -> Result<Schedule> {
         let train = self.train_steps.context("kind diffusion needs the key train_steps")?;
-        ensure!((1..=MOST_STEPS).contains(&train), "train_steps is {train}; it must be 1 to {MOST_STEPS}");
+        ensure!((1..=MAX_STEPS).contains(&train), "train_steps is {train}; it must be 1 to {MAX_STEPS}");
         let steps = if self.steps.or(self.euler_steps).is_some() { self.step_count()? } else { train };
         ensure!(steps <= train, "steps is {steps}, but train_steps is only {train}");
         let remaining = self.remaining(train)?;
@@ -180,7 +180,7 @@ impl JsonDenoising {
             (Some(_), Some(_)) => bail!("steps and euler_steps are synonyms; remove one of them"),
             (steps, euler) => steps.or(euler).context("kind flow needs the key steps")?,
         };
-        ensure!((1..=MOST_STEPS).contains(&steps), "steps is {steps}; it must be 1 to {MOST_STEPS}");
+        ensure!((1..=MAX_STEPS).contains(&steps), "steps is {steps}; it must be 1 to {MAX_STEPS}");
         Ok(steps)
     }
 

@@ -218,7 +218,7 @@ impl Keys for OpKeys<'_, '_> {
         self.text(key)?.map(|name| self.builder.weights.vector(name, len)).transpose()
     }
 
-    /// Reads a matrix that several ops share one time.
+    /// Reads a matrix that several ops share once.
     fn matrix(&mut self, key: &str, rows: Option<usize>, cols: usize) -> Result<(usize, usize)> {
         let matrix = self.builder.weights.matrix(required(self.text(key)?, key)?, rows, cols)?;
         let rows = matrix.rows;

@@ -12,14 +12,14 @@ use crate::policy::Policy;
 
 /// Most MACs of a run over the calibration recording, about half a second of the executor on a host; a longer recording
 /// is thinned.
-const MOST_MACS: usize = 600_000_000;
+const MAX_MACS: usize = 600_000_000;
 
 /// Most MACs of a run over the held-out recording: all but the longest recordings then give the same error as `actq
 /// eval`.
-const MOST_HELDOUT_MACS: usize = 20_000_000_000;
+const MAX_HELDOUT_MACS: usize = 20_000_000_000;
 
 /// Frames that are always kept: an iterative head runs its network many times for each.
-const LEAST_FRAMES: usize = 200;
+const MIN_FRAMES: usize = 200;
 
 /// Errors of an image on a recording, or on a thinned one if it is long.
 #[derive(Clone, Debug)]
@@ -92,12 +92,12 @@ fn two_digits(number: f64) -> usize {
 /// Returns the frames of a recording that are learned from or held out that are compared, with actions: all, or evenly
 /// spaced ones of a long recording.
 pub(crate) fn compared(graph: &Graph, dataset: &Dataset) -> Dataset {
-    thinned(graph, dataset, MOST_MACS)
+    thinned(graph, dataset, MAX_MACS)
 }
 
 fn thinned(graph: &Graph, dataset: &Dataset, most: usize) -> Dataset {
     let macs = graph.weights().max(1) * graph.denoising_steps();
-    let mut dataset = dataset.thinned((most / macs).max(LEAST_FRAMES), graph.state_len() > 0).into_owned();
+    let mut dataset = dataset.thinned((most / macs).max(MIN_FRAMES), graph.state_len() > 0).into_owned();
     dataset.fill_actions(graph);
     dataset
 }
@@ -117,8 +117,8 @@ pub fn check(
         let report = eval::evaluate(image, &compared)?;
         Ok(Some((compared, Checked { report, recorded: whole.frames() })))
     };
-    let calib = checked(recordings.calib.as_ref(), MOST_MACS)?;
-    let heldout = checked(recordings.heldout.as_ref(), MOST_HELDOUT_MACS)?;
+    let calib = checked(recordings.calib.as_ref(), MAX_MACS)?;
+    let heldout = checked(recordings.heldout.as_ref(), MAX_HELDOUT_MACS)?;
     let Some((compared, of)) = heldout.as_ref().or(calib.as_ref()) else { return Ok(None) };
     let activations = eval::activation_share(image, compared, of.report.nmse)?;
     let [heldout, calib] = [heldout, calib].map(|checked| checked.map(|(_, checked)| checked));

@@ -14,9 +14,9 @@ use crate::graph::Graph;
 /// NMSE up to which recorded actions are the policy's: runs in other arithmetic and actions stored in f16 are closer.
 const SAME: f64 = 1e-6;
 /// Most MACs of the f32 policy for a comparison, about half a second.
-const MOST_MACS: usize = 600_000_000;
+const MAX_MACS: usize = 600_000_000;
 /// Frames that are always compared.
-const LEAST_FRAMES: usize = 200;
+const MIN_FRAMES: usize = 200;
 /// Steps by which recorded actions may be late, or early if below 0.
 const DELAYS: RangeInclusive<isize> = -5..=10;
 /// Relative fall of the unexplained part for which a delay, then a mix of axes, is named.
@@ -40,7 +40,7 @@ pub struct Difference {
     pub recording: String,
     /// Mean over the actions of (mean squared difference / variance of the policy's actions).
     pub nmse: f64,
-    /// What the recorded actions are, for people; empty if nothing explains them.
+    /// What the recorded actions are, human-readable; empty if nothing explains them.
     pub causes: Vec<String>,
     /// Part that remains unexplained, as a share of the recorded variance.
     pub rest: f64,
@@ -86,7 +86,7 @@ pub fn use_policy_of(dataset: &mut Dataset, graph: &Graph) -> Option<Difference>
 pub fn difference(dataset: &Dataset, graph: &Graph) -> Option<Difference> {
     dataset.action.as_ref()?;
     let macs = graph.weights().max(1) * graph.denoising_steps();
-    let most = (MOST_MACS / macs).max(LEAST_FRAMES);
+    let most = (MAX_MACS / macs).max(MIN_FRAMES);
     // Successive steps show delays; frames from the whole recording show what happens later.
     let in_order = Pairs::of(&dataset.thinned(most, true), graph)?;
     let spread = (graph.state_len() == 0).then(|| Pairs::of(&dataset.thinned(most, false), graph)).flatten();

@@ -28,7 +28,7 @@ pub use statistics::{MIN_FRAMES, RowStatistics};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::learning::{Choice, Learning, Recipe, Tried};
+use super::learning::{Choice, Learning, Recipe, Trial};
 use super::options::Options;
 use super::packing::Activations;
 use super::progress::Progress;
@@ -47,9 +47,9 @@ use choose::{Chosen, choose, errors};
 use compact::add_to_bias;
 use feedback::feedback;
 use schedule::Bounds;
-use shape::{Goal, Shape, values};
+use shape::{Shape, Target, values};
 use size::Size;
-use train::{Learned, Present, Task, distill};
+use train::{Baseline, Task, TrainResult, distill};
 use trials::choose_recipe;
 
 /// Quantizes a network. The result lacks hidden elements without bits; its biases and norms have been learned.
@@ -60,10 +60,10 @@ pub fn quantize(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<QuantizedNetwork> {
     check_names(&statistics.windows.graph, options)?;
-    let goal = Goal { statistics, rate, options };
+    let goal = Target { statistics, rate, options };
     let (candidate, chosen) = choose_candidate(goal, progress)?;
     let bounds = chosen.bounds;
-    let (Learned { quantized, graph: learned, .. }, learning) = learn(goal, &candidate, chosen, progress);
+    let (TrainResult { quantized, graph: learned, .. }, learning) = learn(goal, &candidate, chosen, progress);
     let outcomes = outcomes(goal, &candidate, &learned, &quantized, bounds)?;
     let cycles = candidate.shape.cycles;
     let outcomes = with_allocations(statistics, candidate, outcomes);
@@ -84,8 +84,8 @@ fn check_names(graph: &Graph, options: &Options) -> Result<()> {
 }
 
 /// Chooses the network to quantize, and learning or feedback.
-fn choose_candidate(goal: Goal<'_>, progress: &mut dyn FnMut(Progress)) -> Result<(Candidate, Chosen)> {
-    let Goal { statistics: RowStatistics { windows, .. }, options, .. } = goal;
+fn choose_candidate(goal: Target<'_>, progress: &mut dyn FnMut(Progress)) -> Result<(Candidate, Chosen)> {
+    let Target { statistics: RowStatistics { windows, .. }, options, .. } = goal;
     let usual = Recipe::new(Widening::of(windows.recurrent()));
     let recipe = options.choice.and_then(Choice::recipe).unwrap_or(usual);
     let mut choosing = |share, error| progress(Progress::Choosing { share, error });
@@ -104,15 +104,15 @@ fn choose_candidate(goal: Goal<'_>, progress: &mut dyn FnMut(Progress)) -> Resul
 
 /// Learns, or takes two-sided error feedback; also feedback if learning has made the network worse.
 fn learn(
-    goal: Goal<'_>,
+    goal: Target<'_>,
     candidate: &Candidate,
     Chosen { choice, bounds, mut tried, share: from }: Chosen,
     progress: &mut dyn FnMut(Progress),
-) -> (Learned, Learning) {
-    let Goal { statistics: RowStatistics { windows, moments, .. }, options, .. } = goal;
+) -> (TrainResult, Learning) {
+    let Target { statistics: RowStatistics { windows, moments, .. }, options, .. } = goal;
     let fed_back = |damping: f64| {
         let (quantized, graph) = feed_back(candidate, options.group, moments, damping);
-        Learned { quantized, graph, steps: 0 }
+        TrainResult { quantized, graph, steps: 0 }
     };
     let recipe = match choice {
         Choice::Feedback { damping } => {
@@ -121,7 +121,7 @@ fn learn(
         Choice::Learning(recipe) => recipe,
     };
     let task = Task { bounds, ..candidate.task(goal, recipe) };
-    let learned = distill(&task, windows, &mut |Present { share, error, held_out }| {
+    let learned = distill(&task, windows, &mut |Baseline { share, error, held_out }| {
         progress(Progress::Learning { share: from + (1.0 - from) * share, error, held_out });
     });
     let before = fed_back(DAMPING_INPUT);
@@ -129,7 +129,7 @@ fn learn(
     let [after, start, feedback] =
         [(choice, &learned), (choice, &task.start()), (damping, &before)].map(|(choice, of)| {
             let [recorded, widened] = errors(&task, &of.graph, &of.quantized, windows);
-            Tried { choice, recorded, widened }
+            Trial { choice, recorded, widened }
         });
     if is_kept(&after, &start, &feedback) {
         let learning = Learning { steps: learned.steps, discarded: 0, choice, tried };
@@ -142,14 +142,14 @@ fn learn(
 /// `true` if learning has not raised the error of what it started from, nor is feedback better. Feedback fits the
 /// recorded observations more closely than others, so it has to be better at the widened ones, too. An error that is
 /// not a number counts as higher.
-fn is_kept(learned: &Tried, start: &Tried, feedback: &Tried) -> bool {
+fn is_kept(learned: &Trial, start: &Trial, feedback: &Trial) -> bool {
     learned.recorded <= start.recorded && (learned.recorded <= feedback.recorded || learned.widened <= feedback.widened)
 }
 
 /// Returns the matrices with the activations that they get: int16 has another layout, which may pad more, so a matrix
 /// gets it only if it still fits.
 fn outcomes(
-    Goal { statistics, rate, options }: Goal<'_>,
+    Target { statistics, rate, options }: Target<'_>,
     candidate: &Candidate,
     learned: &Graph,
     quantized: &[Quantized],
@@ -234,7 +234,7 @@ mod tests {
     #[test]
     fn learning_counts_only_if_it_lowers_the_error() {
         let tried =
-            |recorded, widened| Tried { choice: Choice::Feedback { damping: DAMPING_INPUT }, recorded, widened };
+            |recorded, widened| Trial { choice: Choice::Feedback { damping: DAMPING_INPUT }, recorded, widened };
         let (start, feedback) = (tried(1.0, 2.0), tried(0.5, 1.0));
         let kept = |recorded, widened| is_kept(&tried(recorded, widened), &start, &feedback);
         assert!(kept(0.4, 0.9) && kept(0.4, 1.1), "lower at the recorded observations");

@@ -80,13 +80,13 @@ pub struct Learning {
     /// Selected way.
     pub choice: Choice,
     /// Ways that were compared.
-    pub tried: Vec<Tried>,
+    pub tried: Vec<Trial>,
 }
 
 /// A choice and its errors: the mean over samples and outputs of squared error over variance. Learning is compared with
 /// feedback on held-out episodes, and settings of learning on all.
 #[derive(Clone, Copy, Debug)]
-pub struct Tried {
+pub struct Trial {
     /// The choice.
     pub choice: Choice,
     /// Error at the recorded observations.

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::distill::MIN_FRAMES;
 use super::learning::Choice;
 use super::packing::{Activations, Packing};
-use super::prepared::LEAST_FRAMES;
+use super::prepared::MIN_COUNTED_FRAMES;
 use super::quantized::Outcome;
 use crate::budget::{Budget, Rate};
 use crate::data::Dataset;
@@ -52,7 +52,7 @@ impl Method {
     pub fn least_frames(&self) -> usize {
         match self {
             Self::Rtn => 0,
-            Self::Gptq | Self::Custom(_) => LEAST_FRAMES,
+            Self::Gptq | Self::Custom(_) => MIN_COUNTED_FRAMES,
             Self::Distill => MIN_FRAMES,
         }
     }
@@ -159,7 +159,7 @@ impl Effort {
 }
 
 /// The most minutes that learning may be limited to: a week.
-pub const MOST_MINUTES: f64 = 10_080.0;
+pub const MAX_MINUTES: f64 = 10_080.0;
 
 /// Options of a quantization.
 #[derive(Clone, Debug)]

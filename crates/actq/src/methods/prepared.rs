@@ -21,14 +21,14 @@ use crate::error::{Context as _, Result, ensure};
 use crate::graph::Graph;
 
 /// Least frames of a method with a recording; distill needs more.
-pub(super) const LEAST_FRAMES: usize = 16;
+pub(super) const MIN_COUNTED_FRAMES: usize = 16;
 
 /// Most input vectors of an iterative head's matrices in statistics; every frame gives one per denoising step.
-const MOST_VECTORS: usize = 8192;
+const MAX_VECTORS: usize = 8192;
 
 /// Least frames of an iterative head in statistics, however short the time; also the frames that measure the time of
 /// one.
-const LEAST_SAMPLED: usize = 64;
+const MIN_SAMPLED: usize = 64;
 const TIMED: usize = 8;
 
 /// A prepared method, which quantizes a network at any number of rates.
@@ -81,14 +81,14 @@ impl<'a> PreparedMethod<'a> {
         let allowance = time.map(Allowance::of);
         let calib = || -> Result<&Dataset> {
             let calib = calib.with_context(|| Recording::Calib.missing(&method.to_string()))?;
-            calib.require_frames(LEAST_FRAMES, "statistics of fewer frames are unreliable")?;
+            calib.require_frames(MIN_COUNTED_FRAMES, "statistics of fewer frames are unreliable")?;
             Ok(calib)
         };
         let mut moments = |dataset: &Dataset| {
-            let most = if steps > 1 { (MOST_VECTORS / steps).min(dataset.frames()) } else { dataset.frames() };
+            let most = if steps > 1 { (MAX_VECTORS / steps).min(dataset.frames()) } else { dataset.frames() };
             let most = allowance.map_or(most, |allowance| {
                 let timed = dataset.thinned(TIMED, false);
-                allowance.fits(timed.frames(), || drop(collect(graph, &timed, &mut |_| {})), LEAST_SAMPLED, most)
+                allowance.fits(timed.frames(), || drop(collect(graph, &timed, &mut |_| {})), MIN_SAMPLED, most)
             });
             let dataset = if steps > 1 { dataset.thinned(most, false) } else { Cow::Borrowed(dataset) };
             let all = dataset.frames().max(1) as f64;
@@ -223,7 +223,7 @@ pub fn least_bytes(graph: &Graph, rate: Rate, options: &Options) -> usize {
     }
 }
 
-/// Quantizes a network one time, by any method: see [`PreparedMethod::quantize`].
+/// Quantizes a network once, by any method: see [`PreparedMethod::quantize`].
 pub fn quantize(
     graph: &Graph,
     calib: Option<&Dataset>,

@@ -100,7 +100,7 @@ impl<'a> Quantizer<'a> {
         Ok(report.transpose()?.map(|report| HeldOut { report, parts: count }))
     }
 
-    /// Returns the statistics without each part, which are collected one time.
+    /// Returns the statistics without each part, which are collected once.
     fn folds(&self, calib: &Dataset, options: &Options) -> Result<&[Fold<'a>]> {
         if self.folds.get().is_none() {
             let policy: &'a Policy = self.policy;

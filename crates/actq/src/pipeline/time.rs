@@ -11,7 +11,7 @@ use crate::measure::time::StepTime;
 use crate::methods::{Activations, Method, Options, Progress};
 
 /// Bits per weight above those of any image.
-const MOST_BITS: f64 = 10.0;
+const MAX_BITS: f64 = 10.0;
 /// Tries between the least and the most bits; the last two differ by a hundredth of a bit.
 const TRIES: usize = 10;
 /// Tries to find the cycles of everything but the rows, and the share of the limit by which they may vary.
@@ -27,7 +27,7 @@ fn predict(quantized: &QuantizedPolicy, limit: TimeLimit) -> Result<StepTime> {
 /// that do not allocate by time, it is the image of the most bits per weight.
 ///
 /// The rate is found with the activations before measurement and without learning, which does not affect time; then
-/// the policy is quantized one time. Activations that the method prefers in int16 get it as far as the time allows.
+/// the policy is quantized once. Activations that the method prefers in int16 get it as far as the time allows.
 /// `progress` receives the share done.
 pub(super) fn within(
     quantizer: &Quantizer<'_>,
@@ -91,7 +91,7 @@ impl Draft<'_, '_> {
             let small = self.limit.image_bytes.is_none_or(|bytes| quantized.image.len() <= bytes);
             Ok(small && predict(quantized, self.limit)?.milliseconds <= self.limit.milliseconds)
         };
-        let (mut low, mut high) = (least_bits(self.at(Rate::BitsPerWeight(f64::MIN_POSITIVE)))?, MOST_BITS);
+        let (mut low, mut high) = (least_bits(self.at(Rate::BitsPerWeight(f64::MIN_POSITIVE)))?, MAX_BITS);
         let fastest = self.at(Rate::BitsPerWeight(low))?;
         self.check(predict(&fastest, self.limit)?.milliseconds)?;
         if let Some(bytes) = self.limit.image_bytes {

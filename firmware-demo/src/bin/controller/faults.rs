@@ -37,7 +37,7 @@ pub(crate) static TICKS: AtomicU32 = AtomicU32::new(0);
 pub(crate) static MISSING: AtomicU32 = AtomicU32::new(0);
 static CRASHES: AtomicU32 = AtomicU32::new(0);
 
-/// Returns the record from before the reset, one time; the count of crashes since power-on continues.
+/// Returns the record from before the reset, once; the count of crashes since power-on continues.
 pub(crate) fn take_record() -> Option<Record> {
     let mut words = RECORD.read();
     let found = Record::from_words(&words);

@@ -59,7 +59,7 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
         .collect::<Result<_>>()?;
     written.sort();
     assert_eq!(written, ["calib.npz", "policy.json", "policy.safetensors"]);
-    failed(&import(&[])?, 1, &["policy.json: exists; pass --force to replace it"])?;
+    failed(&import(&[])?, 1, &["policy.json: already exists; use --force to overwrite"])?;
     succeeded(&import(&["--force"])?)?;
     // Frames with a batch axis look like episodes.
     let (rows, out) = (dir.path().join("rows.npy"), dir.path().join("rows"));

@@ -307,7 +307,7 @@ fn foreign_paths_and_wrong_options_are_refused() -> Result<()> {
     let robot = Robot::new(YAML)?;
     succeeded(&run(robot.import("out", &["--accept-profile"]), b"")?)?;
     let again = run(robot.import("out", &["--accept-profile"]), b"")?;
-    failed(&again, 1, &["deploy.toml: exists; pass --force to replace it"])?;
+    failed(&again, 1, &["deploy.toml: already exists; use --force to overwrite"])?;
 
     let path = robot.path("out/deploy.toml");
     let description = fs::read_to_string(&path)?;

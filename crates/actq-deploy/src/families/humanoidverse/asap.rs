@@ -108,7 +108,7 @@ impl Reader<'_> {
         let Some(answer) = answer else { return Ok(first) };
         let names = || there.iter().map(|policy| policy[0]).collect::<Vec<_>>().join(", ");
         let found = there.iter().copied().find(|policy| policy[0] == answer);
-        found.with_context(|| format!("asap.policy = {answer:?}: there are {}", names()))
+        found.with_context(|| format!("asap.policy = {answer:?}: expected one of {}", names()))
     }
 
     /// Returns the length of an observation of ASAP that selects no joints.

@@ -43,7 +43,7 @@ impl Reader<'_> {
             (false, None) => {
                 let meaning = "nothing states the length of the reference motion; \
                                does the application compute ref_motion_phase (true)?";
-                self.facts.of_application("raw.ref_motion_phase", meaning)?;
+                self.facts.require_from_application("raw.ref_motion_phase", meaning)?;
                 Ok(self.raw("ref_motion_phase", 1, "motions"))
             }
         }

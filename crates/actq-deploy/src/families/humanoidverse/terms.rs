@@ -81,7 +81,7 @@ impl Reader<'_> {
             "ref_motion_phase" => self.motion_phase()?,
             other => {
                 // Only the application knows this term, so it becomes a raw input.
-                self.facts.of_application(
+                self.facts.require_from_application(
                     &format!("raw.{other}"),
                     &format!("term {other:?} is not known to this reader; does the application compute it (true)?"),
                 )?;

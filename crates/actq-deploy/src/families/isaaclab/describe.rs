@@ -10,7 +10,7 @@ use crate::facts::Facts;
 use crate::families::common::{ACTION, Graph, Histories, Parts, given_gravity};
 
 /// Most values of a term that the application computes.
-const MOST: usize = 1 << 16;
+const MAX_COUNT: usize = 1 << 16;
 /// Names of values that this reader adds.
 const RESERVED: [&str; 6] = [CLIPPED, "default", "observation", "processed", "target", "policy"];
 /// Name of the action within its limit.
@@ -73,7 +73,7 @@ impl Builder<'_> {
                 self.policy.decimation
             );
             if self.policy.decimation > 1.0 {
-                self.facts.of_application(key, &meaning)?;
+                self.facts.require_from_application(key, &meaning)?;
             }
             added.push(("joint_pos", "rad"));
         }
@@ -228,7 +228,7 @@ impl Builder<'_> {
                 ));
             }
             let len = len.or(*given).unwrap_or(1);
-            ensure!((1..=MOST).contains(&len), "{key} = {len}: give 1 to {MOST}");
+            ensure!((1..=MAX_COUNT).contains(&len), "{key} = {len}: give 1 to {MAX_COUNT}");
             lens.push(len);
         }
         Ok(lens)

@@ -4,7 +4,7 @@ use actq::error::{Result, ensure};
 use actq::text::printable;
 
 use super::model::{Action, Given, Kind, Layout, Policy, Term, What, known, observation, plain};
-use super::patterns::{Joints, MOST};
+use super::patterns::{Joints, MAX_COUNT};
 use super::values::{bounds, history, no_delay, numbers};
 use crate::document::Document;
 use crate::facts::Facts;
@@ -23,7 +23,7 @@ pub(super) fn joints(yaml: &Document, asset: &str) -> Result<Joints> {
         yaml.peek(&path).is_some(),
         "{} is missing; answer asset with one of {}",
         yaml.location(&path),
-        yaml.keys("articulations").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
+        yaml.keys("articulations").iter().take(MAX_COUNT).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
     );
     for other in yaml.keys("articulations").into_iter().filter(|other| *other != asset) {
         yaml.node(&format!("articulations.{other}"));
@@ -141,7 +141,7 @@ fn terms(yaml: &Document, group: &str, joints: &Joints, actions: &[Action]) -> R
         yaml.peek(&group).is_some(),
         "{} is missing; answer group with one of {}",
         yaml.location(&group),
-        yaml.keys("observations").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
+        yaml.keys("observations").iter().take(MAX_COUNT).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
     );
     for other in yaml.keys("observations").into_iter().map(|other| format!("observations.{other}")) {
         if other != group {

@@ -4,7 +4,7 @@ use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 
 use super::model::{Action, Given, Kind, Layout, MODULES, Policy, Term, What, known, observation, parts_of, plain};
-use super::patterns::{Joints, MOST};
+use super::patterns::{Joints, MAX_COUNT};
 use super::values::{bounds, history, no_delay, numbers};
 use crate::document::Document;
 use crate::facts::Facts;
@@ -54,7 +54,7 @@ impl Environment<'_> {
             yaml.peek(&path).is_some(),
             "{} is missing; answer asset with the name of the robot in the scene: {}",
             yaml.location(&path),
-            yaml.keys("scene").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
+            yaml.keys("scene").iter().take(MAX_COUNT).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
         );
         let pose = |key: &str, facts: &mut Facts| {
             let path = robot(&format!("init_state.{key}"));
@@ -209,7 +209,7 @@ impl Environment<'_> {
             yaml.peek(group).is_some_and(|node| !node.is_null()),
             "{} is missing; answer group with one of {}",
             yaml.location(group),
-            yaml.keys("observations").iter().take(MOST).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
+            yaml.keys("observations").iter().take(MAX_COUNT).map(|name| printable(name)).collect::<Vec<_>>().join(", ")
         );
         for other in yaml.keys("observations").into_iter().filter(|other| *other != self.group) {
             yaml.node(&format!("observations.{other}"));

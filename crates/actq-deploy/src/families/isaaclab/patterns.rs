@@ -8,7 +8,7 @@ use regex_lite::Regex;
 use crate::families::common::check_names;
 
 /// Most joints of a robot, and most patterns for them.
-pub(super) const MOST: usize = 1000;
+pub(super) const MAX_COUNT: usize = 1000;
 
 /// Names of joints in an order.
 #[derive(Clone, Debug)]
@@ -27,14 +27,14 @@ impl Joints {
     ///
     /// If it is empty or too long, or a name occurs twice or has characters that a report cannot show.
     pub(super) fn new(names: Vec<String>, from: String) -> Result<Self> {
-        ensure!((1..=MOST).contains(&names.len()), "{from}: {} joints; give 1 to {MOST}", names.len());
+        ensure!((1..=MAX_COUNT).contains(&names.len()), "{from}: {} joints; give 1 to {MAX_COUNT}", names.len());
         check_names(&names, &from)?;
         Ok(Self { names, from, open: false })
     }
 
     /// Makes placeholders for joints whose order is a question.
     pub(super) fn placeholders(count: usize) -> Self {
-        let names = (0..count.clamp(1, MOST)).map(|i| format!("joint_{i}")).collect();
+        let names = (0..count.clamp(1, MAX_COUNT)).map(|i| format!("joint_{i}")).collect();
         Self { names, from: "a question".to_owned(), open: true }
     }
 
@@ -55,14 +55,14 @@ impl Joints {
             let place = self.names.iter().position(|own| own == name);
             place.ok_or_else(|| {
                 Error::input(format!(
-                    "{at}: {:?} is none of the joints {} ({})",
+                    "{at}: {:?} matches none of the joints {} ({})",
                     printable(name),
                     self.names.join(", "),
                     self.from
                 ))
             })
         };
-        ensure!(names.len() <= MOST, "{at}: {} names; give at most {MOST}", names.len());
+        ensure!(names.len() <= MAX_COUNT, "{at}: {} names; give at most {MAX_COUNT}", names.len());
         names.iter().enumerate().map(place).collect()
     }
 
@@ -90,7 +90,7 @@ impl Joints {
         let mut of_joint: Vec<Option<usize>> = vec![None; self.len()];
         let mut texts = Vec::new();
         for (i, text) in patterns.enumerate() {
-            ensure!(i < MOST, "{at}: more than {MOST} patterns");
+            ensure!(i < MAX_COUNT, "{at}: more than {MAX_COUNT} patterns");
             let pattern = compile(text, at)?;
             texts.push(printable(text));
             if self.open {

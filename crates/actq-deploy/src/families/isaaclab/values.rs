@@ -7,7 +7,7 @@ use crate::families::common::count;
 use crate::yaml::Node;
 
 /// Most frames of a history.
-const MOST_FRAMES: usize = 1000;
+const MAX_FRAMES: usize = 1000;
 
 /// Reads a lowest and a highest number, either of which may be infinite.
 pub(super) fn bounds(node: &Node) -> Option<[f64; 2]> {
@@ -30,7 +30,7 @@ pub(super) fn numbers(node: &Node) -> Option<Vec<f64>> {
 pub(super) fn history(yaml: &Document, at: &str) -> Result<usize> {
     let (length, flat) = (format!("{at}.history_length"), format!("{at}.flatten_history_dim"));
     let frames = yaml.optional(&length, "a number of frames", count)?.unwrap_or(0).max(1);
-    ensure!(frames <= MOST_FRAMES, "{} = {frames}: at most {MOST_FRAMES} frames are read", yaml.location(&length));
+    ensure!(frames <= MAX_FRAMES, "{} = {frames}: at most {MAX_FRAMES} frames are read", yaml.location(&length));
     let is_flat = yaml.optional(&flat, "true or false", Node::truth)?.unwrap_or(true);
     ensure!(
         frames == 1 || is_flat,

@@ -122,7 +122,7 @@ impl Inputs<'_> {
             }
             // Only the application knows this term, so it becomes a raw input.
             _ => {
-                self.facts.of_application(
+                self.facts.require_from_application(
                     &format!("raw.{name}"),
                     &format!("the input {input:?} is not known to this reader; does the application compute its {len} values (true)?"),
                 )?;

@@ -10,7 +10,7 @@ use crate::bundle::Bundle;
 use crate::description::{Description, Network, Numbers, TargetKind};
 use crate::document::Document;
 use crate::facts::Facts;
-use crate::family::Found;
+use crate::family::Recognized;
 use crate::sources::Sources as _;
 
 /// Files of an archive, after its path.
@@ -18,7 +18,7 @@ pub(super) const STEP: &str = ".kinfer/step_fn.onnx";
 const FILES: [&str; 3] = ["step_fn.onnx", "init_fn.onnx", "metadata.json"];
 
 /// Finds the files of an archive; nothing if the file is none.
-pub(super) fn recognize(bundle: &Bundle, file: &str) -> Result<Option<Found>> {
+pub(super) fn recognize(bundle: &Bundle, file: &str) -> Result<Option<Recognized>> {
     let paths = FILES.map(|name| format!("{file}/{name}"));
     let own: Vec<&str> = bundle.files().filter(|own| own.starts_with(&format!("{file}/"))).collect();
     if own.is_empty() {
@@ -32,11 +32,11 @@ pub(super) fn recognize(bundle: &Bundle, file: &str) -> Result<Option<Found>> {
     }
     let [step, init, metadata] = paths;
     let documents = vec![Document::read(bundle, &metadata)?];
-    Ok(Some(Found { documents, networks: vec![step], others: vec![init] }))
+    Ok(Some(Recognized { documents, networks: vec![step], others: vec![init] }))
 }
 
 /// Makes the description.
-pub(super) fn read(bundle: &Bundle, found: &Found, facts: &mut Facts) -> Result<Description> {
+pub(super) fn read(bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
     let (meta, file) = (&found.documents[0], &found.networks[0]);
     let signature = bundle.signature(file)?;
     let (inputs, outputs) = (known(file, &signature.inputs)?, known(file, &signature.outputs)?);
@@ -106,7 +106,7 @@ fn expected(meta: &Document, input: &str, joints: usize) -> Result<usize> {
         "time" => 1,
         "command" => meta.texts("command_names")?.len(),
         "carry" => meta.required("carry_size", "a list of lengths", counts)?.iter().product(),
-        other => bail!("{}: the input {:?} is none of kinfer's", meta.file, printable(other)),
+        other => bail!("{}: the input {:?} matches none of kinfer's", meta.file, printable(other)),
     })
 }
 

@@ -6,12 +6,12 @@ use roxmltree::{Node as Element, ParsingOptions};
 
 use crate::bundle::Bundle;
 use crate::facts::Facts;
-use crate::family::Found;
+use crate::family::Recognized;
 
 /// Most elements and attributes of a MuJoCo file.
-const MOST_XML_NODES: u32 = 100_000;
+const MAX_XML_NODES: u32 = 100_000;
 /// Most levels of its bodies.
-const MOST_XML_LEVELS: usize = 256;
+const MAX_XML_LEVELS: usize = 256;
 
 /// The policy's joints in a MuJoCo file.
 pub(super) struct Robot {
@@ -35,7 +35,7 @@ impl Robot {
     }
 
     /// Reads the bundle's file, if it has one.
-    pub(super) fn of(bundle: &Bundle, found: &Found, n: usize, facts: &mut Facts) -> Result<Option<Self>> {
+    pub(super) fn of(bundle: &Bundle, found: &Recognized, n: usize, facts: &mut Facts) -> Result<Option<Self>> {
         let file = match &found.others[..] {
             [] => return Ok(None),
             [file] => file,
@@ -44,7 +44,7 @@ impl Robot {
                 let file: Option<String> = facts.missing("robot.file", &meaning)?;
                 let file = file.unwrap_or_else(|| several[0].clone());
                 let there = several.iter().find(|other| **other == file);
-                there.with_context(|| format!("robot.file = {file:?}: there are {}", several.join(", ")))?
+                there.with_context(|| format!("robot.file = {file:?}: expected one of {}", several.join(", ")))?
             }
         };
         let mut robot = Self::parse(file, &bundle.text(file)?).with_context(|| file.clone())?;
@@ -70,7 +70,7 @@ impl Robot {
     }
 
     fn parse(file: &str, text: &str) -> Result<Self> {
-        let options = ParsingOptions { allow_dtd: false, nodes_limit: MOST_XML_NODES, ..ParsingOptions::default() };
+        let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_XML_NODES, ..ParsingOptions::default() };
         let document = roxmltree::Document::parse_with_options(text, options)
             .map_err(|error| Error::input(format!("not XML: {}", printable(&error.to_string()))))?;
         let root = document.root_element();
@@ -108,7 +108,7 @@ impl Robot {
 
     /// Adds a body's joints, then those of its bodies, which is MuJoCo's order.
     fn body(&mut self, body: Element<'_, '_>, level: usize) -> Result<()> {
-        ensure!(level < MOST_XML_LEVELS, "bodies have more than {MOST_XML_LEVELS} levels");
+        ensure!(level < MAX_XML_LEVELS, "bodies have more than {MAX_XML_LEVELS} levels");
         let mut bodies = Vec::new();
         self.own(body, level, &mut bodies)?;
         bodies.into_iter().try_for_each(|inner| self.body(inner, level + 1))
@@ -116,7 +116,7 @@ impl Robot {
 
     /// Adds the joints of a body or of a frame in it, and collects the bodies.
     fn own<'a, 'i>(&mut self, body: Element<'a, 'i>, level: usize, bodies: &mut Vec<Element<'a, 'i>>) -> Result<()> {
-        ensure!(level < MOST_XML_LEVELS, "frames have more than {MOST_XML_LEVELS} levels");
+        ensure!(level < MAX_XML_LEVELS, "frames have more than {MAX_XML_LEVELS} levels");
         for element in body.children().filter(Element::is_element) {
             match element.tag_name().name() {
                 "freejoint" => self.free()?,

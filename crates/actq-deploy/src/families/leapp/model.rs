@@ -13,9 +13,9 @@ use crate::families::common::{check_names, counts};
 use crate::yaml::Node;
 
 /// Most models of a pipeline.
-const MOST_MODELS: usize = 64;
+const MAX_MODELS: usize = 64;
 /// Most values of a port; an image can address no more.
-const MOST_VALUES: usize = u16::MAX as usize;
+const MAX_VALUES: usize = u16::MAX as usize;
 /// Stands for an axis of times in `element_names`.
 const TIME: &str = "__temporal_axis__";
 
@@ -51,11 +51,7 @@ pub(super) struct Port {
 pub(super) fn models(bundle: &Bundle, yaml: &Document) -> Result<Vec<Model>> {
     let names: Vec<String> = yaml.keys("models").into_iter().map(str::to_owned).collect();
     let at = yaml.location("models");
-    ensure!(
-        (1..=MOST_MODELS).contains(&names.len()),
-        "{at}: it has {} models; 1 to {MOST_MODELS} are possible",
-        names.len()
-    );
+    ensure!((1..=MAX_MODELS).contains(&names.len()), "{at}: it has {} models; give 1 to {MAX_MODELS}", names.len());
     check_names(&names, &at)?;
     names.into_iter().map(|name| model(bundle, yaml, name)).collect()
 }
@@ -123,8 +119,8 @@ fn port(yaml: &Document, path: &str) -> Result<Port> {
     );
     let lens = |node: &Node| counts(node).filter(|shape| !shape.contains(&0));
     let shape = yaml.required(&of("shape"), "a list of lengths above 0", lens)?;
-    let len = shape.iter().try_fold(1, |len: usize, axis| len.checked_mul(*axis)).filter(|len| *len <= MOST_VALUES);
-    let len = len.with_context(|| format!("{}: more than {MOST_VALUES} values", yaml.location(&of("shape"))))?;
+    let len = shape.iter().try_fold(1, |len: usize, axis| len.checked_mul(*axis)).filter(|len| *len <= MAX_VALUES);
+    let len = len.with_context(|| format!("{}: more than {MAX_VALUES} values", yaml.location(&of("shape"))))?;
     let (names, is_series) = names(yaml, path, &shape, len)?;
     let at = match yaml.optional(&of("isaaclab_connection"), "a text", Node::text)? {
         Some(connection) => format!("{} ({})", yaml.location(path), printable(connection)),

@@ -116,7 +116,7 @@ fn port(text: &str, models: &[Model], ports: fn(&Model) -> &[Port]) -> Result<At
         let all =
             models.iter().flat_map(|model| ports(model).iter().map(|port| format!("{}/{}", model.name, port.name)));
         let all: Vec<String> = all.take(20).collect();
-        format!("there is no port {:?}; there are {}", printable(text), all.join(", "))
+        format!("there is no port {:?}; expected one of {}", printable(text), all.join(", "))
     })
 }
 

@@ -82,7 +82,7 @@ impl Graph {
         let other = self.inputs.iter().find(|(name, _)| !inputs.contains_key(name));
         ensure!(
             other.is_none(),
-            "{}: input {:?} is none of the features {}; export without it",
+            "{}: input {:?} matches none of the features {}; export without it",
             self.file,
             printable(other.map_or("", |(name, _)| name)),
             features.iter().map(|feature| printable(&feature.name)).collect::<Vec<_>>().join(", ")

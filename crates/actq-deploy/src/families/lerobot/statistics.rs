@@ -12,7 +12,7 @@ use crate::facts::Facts;
 use crate::families::tensors::{finite, tensors};
 
 /// Most names in a message.
-const MOST_LISTED: usize = 12;
+const MAX_LISTED: usize = 12;
 
 /// The statistics of a file.
 #[derive(Debug)]
@@ -58,7 +58,7 @@ impl Statistics {
         let mut names = (self.prefixes)(&feature.name).into_iter().map(|prefix| prefix + statistic);
         let found = names.find_map(|name| self.tensors.get_key_value(&name));
         let (name, tensor) = found.with_context(|| {
-            let names: Vec<_> = self.tensors.keys().take(MOST_LISTED).map(|name| printable(name)).collect();
+            let names: Vec<_> = self.tensors.keys().take(MAX_LISTED).map(|name| printable(name)).collect();
             format!(
                 "{}: it has no {statistic} of {:?}; save the policy with its dataset's statistics, or set the mode of {} to \
                  IDENTITY if its values are not normalized. It has {}",

@@ -123,7 +123,7 @@ impl<'a> Config<'a> {
         Ok(())
     }
 
-    /// Returns joints by their numbers, each at most one time; none if the list is missing.
+    /// Returns joints by their numbers, each at most once; none if the list is missing.
     pub(super) fn places(&self, key: &str) -> Result<Vec<usize>> {
         let joints = self.joints()?;
         let places = self.optional(key, "a list of joints' numbers, from 0", counts)?.unwrap_or_default();

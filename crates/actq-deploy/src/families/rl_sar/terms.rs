@@ -85,7 +85,7 @@ impl Terms<'_, '_> {
             }
             "ang_vel" | "ang_vel_body" | "ang_vel_world" => {
                 if name == "ang_vel_world" {
-                    self.facts.of_application(
+                    self.facts.require_from_application(
                         "raw.ang_vel",
                         "the term ang_vel_world rotates a velocity of the world's frame into the body's; \
                          does the application give it in the body's frame (true)?",
@@ -172,7 +172,7 @@ impl Terms<'_, '_> {
     /// Begins a term that the deploy code computes of a motion's file, and the application for an image.
     fn of_motion(&mut self, name: &str, len: usize) -> Result<Term> {
         let key = format!("raw.{}", last_part(name));
-        self.facts.of_application(
+        self.facts.require_from_application(
             &key,
             &format!("the deploy code computes {name} of the motion's file; does the application compute it (true)?"),
         )?;

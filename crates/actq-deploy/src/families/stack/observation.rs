@@ -283,7 +283,7 @@ impl Reader<'_> {
                     "term {:?} ({}) is not known to this reader; does the application compute its {len} values (true)?",
                     item.name, item.kind
                 );
-                self.values.facts.of_application(&key, &meaning)?;
+                self.values.facts.require_from_application(&key, &meaning)?;
                 Some(len)
             }
             None => {

@@ -7,7 +7,7 @@ use crate::values::expr::{Expr, Exprs, Guard, Id};
 use crate::values::tensor::Element;
 
 /// Largest limit of a clip that becomes one operation about its middle; beyond it, the offset would cost digits.
-const MOST_CLIP: f64 = 100.0;
+const MAX_CLIP: f64 = 100.0;
 /// Largest distance of a limit from zero at which it is subtracted and added again; beyond it, small values would lose
 /// digits.
 const FAR_LIMIT: f64 = 1.0;
@@ -74,7 +74,7 @@ impl Exprs {
         let ranges = || low.iter().zip(high);
         let fits = |(low, high): (&f64, &f64)| {
             let most = low.abs().max(high.abs());
-            low < high && (most <= MOST_CLIP || -low == *high && most < f64::from(f32::MAX))
+            low < high && (most <= MAX_CLIP || -low == *high && most < f64::from(f32::MAX))
         };
         if !ranges().all(fits) {
             return None;
@@ -159,7 +159,7 @@ impl Exprs {
             return if high < f64::INFINITY { self.put(Expr::Clip(positive, high), len) } else { positive };
         }
         let middle = low / 2.0 + high / 2.0;
-        if middle == 0.0 || low.abs().max(high.abs()) <= MOST_CLIP {
+        if middle == 0.0 || low.abs().max(high.abs()) <= MAX_CLIP {
             let len = self.len_of(x);
             let about = self.scaled(x, 1.0, -middle);
             let clipped = self.put(Expr::Clip(about, high - middle), len);

@@ -134,7 +134,7 @@ fn normalize(x: &mut [f32], eps: f32, centred: bool) -> f32 {
     inverse
 }
 
-/// Goes back through either norm, except for the derivative by the bias.
+/// Backpropagates through either norm, except for the derivative by the bias.
 fn back(run: &mut Backward<'_>, saved: &Saved, mut dy: Array2<f32>, centred: bool) {
     let weight = &run.vectors[0];
     let d_weight = &mut run.d_vectors[0];

@@ -32,7 +32,7 @@ const CHOICES: [Option<Width>; 5] = [None, Some(Width::W2), Some(Width::W3), Som
 /// Least gain per bit of a row that is widened with the rest, as a share of the gain elsewhere.
 const WORTH: f64 = 0.1;
 /// Most rows that are widened together: blocks are padded to this many.
-const MOST_AT_ONCE: usize = 4;
+const MAX_AT_ONCE: usize = 4;
 
 /// Properties of a matrix's rows in the allocation.
 #[derive(Clone, Debug)]
@@ -158,7 +158,7 @@ fn fill(widths: &mut Widths, size: &Size<'_>, rows: &[Rows], limit: f64, least: 
             candidates.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
             let mut wider = widths.clone();
             let mut gained = 0.0;
-            for &r in candidates.iter().take(MOST_AT_ONCE) {
+            for &r in candidates.iter().take(MAX_AT_ONCE) {
                 wider[m][r] = to;
                 gained += gain(&r);
                 let takes = size.price(&wider);

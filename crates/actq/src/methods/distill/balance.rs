@@ -99,7 +99,7 @@ pub fn balance_bytes(graph: &Graph) -> usize {
 fn choose_part(graph: &Graph, site: &Site, columns: &Columns, moments: &[Moments]) -> Part {
     let part = Part::cheapest(columns, count_reading_weights(graph, site), graph.weights());
     let keeps_usable = |factors: Vec<f64>| part.holds(&factors) && !is_ruined(graph, site, moments, &factors);
-    let is_usable = !columns.are_far() && part.factors(columns).is_some_and(keeps_usable);
+    let is_usable = !columns.has_outliers() && part.factors(columns).is_some_and(keeps_usable);
     if is_usable { part } else { Part::whole(columns) }
 }
 
@@ -110,7 +110,7 @@ fn is_worthwhile(graph: &Graph, site: &Site, columns: &Columns, part: &Part, mom
     let unit_factors = vec![1.0; columns.mean.len()];
     saved(&Part::whole(columns)) >= MIN_SAVED_BITS * graph.weights() as f64
         || (columns.saved_bits() >= RUINOUS_BITS && saved(part) >= 0.0)
-        || columns.are_far()
+        || columns.has_outliers()
         || is_ruined(graph, site, moments, &unit_factors)
 }
 

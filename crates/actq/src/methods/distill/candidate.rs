@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::compact::{Compacted, compact};
 use super::objective::Frames;
-use super::shape::{Goal, Shape, shape};
+use super::shape::{Shape, Target, shape};
 use super::train::Task;
 use crate::calibrate::moments::Moments;
 use crate::error::Result;
@@ -25,7 +25,7 @@ impl Candidate {
     /// # Errors
     ///
     /// As [`shape`].
-    pub(super) fn new(goal: Goal<'_>, recipe: Recipe) -> Result<Self> {
+    pub(super) fn new(goal: Target<'_>, recipe: Recipe) -> Result<Self> {
         let shape = shape(goal, recipe)?;
         let (cut, moments) = (&shape.cut, &goal.statistics.moments);
         let inputs =
@@ -47,8 +47,8 @@ impl Candidate {
     }
 
     /// Returns the task to learn it.
-    pub(super) fn task<'a>(&'a self, goal: Goal<'a>, recipe: Recipe) -> Task<'a> {
-        let Goal { statistics, options, .. } = goal;
+    pub(super) fn task<'a>(&'a self, goal: Target<'a>, recipe: Recipe) -> Task<'a> {
+        let Target { statistics, options, .. } = goal;
         Task {
             graph: &self.compacted.graph,
             widths: &self.compacted.widths,

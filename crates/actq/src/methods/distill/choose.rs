@@ -15,11 +15,11 @@ use crate::calibrate::sensitivity::{DAMPING_INPUT, drawn_moments};
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::Windows;
 use crate::graph::{Graph, Network};
-use crate::methods::learning::{Choice, Tried};
+use crate::methods::learning::{Choice, Trial};
 use crate::methods::quantized::{Quantized, dequantized};
 
 /// Least steps of which a part is spent on choices.
-pub(super) const LEAST_STEPS: usize = 3000;
+pub(super) const MIN_STEPS: usize = 3000;
 /// Divisor of the steps, and of the time, for one choice.
 const TRIAL_STEP_DIVISOR: usize = 8;
 const TRIAL_TIME_DIVISOR: u32 = 12;
@@ -42,7 +42,7 @@ pub struct Chosen {
     /// Remaining limits of learning.
     pub bounds: Bounds,
     /// Ways that were compared.
-    pub tried: Vec<Tried>,
+    pub tried: Vec<Trial>,
     /// Approximate share of the choice in all the work.
     pub share: f64,
 }
@@ -70,7 +70,7 @@ pub fn choose(
     let untried = if learns { Choice::Learning(task.recipe) } else { Choice::Feedback { damping: DAMPING_INPUT } };
     let untried = Chosen::untried(untried, task.bounds);
     let iterative = task.graph.denoising_steps() > 1;
-    let few = learns && steps.is_some_and(|steps| steps < LEAST_STEPS);
+    let few = learns && steps.is_some_and(|steps| steps < MIN_STEPS);
     if few || !learns && iterative {
         return untried;
     }
@@ -78,7 +78,7 @@ pub fn choose(
     let mut tried = Vec::new();
     let mut try_out = |choice, (quantized, graph): (Vec<Quantized>, Graph)| {
         let [recorded, widened] = errors(task, &graph, &quantized, &held_out);
-        tried.push(Tried { choice, recorded, widened });
+        tried.push(Trial { choice, recorded, widened });
     };
     if !iterative {
         let moments = drawn_moments(&learned_from, task.seed);
@@ -102,10 +102,10 @@ pub fn choose(
 
 /// Returns the trial with the lowest expected error. Among those whose errors on the path differ by chance only, it is
 /// the one with the lowest error off it. Feedback is complete here, whereas learning has had an eighth of its steps.
-pub(super) fn lowest_error(tried: &[Tried], recurrent: bool) -> Option<&Tried> {
-    let remaining = |tried: &Tried| if matches!(tried.choice, Choice::Learning(_)) { ERROR_RATIO } else { 1.0 };
-    let widened = |tried: &Tried| remaining(tried) * tried.widened;
-    let expected = |tried: &Tried| if recurrent { widened(tried) } else { remaining(tried) * tried.recorded };
+pub(super) fn lowest_error(tried: &[Trial], recurrent: bool) -> Option<&Trial> {
+    let remaining = |tried: &Trial| if matches!(tried.choice, Choice::Learning(_)) { ERROR_RATIO } else { 1.0 };
+    let widened = |tried: &Trial| remaining(tried) * tried.widened;
+    let expected = |tried: &Trial| if recurrent { widened(tried) } else { remaining(tried) * tried.recorded };
     let lowest = tried.iter().map(expected).min_by(f64::total_cmp)?;
     let alike = tried.iter().filter(|tried| expected(tried) <= (1.0 + CHANCE) * lowest);
     alike.min_by(|a, b| widened(a).total_cmp(&widened(b)))
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn with_enough_steps_feedback_competes_with_learning() {
-        let Learning { choice, tried, .. } = chosen(4, LEAST_STEPS);
+        let Learning { choice, tried, .. } = chosen(4, MIN_STEPS);
         let (compared, after) = tried.split_at(DAMPINGS.len() + 1);
         let first = lowest_error(compared, false).map(|tried| tried.choice);
         // What learning gave in the end is compared, too, if it is discarded.
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn learning_that_raises_the_error_is_discarded() {
-        let Learning { steps, discarded, choice, tried } = chosen(4, LEAST_STEPS);
+        let Learning { steps, discarded, choice, tried } = chosen(4, MIN_STEPS);
         assert!(steps == 0 && discarded > 0, "{steps} {discarded}");
         assert_eq!(choice, Choice::Feedback { damping: DAMPING_INPUT });
         let [.., learned, fed_back] = tried[..] else { panic!("{tried:?}") };
@@ -166,11 +166,11 @@ mod tests {
     fn feedback_must_beat_the_predicted_learning_error() {
         let learned = |noise: f32, recorded, widened| {
             let choice = Choice::Learning(Recipe::new(Widening { noise, ..Widening::WIDE }));
-            Tried { choice, recorded, widened }
+            Trial { choice, recorded, widened }
         };
-        let fed_back = |recorded| Tried { choice: Choice::Feedback { damping: 0.01 }, recorded, widened: 9.0 };
+        let fed_back = |recorded| Trial { choice: Choice::Feedback { damping: 0.01 }, recorded, widened: 9.0 };
         let [a, b] = [learned(0.1, 1.2, 2.0), learned(0.2, 1.0, 3.0)];
-        let choice = |tried: &[Tried], recurrent| lowest_error(tried, recurrent).map(|tried| tried.choice);
+        let choice = |tried: &[Trial], recurrent| lowest_error(tried, recurrent).map(|tried| tried.choice);
         assert_eq!([choice(&[a, b], false), choice(&[a, b], true)], [Some(b.choice), Some(a.choice)]);
         let [worse, better] = [fed_back(0.85), fed_back(0.75)];
         assert_eq!(choice(&[worse, a, b], false), Some(b.choice));

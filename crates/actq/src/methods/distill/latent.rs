@@ -33,7 +33,7 @@ pub(super) struct Latent {
 /// Strides of codes of different widths. A wider row has more steps for the same weights, so equal strides change it
 /// less.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Strides {
+pub(super) enum RateScaling {
     /// Equal, in steps.
     Equal,
     /// In proportion to the root of the number of levels: between equal in steps and equal in weights
@@ -73,11 +73,11 @@ impl Grid {
     }
 
     /// Returns the rate of codes in units of that of 2 bits.
-    fn stride(self, strides: Strides) -> f32 {
+    fn stride(self, scaling: RateScaling) -> f32 {
         const OF_2_BITS: f32 = 3.0;
-        match strides {
-            Strides::Equal => 1.0,
-            Strides::ByWidth => ((self.high - self.low) / OF_2_BITS).sqrt(),
+        match scaling {
+            RateScaling::Equal => 1.0,
+            RateScaling::ByWidth => ((self.high - self.low) / OF_2_BITS).sqrt(),
         }
     }
 
@@ -181,11 +181,11 @@ pub(super) struct Strip<'a> {
 
 /// Strides of a step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Gait {
+pub(super) struct LearningRates {
     pub(super) codes: Stride,
     pub(super) scales: Stride,
     /// Codes of rows wider than 2 bits.
-    pub(super) strides: Strides,
+    pub(super) scaling: RateScaling,
 }
 
 impl Strip<'_> {
@@ -208,7 +208,7 @@ impl Strip<'_> {
     }
 
     /// Moves codes and scales along `grads`, the derivative by the weights, which becomes that by the codes.
-    pub(super) fn learn(&mut self, grads: &mut [f32], gait: Gait) {
+    pub(super) fn learn(&mut self, grads: &mut [f32], rates: LearningRates) {
         let Self { from, cols, widths, fitted, .. } = *self;
         let moments = self.of_codes.first.chunks_mut(cols).zip(self.of_codes.second.chunks_mut(cols));
         let rows = self.codes.chunks_mut(cols).zip(grads.chunks_mut(cols)).zip(moments).zip(widths).enumerate();
@@ -220,13 +220,13 @@ impl Strip<'_> {
                 || {
                     let groups = grads.chunks_mut(group).zip(codes.chunks(group)).zip(&scales);
                     let by_scale = groups.map(|((grads, codes), scale)| grid.through(grads, codes, *scale)).sum();
-                    step(codes, grads, Moments { first, second }, gait.codes.times(grid.stride(gait.strides)));
+                    step(codes, grads, Moments { first, second }, rates.codes.times(grid.stride(rates.scaling)));
                     by_scale
                 },
             );
             let Moments { first, second } = &mut self.of_scales;
             let of_row = Moments { first: &mut first[r..=r], second: &mut second[r..=r] };
-            step(&mut self.log_scales[r..=r], &[by_scale], of_row, gait.scales);
+            step(&mut self.log_scales[r..=r], &[by_scale], of_row, rates.scales);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Batches with the f32 network's outputs. Each output is computed one time and learned from several times, in
+//! Batches with the f32 network's outputs. Each output is computed once and learned from several times, in
 //! different batches. The f32 network is often larger than the one that learns.
 
 use ndarray::Array2;
@@ -17,14 +17,14 @@ const MIN_LESSONS: usize = 16;
 
 /// Observations, the state before the first, and the f32 network's outputs.
 #[derive(Debug)]
-pub struct Lesson {
+pub struct TrainingBatch {
     frames: Array2<f32>,
     state: State,
     /// The f32 network's outputs, `[frame, element]`.
     pub target: Array2<f32>,
 }
 
-impl Lesson {
+impl TrainingBatch {
     /// Runs the f32 network on a batch for the network `graph`, whose `states` are those of the episodes.
     pub fn of(windows: &Windows, batch: Batch, graph: &Graph, states: &[State]) -> Self {
         let target = windows.teach(&batch);
@@ -58,7 +58,7 @@ pub enum Source {
 /// The latest lessons.
 #[derive(Debug)]
 pub struct Lessons {
-    kept: Vec<Lesson>,
+    kept: Vec<TrainingBatch>,
     /// Parts of batches so far, and new lessons.
     parts: usize,
     drawn: usize,
@@ -86,12 +86,12 @@ impl Lessons {
     }
 
     /// Returns a kept lesson.
-    pub fn kept(&self, index: usize) -> &Lesson {
+    pub fn kept(&self, index: usize) -> &TrainingBatch {
         &self.kept[index]
     }
 
     /// Keeps a lesson; above the limit, it replaces the oldest one.
-    pub fn keep(&mut self, lesson: Lesson) {
+    pub fn keep(&mut self, lesson: TrainingBatch) {
         let limit = (MAX_VALUES / lesson.values().max(1)).clamp(MIN_LESSONS, MAX_LESSONS);
         match self.kept.len() < limit {
             true => self.kept.push(lesson),

@@ -19,7 +19,7 @@ use crate::methods::options::Options;
 
 /// A network to quantize, by its statistics, and its budget.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Goal<'a> {
+pub(super) struct Target<'a> {
     pub(super) statistics: &'a RowStatistics,
     pub(super) rate: Rate,
     pub(super) options: &'a Options,
@@ -46,7 +46,7 @@ const SHARES: [f64; 11] = [1.0, 0.875, 0.75, 0.625, 0.5, 0.4375, 0.375, 0.3125, 
 
 /// Chooses the units, and the widths of all rows. Units are removed if the network learns and no width is forced: of
 /// several shares of them, the one with the lowest expected error is kept. The recipe determines the expected errors.
-pub(super) fn shape(Goal { statistics, rate, options }: Goal<'_>, recipe: Recipe) -> Result<Shape> {
+pub(super) fn shape(Target { statistics, rate, options }: Target<'_>, recipe: Recipe) -> Result<Shape> {
     let Recipe { rounding, even, .. } = recipe;
     let RowStatistics { inputs, outputs, moments, .. } = statistics;
     let graph = statistics.graph();

@@ -10,8 +10,8 @@ use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
 use super::adam::{Adam, Stride};
-use super::latent::{Gait, Latent, Strides};
-use super::lessons::{Lesson, Lessons, Source};
+use super::latent::{Latent, LearningRates, RateScaling};
+use super::lessons::{Lessons, Source, TrainingBatch};
 use super::objective::{Frames, Objective};
 use super::schedule::{Bounds, Schedule, most_steps};
 use crate::calibrate::widening::Widening;
@@ -32,16 +32,16 @@ struct Rates {
     /// Rate of biases and norms.
     vector: f32,
     /// Strides of wider rows.
-    strides: Strides,
+    scaling: RateScaling,
 }
 
 /// Rates of feed-forward networks. With higher ones, they fit the recording better and held-out episodes worse.
-const OF_FRAMES: Rates = Rates { latent: 4e-3, scale: 3e-3, vector: 1e-3, strides: Strides::Equal };
+const OF_FRAMES: Rates = Rates { latent: 4e-3, scale: 3e-3, vector: 1e-3, scaling: RateScaling::Equal };
 /// Rates of networks that lost more than half of the weights.
-const OF_SMALL: Rates = Rates { latent: 8e-3, scale: 6e-3, vector: 2e-3, strides: Strides::ByWidth };
+const OF_SMALL: Rates = Rates { latent: 8e-3, scale: 6e-3, vector: 2e-3, scaling: RateScaling::ByWidth };
 /// Rates of recurrent networks, which take fewer steps: with the rates above, g1_lstm64 ends at 1.6 times the error
 /// (docs/records).
-const OF_WINDOWS: Rates = Rates { latent: 3e-2, scale: 1e-2, vector: 1e-2, strides: Strides::ByWidth };
+const OF_WINDOWS: Rates = Rates { latent: 3e-2, scale: 1e-2, vector: 1e-2, scaling: RateScaling::ByWidth };
 /// Samples of a batch: frames, or windows of a recurrent network.
 const FRAMES: usize = 256;
 const WINDOWS: usize = 16;
@@ -97,9 +97,9 @@ impl Task<'_> {
     }
 
     /// Returns what learning starts from: every weight rounded to the nearest level.
-    pub(super) fn start(&self) -> Learned {
+    pub(super) fn start(&self) -> TrainResult {
         let quantized = self.latents().iter().map(Latent::quantized).collect();
-        Learned { quantized, graph: self.graph.clone(), steps: 0 }
+        TrainResult { quantized, graph: self.graph.clone(), steps: 0 }
     }
 
     fn latents(&self) -> Vec<Latent> {
@@ -117,7 +117,7 @@ impl Task<'_> {
 
 /// Result of a distillation.
 #[derive(Debug)]
-pub struct Learned {
+pub struct TrainResult {
     /// The quantized matrices.
     pub quantized: Vec<Quantized>,
     /// Structure, with the learned biases and norms.
@@ -128,7 +128,7 @@ pub struct Learned {
 
 /// State of learning after a step.
 #[derive(Clone, Copy, Debug)]
-pub struct Present {
+pub struct Baseline {
     /// Share done.
     pub share: f64,
     /// Error on the widened inputs.
@@ -138,7 +138,7 @@ pub struct Present {
 }
 
 /// Learns codes, scales, biases and norms. `progress` is called after each step.
-pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Present)) -> Learned {
+pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Baseline)) -> TrainResult {
     let network = Network::rounded(task.graph, task.x_max);
     let mut weights = Weights::of(task.graph);
     let mut latents = task.latents();
@@ -160,13 +160,13 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Pres
         if renews_states(windows, schedule.steps()) {
             states = windows.states_of(&network, &weights);
         }
-        let learned: Vec<(f32, Derivatives, Option<Lesson>)> = lessons
+        let learned: Vec<(f32, Derivatives, Option<TrainingBatch>)> = lessons
             .next(shards)
             .into_par_iter()
             .map(|source| match source {
                 Source::New(seed) => {
                     let batch = windows.batch(size / shards, Some(task.recipe.widening), &mut Random::new(seed));
-                    let lesson = Lesson::of(windows, batch, task.graph, &states);
+                    let lesson = TrainingBatch::of(windows, batch, task.graph, &states);
                     let (loss, derivatives) = gradient(&network, &weights, &objective, &lesson);
                     (loss, derivatives, Some(lesson))
                 }
@@ -188,9 +188,10 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Pres
         }
         schedule.took(loss);
         let stride = |of: f32| Stride::new(of * task.recipe.rate * rate, schedule.steps() as i32);
-        let gait = Gait { codes: stride(rates.latent), scales: stride(rates.scale), strides: rates.strides };
+        let of_codes =
+            LearningRates { codes: stride(rates.latent), scales: stride(rates.scale), scaling: rates.scaling };
         let by_vector = stride(rates.vector);
-        learn(&mut latents, &mut of_matrices, gait, &mut weights.matrices);
+        learn(&mut latents, &mut of_matrices, of_codes, &mut weights.matrices);
         let vectors = weights.vectors.iter_mut().flatten().zip(of_vectors.iter().flatten());
         for ((adam, units), (vector, grads)) in adam_vectors.iter_mut().zip(&units).zip(vectors) {
             adam.step_in_units(vector, grads, units.as_deref(), by_vector);
@@ -198,21 +199,21 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Pres
         if let Some(watched) = task.watched.filter(|_| schedule.is_at_part()) {
             held_out = Some(recorded_error(&network, &weights, watched, None, task.seed));
         }
-        progress(Present { share: schedule.share(), error: schedule.error().unwrap_or_default(), held_out });
+        progress(Baseline { share: schedule.share(), error: schedule.error().unwrap_or_default(), held_out });
     }
     let mut graph = task.graph.clone();
     weights.store_vectors(&mut graph);
-    Learned { quantized: latents.iter().map(Latent::quantized).collect(), graph, steps: schedule.steps() }
+    TrainResult { quantized: latents.iter().map(Latent::quantized).collect(), graph, steps: schedule.steps() }
 }
 
 /// Moves all codes and scales along `grads`, the derivatives by the weights, and writes the new weights.
-fn learn(latents: &mut [Latent], grads: &mut [Array2<f32>], gait: Gait, weights: &mut [Matrix]) {
+fn learn(latents: &mut [Latent], grads: &mut [Array2<f32>], rates: LearningRates, weights: &mut [Matrix]) {
     let mut strips = Vec::new();
     for ((latent, grads), matrix) in latents.iter_mut().zip(grads).zip(weights) {
         strips.extend(latent.strips().zip(grads.axis_chunks_iter_mut(Axis(0), STRIP)).zip(matrix.strips()));
     }
     strips.into_par_iter().for_each(|((mut strip, mut grads), mut weights)| {
-        strip.learn(grads.as_slice_mut().unwrap_or_default(), gait);
+        strip.learn(grads.as_slice_mut().unwrap_or_default(), rates);
         weights.set(|values| strip.weights(values));
     });
 }
@@ -221,7 +222,8 @@ fn learn(latents: &mut [Latent], grads: &mut [Array2<f32>], gait: Gait, weights:
 /// same in every unit of a layer. Vectors of recurrent cells learn in the units of their gates.
 fn units_of_vectors(graph: &Graph, windows: &Windows, seed: u64) -> Vec<Option<Vec<f32>>> {
     let batch = windows.batch(UNIT_FRAMES.div_ceil(windows.window), None, &mut Random::new(seed));
-    let lesson = Lesson::of(windows, batch, graph, &windows.states_of(&Network::new(graph), &Weights::of(graph)));
+    let lesson =
+        TrainingBatch::of(windows, batch, graph, &windows.states_of(&Network::new(graph), &Weights::of(graph)));
     let pass = lesson.pass(&Network::new(graph), &Weights::of(graph));
     let mut deviations = vec![Vec::new(); graph.nodes.len() + 1];
     pass.all_values().for_each(|(value, of)| deviations[value] = column_deviations(of));
@@ -274,7 +276,7 @@ pub fn gradient(
     network: &Network<'_>,
     weights: &Weights,
     objective: &Objective<'_>,
-    lesson: &Lesson,
+    lesson: &TrainingBatch,
 ) -> (f32, Derivatives) {
     let pass = lesson.pass(network, weights);
     let (error, loss) = objective.measure(pass.output(), &lesson.target);
@@ -291,7 +293,7 @@ pub fn losses<'b>(
     let objective = Objective::new(&windows.output_variance, Frames::Even);
     let states = windows.states_of(network, weights);
     batches.into_iter().map(move |batch| {
-        let lesson = Lesson::of(windows, batch, network.graph, &states);
+        let lesson = TrainingBatch::of(windows, batch, network.graph, &states);
         objective.measure(lesson.pass(network, weights).output(), &lesson.target).1
     })
 }

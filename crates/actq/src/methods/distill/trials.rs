@@ -14,13 +14,13 @@
 //! little (docs/records/2026-11-26-trials.md).
 
 use super::candidate::Candidate;
-use super::choose::{Chosen, LEAST_STEPS, errors, lowest_error};
+use super::choose::{Chosen, MIN_STEPS, errors, lowest_error};
 #[cfg(doc)]
 use super::removal::even_layer_errors;
 use super::schedule::Bounds;
-use super::shape::Goal;
-use super::train::{Present, Task, distill};
-use crate::methods::learning::{Choice, Recipe, Tried};
+use super::shape::Target;
+use super::train::{Baseline, Task, distill};
+use crate::methods::learning::{Choice, Recipe, Trial};
 
 /// Factors on the learning rates. Recurrent networks use only the first, since their rates hardly depend on the size.
 /// Even layers gave them the same shapes, or no better ones, and their trials take longest.
@@ -38,14 +38,14 @@ const TRIAL_TIME_DIVISOR: u32 = 20;
 /// Chooses the learning rate and the shape of a network, whose first shape is given. If few steps are to be learned, it
 /// runs no trials.
 pub(super) fn choose_recipe(
-    goal: Goal<'_>,
+    goal: Target<'_>,
     first: Candidate,
     recipe: Recipe,
     progress: &mut dyn FnMut(f64, f64),
 ) -> (Candidate, Chosen) {
     let windows = &goal.statistics.windows;
     let Bounds { steps, time } = goal.statistics.bounds(goal.options);
-    if steps.is_some_and(|steps| steps < LEAST_STEPS) {
+    if steps.is_some_and(|steps| steps < MIN_STEPS) {
         return (first, Chosen::untried(Choice::Learning(recipe), Bounds { steps, time }));
     }
     let small = first.task(goal, recipe).keeps_less_than_a_quarter(windows);
@@ -59,13 +59,13 @@ pub(super) fn choose_recipe(
     };
     let mut attempt = |candidate: &Candidate, recipe: Recipe, before: usize| {
         let task = Task { bounds, watched: None, ..candidate.task(goal, recipe) };
-        let mut progress = |now: Present| progress((before as f64 + now.share) / work, now.error);
+        let mut progress = |now: Baseline| progress((before as f64 + now.share) / work, now.error);
         let learned = distill(&task, windows, &mut progress);
         let [recorded, widened] = errors(&task, &learned.graph, &learned.quantized, windows);
-        Tried { choice: Choice::Learning(recipe), recorded, widened }
+        Trial { choice: Choice::Learning(recipe), recorded, widened }
     };
-    let chosen = |tried: &[Tried]| match lowest_error(tried, windows.recurrent()) {
-        Some(Tried { choice: Choice::Learning(recipe), .. }) => *recipe,
+    let chosen = |tried: &[Trial]| match lowest_error(tried, windows.recurrent()) {
+        Some(Trial { choice: Choice::Learning(recipe), .. }) => *recipe,
         _ => recipe,
     };
     let mut tried = Vec::new();
@@ -73,7 +73,7 @@ pub(super) fn choose_recipe(
         tried.push(attempt(&first, Recipe { rate, ..recipe }, tried.len()));
     }
     let recipe = chosen(&tried);
-    let mut of_shapes: Vec<Tried> =
+    let mut of_shapes: Vec<Trial> =
         tried.iter().filter(|tried| tried.choice == Choice::Learning(recipe)).copied().collect();
     let mut candidates = vec![(recipe, first)];
     for &even in evenness {
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn rates_are_tried_and_then_shapes() {
-        let Learning { choice, tried, .. } = learning(LEAST_STEPS);
+        let Learning { choice, tried, .. } = learning(MIN_STEPS);
         let recipes: Vec<Recipe> = tried.iter().map(|tried| recipe(tried.choice)).collect();
         let (of_rates, of_shapes) = recipes.split_at(RATES.len());
         assert_eq!(
@@ -146,7 +146,7 @@ mod tests {
         let (measured, even) = of_shapes.split_at(first_even);
         assert!(measured.iter().all(|of| ROUNDINGS[1..].contains(&of.rounding)), "{measured:?}");
         assert!(even.len() <= MAX_EVEN_TRIALS && even.iter().all(|of| of.even), "{even:?}");
-        let at_rate: Vec<Tried> = tried.iter().filter(|tried| recipe(tried.choice).rate == rate).copied().collect();
+        let at_rate: Vec<Trial> = tried.iter().filter(|tried| recipe(tried.choice).rate == rate).copied().collect();
         assert_eq!(lowest_error(&at_rate, false).map(|tried| tried.choice), Some(choice));
     }
 

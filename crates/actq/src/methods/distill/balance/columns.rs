@@ -70,7 +70,7 @@ impl Columns {
     }
 
     /// `true` if a value is so large or small that f32 can square it only after a factor is applied.
-    pub(super) fn is_far(&self, column: usize) -> bool {
+    pub(super) fn is_outlier(&self, column: usize) -> bool {
         self.is_beyond(column, MAX_DEVIATION)
     }
 
@@ -81,7 +81,7 @@ impl Columns {
     }
 
     /// `true` if the values are usually so large or small that f32 can square them only after a factor is applied.
-    pub(super) fn are_far(&self) -> bool {
+    pub(super) fn has_outliers(&self) -> bool {
         let deviations = self.deviation.iter().zip(&self.units).filter(|(d, _)| **d > 0.0).map(|(d, u)| d / u);
         geometric_mean(deviations).is_some_and(|usual| !(1.0 / MAX_DEVIATION..=MAX_DEVIATION).contains(&usual))
     }

@@ -138,7 +138,7 @@ impl Kept {
         let roots = |values: &[f64]| weights.iter().zip(values).map(|(a, h)| (a * h).sqrt()).collect::<Vec<f64>>();
         let scaled = roots(if has_means { &centred } else { &values });
         let least = roots(&centred).iter().sum();
-        let mut order: Vec<usize> = (0..weights.len()).filter(|&c| !columns.is_far(c)).collect();
+        let mut order: Vec<usize> = (0..weights.len()).filter(|&c| !columns.is_outlier(c)).collect();
         let ratio = |c: usize| weights[c] / values[c];
         order.sort_by(|&a, &b| ratio(a).total_cmp(&ratio(b)).then(values[b].total_cmp(&values[a])));
         Self { has_means, order, weights, values, scaled, least }
