@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use actq::import::Importer as _;
+use actq::import::contract::StatedLimits;
 use actq::measure::actions::actions;
 use actq::measure::size::hex;
 use actq_cli::commands::bundle::{Gathered, refuse_open_questions};
@@ -15,7 +16,9 @@ use actq_cli::report::deployment;
 use actq_deploy::{Answers, Bundle, DESCRIPTION, DeployFolder, read};
 use actq_onnx::{Choice, Onnx, import, import_bytes};
 use anyhow::anyhow;
-use numpy::{IntoPyArray as _, PyArrayMethods as _};
+use numpy::{
+    AllowTypeChange, IntoPyArray as _, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _, PyUntypedArrayMethods as _,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -98,6 +101,31 @@ impl Policy {
         hex(&self.policy.digest)
     }
 
+    /// Returns the actions at observations [step, value], one after the other from the start of an episode, or at one
+    /// observation [value]; with scale, offset and limits, before step limits and smoothing.
+    fn __call__<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = given)] observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        if self.policy.around.is_some() {
+            return Err(error!(
+                "a policy of a deploy bundle cannot be called; quantize it, and call a Head of its image"
+            ));
+        }
+        let (given, len) = (observations.shape().to_vec(), self.policy.graph.input_len());
+        let shape = match given[..] {
+            [values] if values == len => vec![self.policy.chunk * self.policy.act_len],
+            [steps, values] if values == len => vec![steps, self.policy.chunk * self.policy.act_len],
+            _ => {
+                return Err(error!("the observations have the shape {given:?}; use [{len}] for one, or [steps, {len}]"));
+            }
+        };
+        let observations: Vec<f32> = observations.as_array().iter().copied().collect();
+        let rows: Vec<Vec<f32>> = observations.chunks(len).map(<[f32]>::to_vec).collect();
+        py.detach(|| actions(&self.policy, &rows)).concat().into_pyarray(py).reshape(shape)
+    }
+
     /// Returns the policy itself, because it never changes.
     fn __copy__(slf: Py<Self>) -> Py<Self> {
         slf
@@ -125,20 +153,26 @@ impl Policy {
 
 /// Reads a policy folder, an ONNX file, or a deploy bundle.
 #[pyfunction]
-#[pyo3(signature = (path, *, output, states, observe, accept_profile, answers))]
+#[pyo3(signature = (path, *, output, states, observe, limits, rate_hz, accept_profile, answers, profile))]
+#[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub(crate) fn import_path(
     py: Python<'_>,
     #[pyo3(from_py_with = given)] path: PathBuf,
     #[pyo3(from_py_with = given)] output: Option<String>,
     #[pyo3(from_py_with = given)] states: Vec<(String, String)>,
     #[pyo3(from_py_with = given)] observe: Vec<String>,
+    #[pyo3(from_py_with = given)] limits: [Vec<f64>; 3],
+    #[pyo3(from_py_with = given)] rate_hz: Option<f64>,
     #[pyo3(from_py_with = given)] accept_profile: bool,
     #[pyo3(from_py_with = given)] answers: String,
+    #[pyo3(from_py_with = given)] profile: Option<String>,
 ) -> PyResult<Policy> {
     py.detach(|| {
-        let choice = Choice { output, states, observed: observe, ..Choice::default() };
-        let is_answered = accept_profile || !answers.is_empty();
-        let refuse_answers = || error!("{}: only a deploy bundle takes accept_profile and answers", path.display());
+        let limits = stated(limits);
+        let choice = Choice { output, states, observed: observe, limits, rate_hz, ..Choice::default() };
+        let is_answered = accept_profile || !answers.is_empty() || profile.is_some();
+        let refuse_answers =
+            || error!("{}: only a deploy bundle takes accept_profile, answers and profile", path.display());
         if Onnx.accepts(&path) {
             if is_answered {
                 return Err(refuse_answers());
@@ -151,8 +185,14 @@ pub(crate) fn import_path(
         }
         let is_policy = DeployFolder.accepts(&path) || path.join(actq::import::FILES[0]).is_file();
         let is_bundle = path.is_dir() || path.extension().is_some_and(|ending| ending == "kinfer");
+        if choice.rate_hz.is_some() {
+            return Err(error!("{}: only an ONNX file takes rate_hz; this source states its rate", path.display()));
+        }
         if is_bundle && !is_policy {
-            return import_bundle(&path, accept_profile, &answers);
+            return import_bundle(&path, accept_profile, &answers, profile.as_deref(), &choice.limits);
+        }
+        if !choice.limits.is_empty() {
+            return Err(error!("{}: a policy folder takes no limits; set them in its files", path.display()));
         }
         if is_answered {
             return Err(refuse_answers());
@@ -162,12 +202,24 @@ pub(crate) fn import_path(
 }
 
 /// Imports a bundle into a temporary folder, as `actq import` does into a lasting one.
-fn import_bundle(path: &Path, accept_profile: bool, answers: &str) -> PyResult<Policy> {
-    let bundle = Bundle::open(path).or_raise()?;
-    let reading = read(&bundle, accept_profile, Answers::parse(answers).or_raise()?).or_raise()?;
+fn import_bundle(
+    path: &Path,
+    accept_profile: bool,
+    answers: &str,
+    profile: Option<&str>,
+    limits: &StatedLimits,
+) -> PyResult<Policy> {
+    let mut bundle = Bundle::open(path).or_raise()?;
+    if let Some(profile) = profile {
+        bundle = bundle.with_profile(profile);
+    }
+    let mut reading = read(&bundle, accept_profile, Answers::parse(answers).or_raise()?).or_raise()?;
     refuse_open_questions(&reading)
         .map_err(|error| anyhow!("{}{error:#}", deployment::questions(&reading.questions)))
         .or_raise()?;
+    if !limits.is_empty() {
+        reading.limit(limits, &bundle).or_raise()?;
+    }
     let folder = Scratch::new().or_raise()?;
     for (name, content) in Gathered::of(&bundle, &reading).or_raise()?.files {
         let place = folder.path().join(name);
@@ -179,15 +231,22 @@ fn import_bundle(path: &Path, accept_profile: bool, answers: &str) -> PyResult<P
     Ok(Policy { policy: Arc::new(policy), _folder: Some(folder) })
 }
 
+/// Returns the lowest and highest values and the largest steps that a caller passes.
+fn stated([low, high, max_step]: [Vec<f64>; 3]) -> StatedLimits {
+    StatedLimits { low, high, max_step }
+}
+
 /// Largest magnitudes of the observations that a module is compared on, and the number of them for each: so different
 /// that the branches of a module are met.
 const MAGNITUDES: [f32; 7] = [2.0, 0.002, 0.02, 0.2, 20.0, 200.0, 2000.0];
 const FRAMES: usize = 32;
 
 /// Reads the bytes of an ONNX file. Returns the policy, and how to compare its source with it: observed inputs, pairs of
-/// states, the output, drawn observations [block, frame, value], and the policy's actions on them.
+/// states, the output, drawn observations [block, frame, value], and the policy's actions on them without the limits of
+/// the caller.
 #[pyfunction]
-#[pyo3(signature = (bytes, *, name, output, states, observe))]
+#[pyo3(signature = (bytes, *, name, output, states, observe, limits, rate_hz))]
+#[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub(crate) fn import_onnx<'py>(
     py: Python<'py>,
     bytes: Vec<u8>,
@@ -195,15 +254,22 @@ pub(crate) fn import_onnx<'py>(
     #[pyo3(from_py_with = given)] output: Option<String>,
     #[pyo3(from_py_with = given)] states: Vec<(String, String)>,
     #[pyo3(from_py_with = given)] observe: Vec<String>,
+    #[pyo3(from_py_with = given)] limits: [Vec<f64>; 3],
+    #[pyo3(from_py_with = given)] rate_hz: Option<f64>,
 ) -> PyResult<(Policy, Bound<'py, PyDict>)> {
     let (imported, policy, probes, actions) = py.detach(|| {
         let choice = Choice { output, states, observed: observe, ..Choice::default() };
-        let imported = import_bytes(bytes, Path::new(""), &name, &choice).map_err(|error| error.context(name.clone()));
-        let imported = imported.map_err(raise_of_import)?;
-        let policy = imported.policy(Path::new(""), Path::new(&name)).or_raise()?;
+        let import = |choice: &Choice| {
+            let imported = import_bytes(bytes.clone(), Path::new(""), &name, choice);
+            let imported = imported.map_err(|error| raise_of_import(error.context(name.clone())))?;
+            let policy = imported.policy(Path::new(""), Path::new(&name)).or_raise()?;
+            PyResult::Ok((imported, policy))
+        };
+        let (imported, policy) = import(&choice)?;
         let probes = probes(&imported, &policy, &MAGNITUDES, FRAMES);
         let actions = actions(&policy, &probes);
-        PyResult::Ok((imported, policy, probes, actions))
+        let limited = Choice { limits: stated(limits), rate_hz, ..choice };
+        PyResult::Ok((imported, import(&limited)?.1, probes, actions))
     })?;
     let plan = PyDict::new(py);
     plan.set_item("inputs", imported.inputs)?;

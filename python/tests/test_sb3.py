@@ -23,11 +23,27 @@ class Env(gymnasium.Env):
 
 def model(algorithm, actions, **options):
     torch.manual_seed(0)
-    made = getattr(sb3, algorithm)("MlpPolicy", Env(actions), seed=0, device="cpu", **options)
+    return moved(getattr(sb3, algorithm)("MlpPolicy", Env(actions), seed=0, device="cpu", **options))
+
+
+def moved(made):
+    """Changes the weights: those of an untrained last layer give hardly any action."""
     with torch.no_grad():
         for parameter in made.policy.parameters():
             parameter.add_(0.1 * torch.randn_like(parameter))
     return made
+
+
+def test_a_new_model_has_the_limits_of_its_action_space():
+    policy = actq.import_policy(sb3.PPO("MlpPolicy", Env(WIDE), seed=0, device="cpu"))
+    lines = [line.split() for line in actq.quantize(policy, bits=8, method="rtn", progress=False).inspect().splitlines()]
+    i = lines.index(["action", "scale", "offset", "low", "high", "max", "step"])
+    assert [line[3:5] for line in lines[i + 1 : i + 4]] == [["-2", "2"], ["0", "1"], ["-5", "7"]], "a controller can arm"
+    narrow = actq.import_policy(sb3.PPO("MlpPolicy", Env(WIDE), seed=0, device="cpu").policy, torch.zeros(1, 17), high=[1, 2, 3])
+    random = 1e3 * np.random.default_rng(0).normal(size=(200, 17)).astype(np.float32)
+    assert (narrow(random) <= [1, 1, 3]).all() and (narrow(random) >= WIDE.low).all()
+    with pytest.raises(actq.Error, match="PPO: 2 limits for 3 actions; give one for each, or one for all"):
+        actq.import_policy(sb3.PPO("MlpPolicy", Env(WIDE), seed=0, device="cpu"), low=[0, 1])
 
 
 def image_of(policy):
@@ -60,8 +76,8 @@ def test_scores_choose_the_predicted_action(algorithm, options):
 
 def test_other_objects_are_refused_with_the_right_one(tmp_path):
     made = model("PPO", WIDE)
-    with pytest.raises(actq.Error, match="the policy is of type PPO; pass model.policy"):
-        actq.import_policy(made, torch.zeros(1, 17))
+    with pytest.raises(actq.Error, match="the policy is of type object; pass a path, a torch.nn.Module or a trained model"):
+        actq.import_policy(object(), torch.zeros(1, 17))
     with pytest.raises(actq.Error, match=r"output_0 \(64 values\), output_1 \(64 values\); choose one"):
         actq.import_policy(made.policy.mlp_extractor, torch.zeros(1, 17))
     made.save(tmp_path / "model.zip")
@@ -92,3 +108,50 @@ def test_an_exported_policy_asks_for_the_action(tmp_path):
     torch.onnx.export(made.policy, (torch.zeros(1, 17),), str(file), opset_version=17, dynamo=False)
     with pytest.raises(actq.Error, match=r"no other output is named action; choose one by .* \(1 values\)"):
         actq.import_policy(file)
+
+
+class Parts(gymnasium.Env):
+    metadata = {}
+    observation_space = spaces.Dict({"joints": spaces.Box(-9, 9, (4,)), "aim": spaces.Box(-9, 9, (3,))})
+    action_space = WIDE
+
+
+def vectorized(env, stacked, is_outside):
+    from stable_baselines3.common import vec_env
+
+    made = vec_env.DummyVecEnv([lambda: env])
+    normalize = lambda env: vec_env.VecNormalize(env, clip_obs=1.5)  # noqa: E731
+    stack = lambda env: vec_env.VecFrameStack(env, 3) if stacked else env  # noqa: E731
+    return normalize(stack(made)) if is_outside else stack(normalize(made))
+
+
+@pytest.mark.parametrize("algorithm", ["PPO", "SAC"])
+@pytest.mark.parametrize(("stacked", "is_outside"), [(False, True), (True, True), (True, False)])
+def test_a_model_has_its_normalization(algorithm, stacked, is_outside):
+    env = vectorized(Env(WIDE), stacked, is_outside)
+    options = {"buffer_size": 9} if algorithm == "SAC" else {}
+    made = moved(getattr(sb3, algorithm)("MlpPolicy", env, seed=0, device="cpu", **options))
+    statistics = made.get_vec_normalize_env().obs_rms
+    random = np.random.default_rng(3)
+    statistics.mean, statistics.var = random.normal(size=statistics.mean.shape), 0.1 + random.random(statistics.mean.shape)
+    policy = actq.import_policy(made, name="walker")
+    frames = (1 + 2 * random.normal(size=(50, policy.obs_len))).astype(np.float32)
+    normalize = made.get_vec_normalize_env().normalize_obs
+    of_frames = frames.reshape(50, -1, statistics.mean.shape[-1])
+    expected, _ = made.predict(normalize(of_frames).reshape(50, -1), deterministic=True)
+    np.testing.assert_allclose(policy(frames), expected, rtol=1e-4, atol=1e-4)
+    assert policy.name == "walker" and np.ptp(expected) > 0.1
+    assert (policy(100 * frames) <= WIDE.high).all()
+
+
+def test_parts_of_an_observation_follow_the_keys_of_the_space():
+    env = vectorized(Parts(), False, True)
+    env.norm_obs_keys = ["joints"]
+    made = moved(sb3.PPO("MultiInputPolicy", env, seed=0, device="cpu"))
+    env.obs_rms["joints"].mean[:] = [1, 2, 3, 4]
+    policy = actq.import_policy(made)
+    rows = np.random.default_rng(1).normal(size=(20, 7)).astype(np.float32)
+    ends = {"aim": rows[:, :3], "joints": rows[:, 3:]}
+    assert list(made.observation_space.spaces) == ["aim", "joints"]
+    expected, _ = made.predict(env.normalize_obs(ends), deterministic=True)
+    np.testing.assert_allclose(policy(rows), expected, rtol=1e-4, atol=1e-4)

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use actq::error::{Context as _, Result, bail};
+use actq::error::{Context as _, Result, bail, ensure};
+use actq::import::contract::StatedLimits;
 
 use crate::bundle::Bundle;
 use crate::description::{Description, Numbers, Op, Operand};
@@ -10,6 +11,7 @@ use crate::facts::{Answers, Facts, Profile, Question};
 use crate::families::{FAMILIES, Stack};
 use crate::family::{Family, Recognized};
 use crate::nearest::nearest;
+use crate::plan::Plan;
 
 /// File of a description, in a bundle's folder. Where it is, no reader is needed.
 pub const DESCRIPTION: &str = "deploy.toml";
@@ -29,6 +31,33 @@ pub struct Reading {
     pub questions: Vec<Question>,
     /// Keys of the files that nothing read.
     pub unread: Vec<String>,
+}
+
+impl Reading {
+    /// Limits the targets to what a user states, with a value for all targets or one for each value of them in their
+    /// order; of two limits, the stricter one holds.
+    ///
+    /// # Errors
+    ///
+    /// As [`StatedLimits::within`], for a largest step, and if the description is not complete.
+    pub fn limit(&mut self, stated: &StatedLimits, bundle: &Bundle) -> Result<()> {
+        ensure!(
+            stated.max_step.is_empty(),
+            "a bundle's targets have no largest step; its firmware takes LOW:HIGH:RATE"
+        );
+        let known: Vec<Vec<[f64; 2]>> = Plan::new(&self.description, bundle).context(DESCRIPTION)?.target_limits();
+        let mut limits = stated.within(&known.concat(), "the bundle")?.into_iter();
+        for (target, known) in self.description.targets.iter_mut().zip(known) {
+            let own: Vec<[f64; 2]> = limits.by_ref().take(known.len()).collect();
+            let side = |side: usize| own.iter().map(|limits| limits[side]).collect::<Vec<f64>>();
+            let [low, high] = [side(0), side(1)];
+            if own != known && low.iter().chain(&high).all(|limit| limit.is_finite()) {
+                target.limits = Some([low, high].map(Numbers::Each));
+                self.sources.insert("limits".to_owned(), "the option for limits".to_owned());
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Limits the targets that end in a clip to its numbers: a controller needs them to arm.

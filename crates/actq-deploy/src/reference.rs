@@ -11,7 +11,7 @@ use actq::text::count;
 
 use crate::conventions::{Variant, variants};
 use crate::description::Description;
-use crate::plan::{Plan, PlannedTarget};
+use crate::plan::Plan;
 use crate::run::{Runner, Tick};
 use crate::sources::{Array, Sources};
 
@@ -256,7 +256,7 @@ impl Reference {
     fn run(&self, plan: Plan, rounding: &[Values], ends: Ends, fed: Fed) -> Result<Comparison> {
         let frames = self.raw.frames(&plan.inputs)?;
         let labels: Vec<String> = plan.observation_labels().iter().map(ToString::to_string).collect();
-        let (limits, scales) = (limits(&plan), KINDS.map(|kind| self.largest(kind)));
+        let (limits, scales) = (plan.target_limits().concat(), KINDS.map(|kind| self.largest(kind)));
         let mut runner = Runner::new(plan);
         let mut comparison = Comparison { ticks: self.raw.ticks, ..Comparison::default() };
         for (t, frame) in frames.iter().enumerate() {
@@ -296,15 +296,6 @@ impl Reference {
         }
         Ok(comparison)
     }
-}
-
-/// Returns the limits of each value of the targets.
-fn limits(plan: &Plan) -> Vec<[f64; 2]> {
-    let of = |target: &PlannedTarget| match &target.limits {
-        Some([low, high]) => low.iter().zip(high).map(|(low, high)| [*low, *high]).collect(),
-        None => vec![[f64::NEG_INFINITY, f64::INFINITY]; plan.values[target.value].labels.len()],
-    };
-    plan.targets.iter().flat_map(of).collect()
 }
 
 /// Returns the conventions that explain a difference: those that agree with the reference if they alone are changed.

@@ -198,6 +198,10 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
     let last = contract.iter().flat_map(keys).collect();
     let (contract, bounded) =
         if choice.is_inner { (None, 0) } else { action::bounded(&exprs, root, contract, act_len) };
+    let contract = match choice.limits.is_empty() {
+        true => contract,
+        false => Some(contract.unwrap_or_default().limited(&choice.limits, act_len)?),
+    };
     let root = simplify(&mut exprs, root, &cells.instead);
     let lowered = lower(&exprs, root, &observation.offsets, observation.len)
         .map_err(|(id, error)| at_node(model, &exprs, id, error))?;
@@ -208,6 +212,7 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
         chunk: (chunk > 1).then_some(chunk),
         obs_dim: observation.len,
         act_dim: act_len,
+        control_hz: choice.rate_hz,
         // Without a contract, the actions of a chunk would be limited to -1 .. 1.
         action: contract.or_else(|| (chunk > 1).then(JsonContract::default)),
         ops: Vec::new(),

@@ -49,6 +49,9 @@ class Policy:
     @property
     def digest(self) -> str:
         """SHA-256 of the policy's files, as `Image.source` has it."""
+    def __call__(self, observations: npt.ArrayLike) -> _Floats:
+        """Returns the actions in f32 at observations [steps, obs_len] of one episode, from its start, or at one observation
+        [obs_len]: the network's outputs with scale, offset and limits, before step limits and smoothing."""
 
 class Cost(TypedDict):
     """The predicted cost of a step that evaluates the network, and the memory that it needs."""
@@ -242,9 +245,27 @@ class Link:
     def __exit__(self, *exception: object) -> None: ...
 
 def import_path(
-    path: _Path, *, output: Optional[str], states: List[Tuple[str, str]], observe: Sequence[str], accept_profile: bool, answers: str
+    path: _Path,
+    *,
+    output: Optional[str],
+    states: List[Tuple[str, str]],
+    observe: Sequence[str],
+    limits: Tuple[List[float], List[float], List[float]],
+    rate_hz: Optional[float],
+    accept_profile: bool,
+    answers: str,
+    profile: Optional[str],
 ) -> Policy: ...
-def import_onnx(bytes: bytes, *, name: str, output: Optional[str], states: List[Tuple[str, str]], observe: Sequence[str]) -> Tuple[Policy, Dict[str, Any]]: ...
+def import_onnx(
+    bytes: bytes,
+    *,
+    name: str,
+    output: Optional[str],
+    states: List[Tuple[str, str]],
+    observe: Sequence[str],
+    limits: Tuple[List[float], List[float], List[float]],
+    rate_hz: Optional[float],
+) -> Tuple[Policy, Dict[str, Any]]: ...
 def quantize(
     policy: Policy, recordings: Any, heldout: Any, request: Dict[str, Any], progress: _Report
 ) -> Tuple[Image, List[str], List[str]]: ...

@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Mapping, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, List, Mapping, Optional, Sequence, Tuple, Union
+
+import numpy as np
 
 from . import _actq
 from ._actq import Policy
 from ._typing import Path as PathLike
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
     import torch
 
     Source = Union[PathLike, torch.nn.Module, torch.jit.ScriptModule]
@@ -33,13 +36,20 @@ def import_policy(
     name: Optional[str] = None,
     accept_profile: bool = False,
     answers: Union[None, PathLike, Mapping[str, Any]] = None,
+    profile: Optional[PathLike] = None,
+    low: Optional[npt.ArrayLike] = None,
+    high: Optional[npt.ArrayLike] = None,
+    max_step: Optional[npt.ArrayLike] = None,
+    rate_hz: Optional[float] = None,
 ) -> Policy:
     """Reads a policy.
 
     source: the path of an ONNX file, of a policy folder (docs/POLICY.md), of a deploy bundle (docs/DEPLOY.md) or of a
-        TorchScript file; or a torch.nn.Module. Of a policy of Stable-Baselines3, its `predict(deterministic=True)` is read.
+        TorchScript file; or a torch.nn.Module. Or a trained model: an algorithm or policy of Stable-Baselines3, whose
+        `predict(deterministic=True)` is read, with its VecNormalize; a runner of rsl_rl 5; an agent of CleanRL, whose
+        mean action is read. A Dict of observations is one vector, in the order of the space's keys.
     example: of a module or TorchScript file, its input: a tensor [1, n_obs], or a tuple of the observation and the
-        recurrent states, each with a batch of 1.
+        recurrent states, each with a batch of 1. A trained model needs none.
     output: of ONNX or a module, the output that is the action. The default is the one named "action", or the only
         candidate.
     states: of ONNX or a module, the inputs that hold recurrent state, each with the output of its next value.
@@ -49,6 +59,12 @@ def import_policy(
     name: of a module, the policy's name; the default is its class.
     accept_profile, answers: of a bundle, the answers to what its files do not say, as `actq import` takes them: a path
         of a TOML file, or a mapping.
+    profile: of a bundle, the path of the profile of your own deploy stack, a TOML file.
+    low, high: limits of the actions, or of a bundle's targets, in their unit: a number, or one for each, as
+        `env.action_space.low`. Of these and those in the source, the stricter ones hold. A motor controller refuses to arm
+        without limits.
+    max_step: largest change from one action to the next, a number, or one for each. A bundle takes none.
+    rate_hz: actions in a second. A policy folder and a bundle state theirs.
 
     Copies of a module run on drawn observations, and the policy must give their actions. The module does not change.
 
@@ -59,6 +75,9 @@ def import_policy(
     if isinstance(observe, str):
         raise _actq.Error(f"observe is the text {observe!r}; pass a list of inputs")
     pairs = list((states or {}).items())
+    limits = (_numbers("low", low), _numbers("high", high), _numbers("max_step", max_step))
+    if rate_hz is not None and not (isinstance(rate_hz, (int, float)) and 0 < rate_hz < float("inf")):
+        raise _actq.Error(f"rate_hz is {rate_hz!r}; pass a number above 0")
     if isinstance(source, (str, os.PathLike)):
         if not os.fspath(source):
             raise _actq.Error("the path of the policy is empty")
@@ -71,8 +90,9 @@ def import_policy(
                 if value is not None:
                     raise _actq.Error(f"{path}: only a module or a TorchScript file takes {key}")
             return _actq.import_path(
-                path, output=output, states=pairs, observe=observe, accept_profile=accept_profile, answers=_toml(answers)
-            )
+                path, output=output, states=pairs, observe=observe, limits=limits, rate_hz=rate_hz,
+                accept_profile=accept_profile, answers=_toml(answers), profile=_text("profile", profile),
+            )  # fmt: skip
         if not path.is_file():
             raise _actq.Error(f"{path}: there is no such file")
         name = name or path.stem
@@ -81,21 +101,39 @@ def import_policy(
         except Exception as error:
             text = str(error).strip().split("\n")[0]
             raise _actq.Error(f"{path}: torch cannot read it as TorchScript: {text}; pass a module instead") from error
-    elif not callable(getattr(source, "forward", None)):
-        # An algorithm of Stable-Baselines3.
-        remedy = "model.policy" if hasattr(source, "policy") else "a path, or a torch.nn.Module"
-        raise _actq.Error(f"the policy is of type {type(source).__name__}; pass {remedy}")
-    if accept_profile or answers is not None:
-        raise _actq.Error("only a deploy bundle takes accept_profile and answers")
+    if accept_profile or answers is not None or profile is not None:
+        raise _actq.Error("only a deploy bundle takes accept_profile, answers and profile")
     _torch_module()
+    from . import _models
     from ._torch import import_module
 
     name = name or type(source).__name__
+    model = _models.of(source, name)
+    if model is None and not callable(getattr(source, "forward", None)):
+        raise _actq.Error(f"the policy is of type {type(source).__name__}; pass a path, a torch.nn.Module or a trained model")
+    if model is not None:
+        source, example = model.module, model.example if example is None else example
+        input_names, output_names = input_names or model.input_names, output_names or model.output_names
     if example is None:
         raise _actq.Error(f"{name}: pass an example of the module's input, as torch.zeros(1, n_obs)")
-    return import_module(
-        source, example, name, output=output, states=pairs, observe=observe, input_names=input_names, output_names=output_names
+    policy = import_module(
+        source, example, name, output=output, states=pairs, observe=observe, input_names=input_names,
+        output_names=output_names, limits=limits, rate_hz=rate_hz,
     )  # fmt: skip
+    if model is not None:
+        model.refuse_other_actions(policy, name, limits)
+    return policy
+
+
+def _numbers(name: str, value: Any) -> List[float]:
+    """Returns the numbers of an argument, one after the other."""
+    if value is None:
+        return []
+    try:
+        numbers = np.asarray(value, np.float64).reshape(-1)
+    except (TypeError, ValueError) as error:
+        raise _actq.Error(f"{name}: {error}; pass a number, or one for each action") from error
+    return [float(number) for number in numbers]
 
 
 def _torch_module() -> Any:
@@ -112,10 +150,14 @@ def _toml(answers: Union[None, PathLike, Mapping[str, Any]]) -> str:
         return ""
     if isinstance(answers, Mapping):
         return "".join(f"{key} = {_toml_value(key, value)}\n" for key, value in answers.items())
+    return _text("answers", answers) or ""
+
+
+def _text(name: str, path: Optional[PathLike]) -> Optional[str]:
     try:
-        return Path(answers).read_text(encoding="utf-8")
+        return None if path is None else Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise _actq.Error(f"answers: {answers}: {error}") from error
+        raise _actq.Error(f"{name}: {path}: {error}") from error
 
 
 def _toml_value(key: str, value: Any) -> str:

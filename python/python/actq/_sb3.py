@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Dict, List, Tuple, Union
 
 import numpy as np
 import torch
 
 from ._actq import Error
-from ._typing import Array
+from ._typing import Array, Limits
 
 
 def is_policy(module: Any) -> bool:
@@ -18,7 +18,8 @@ def is_policy(module: Any) -> bool:
 
 
 class Deterministic(torch.nn.Module):
-    """What `policy.predict(obs, deterministic=True)` returns. For Discrete, scores whose largest is that action."""
+    """What `policy.predict(obs, deterministic=True)` returns, before the limits of the action space. For Discrete, scores
+    whose largest is that action."""
 
     low: torch.Tensor
     high: torch.Tensor
@@ -26,6 +27,7 @@ class Deterministic(torch.nn.Module):
     def __init__(self, policy: Any, name: str) -> None:
         super().__init__()
         self.policy = policy
+        self.parts = parts(policy.observation_space, name)
         space = policy.action_space
         self.kind = type(space).__name__
         has_actor = all(hasattr(policy, part) for part in ("mlp_extractor", "action_net", "pi_features_extractor"))
@@ -38,8 +40,8 @@ class Deterministic(torch.nn.Module):
             self.register_buffer("low", torch.from_numpy(space.low.astype(np.float32)), persistent=False)
             self.register_buffer("high", torch.from_numpy(space.high.astype(np.float32)), persistent=False)
 
-    def forward(self, obs: torch.Tensor) -> Any:
-        policy = self.policy
+    def forward(self, given: torch.Tensor) -> Any:
+        policy, obs = self.policy, self.observation(given)
         if self.kind == "Discrete":
             if hasattr(policy, "q_net") and isinstance(policy.q_net, torch.nn.Sequential):
                 return policy(obs)
@@ -50,7 +52,53 @@ class Deterministic(torch.nn.Module):
         action = policy._predict(obs, deterministic=True)
         if policy.squash_output:
             return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
-        return torch.minimum(torch.maximum(action, self.low), self.high)
+        return action
+
+    def limits(self) -> Tuple[Array, Array]:
+        """Returns lowest and highest actions; an action that is scaled to them has no others."""
+        if self.kind == "Box" and not self.policy.squash_output:
+            space = self.policy.action_space
+            return space.low.reshape(-1), space.high.reshape(-1)
+        return np.array([]), np.array([])
+
+    def observation(self, given: Any) -> Any:
+        """Returns what the policy takes of flat values, an array or a tensor: of a Dict, those of each key."""
+        if not isinstance(self.parts, list):
+            return given.reshape(-1, *self.parts)
+        lengths = [int(np.prod(shape)) for _, shape in self.parts]
+        ends = np.cumsum(lengths).tolist()
+        return {
+            key: given[:, end - length : end].reshape(-1, *shape)
+            for (key, shape), length, end in zip(self.parts, lengths, ends)
+        }
+
+
+#: The shape of an observation; of a Dict the keys with their shapes, in the order of the space.
+Parts = Union[Tuple[int, ...], List[Tuple[str, Tuple[int, ...]]]]
+
+
+def parts(space: Any, name: str) -> Parts:
+    """Returns the parts of an observation. Only numbers can be observed."""
+    spaces: Dict[str, Any] = getattr(space, "spaces", {"": space})
+    for key, part in spaces.items():
+        if type(part).__name__ != "Box":
+            raise Error(f"{name}: the observation {key} is {part}; only numbers of a Box, or a Dict of them, can be observed")
+    shapes = {key: tuple(int(n) for n in part.shape) for key, part in spaces.items()}
+    return list(shapes.items()) if hasattr(space, "spaces") else shapes[""]
+
+
+def limited(module: Any, limits: Limits, name: str) -> Limits:
+    """Returns limits of a caller with those of the action space, of two the stricter."""
+    for part in module.modules():
+        if isinstance(part, Deterministic) and part.limits()[0].size:
+            low, high = part.limits()
+            stated = [(limits[0], low, np.maximum), (limits[1], high, np.minimum)]
+            for given, own, _ in stated:
+                if len(given) > 1 and len(given) != own.size:
+                    raise Error(f"{name}: {len(given)} limits for {own.size} actions; give one for each, or one for all")
+            low, high = (stricter(given, own) if given else own for given, own, stricter in stated)
+            return low.astype(float).tolist(), high.astype(float).tolist(), limits[2]
+    return limits
 
 
 def refuse_other_actions(module: Any, probes: Array, name: str) -> None:
@@ -58,10 +106,11 @@ def refuse_other_actions(module: Any, probes: Array, name: str) -> None:
     if not isinstance(module, Deterministic):
         return
     policy = module.policy
-    for row in probes.reshape(-1, probes.shape[-1]):
-        obs = row.reshape(policy.observation_space.shape)
-        expected, _ = policy.predict(obs, deterministic=True)
-        found = module(torch.from_numpy(obs[None]).to(policy.device))[0].cpu().numpy()
+    for row in probes.reshape(-1, 1, probes.shape[-1]):
+        (expected,), _ = policy.predict(module.observation(row), deterministic=True)
+        found = module(torch.from_numpy(row).to(policy.device))[0].cpu().numpy()
+        low, high = module.limits()
+        found = np.clip(found.reshape(expected.shape), low.reshape(expected.shape), high.reshape(expected.shape)) if low.size else found
         if module.kind == "Discrete":
             is_same = found[int(expected)] >= found.max() - 1e-5 * np.abs(found).max()
         else:

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::quantize::{BudgetArgs, LearnArgs, RunArgs};
-use super::values::{pair, positive, two_files};
+use super::values::{LimitList, limits, pair, positive, two_files};
 
 #[derive(clap::Args)]
 pub(crate) struct ImportArgs {
@@ -27,6 +27,9 @@ pub(crate) struct ImportArgs {
     /// An input that is measured anew in each step, although its name is that of a state or a constant; may be repeated
     #[arg(long, value_name = "NAME")]
     pub(crate) observe: Vec<String>,
+    /// Actions in a second
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    pub(crate) rate_hz: Option<f64>,
     /// Compare the actions with onnxruntime's, on the recording or on random observations, to 1e-5 of the largest
     /// action. If they differ, a run in float64 decides which is right. Needs Python with onnxruntime and onnx
     /// (python3, or the interpreter that ACTQ_PYTHON names)
@@ -39,7 +42,7 @@ pub(crate) struct ImportArgs {
     pub(crate) force: bool,
 }
 
-/// Options for reading a deploy bundle.
+/// Options for reading a deploy bundle, or that it shares with an ONNX file.
 #[derive(clap::Args, Clone)]
 pub(crate) struct ReadingArgs {
     /// Bundle: the answers to the questions of an earlier run, a TOML file of their keys
@@ -58,6 +61,11 @@ pub(crate) struct ReadingArgs {
     /// inputs [tick, value] by name, EXPECT.npz the arrays observation, action and target
     #[arg(long, value_name = "RAW.npz:EXPECT.npz", value_parser = two_files)]
     pub(crate) reference: Option<(PathBuf, PathBuf)>,
+    /// Lowest and highest value of all actions or targets, and the largest change in a second (which needs --rate-hz, and
+    /// which a bundle does not take); or a file with a line for each of them. Of two limits, the stricter one holds. A motor
+    /// controller refuses to arm without limits
+    #[arg(long, value_name = "LOW:HIGH[:RATE]|FILE", value_parser = limits, allow_hyphen_values = true)]
+    pub(crate) limits: Option<LimitList>,
 }
 
 #[derive(clap::Args)]

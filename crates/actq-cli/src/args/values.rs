@@ -1,10 +1,14 @@
 //! Parsers of option values. An error names the values that the option accepts.
 
+use std::fs;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use actq::error::ensure;
+use actq::import::contract::StatedLimits;
 use actq::methods::{Effort, MAX_MINUTES};
 use actq::units;
+use actq_controller::Limits;
 use actq_kernels::Width;
 use actq_kernels::layout::is_group;
 
@@ -23,6 +27,48 @@ pub(super) fn two_files(text: &str) -> Result<(PathBuf, PathBuf), String> {
     let both = text.rsplit_once(':').filter(|(first, second)| !first.is_empty() && !second.is_empty());
     let (first, second) = both.ok_or_else(|| "use the form RAW.npz:EXPECT.npz".to_owned())?;
     Ok((first.into(), second.into()))
+}
+
+/// Limits of `--limits`: one for all actions, or one for each.
+#[derive(Clone, Debug)]
+pub(crate) struct LimitList(Vec<Limits>);
+
+impl LimitList {
+    /// Returns them for actions of a rate.
+    ///
+    /// # Errors
+    ///
+    /// If they have a largest change in a second, and the rate is not known.
+    pub(crate) fn at(&self, rate_hz: Option<f64>) -> actq::error::Result<StatedLimits> {
+        let of = |value: fn(&Limits) -> f32| self.0.iter().map(value).map(f64::from).collect();
+        let has_rate = self.0.iter().any(|limits| limits.rate.is_some());
+        ensure!(!has_rate || rate_hz.is_some(), "--limits has a largest change in a second; pass --rate-hz HZ, too");
+        let step = |limits: &Limits| match (limits.rate, rate_hz) {
+            (Some(rate), Some(rate_hz)) => f64::from(rate) / rate_hz,
+            _ => f64::INFINITY,
+        };
+        let max_step = if has_rate { self.0.iter().map(step).collect() } else { Vec::new() };
+        Ok(StatedLimits { low: of(|limits| limits.low), high: of(|limits| limits.high), max_step })
+    }
+}
+
+/// Parses limits for all actions, or reads a file with a line for each.
+pub(super) fn limits(text: &str) -> Result<LimitList, String> {
+    let error = match text.parse() {
+        Ok(limits) => return Ok(LimitList(vec![limits])),
+        Err(error) => error,
+    };
+    if !Path::new(text).is_file() {
+        return Err(format!("no file has this name, and {error}"));
+    }
+    let lines = fs::read_to_string(text).map_err(|error| error.to_string())?;
+    let line = |(i, line): (usize, &str)| line.parse().map_err(|error| format!("line {}: {line:?}: {error}", i + 1));
+    let all: Vec<Limits> = lines.trim_end().lines().enumerate().map(line).collect::<Result<_, _>>()?;
+    if all.is_empty() {
+        Err("the file is empty; it takes a line LOW:HIGH for each action".to_owned())
+    } else {
+        Ok(LimitList(all))
+    }
 }
 
 /// Parses a command line for a shell.

@@ -24,15 +24,16 @@ use crate::terminal::{note, print, reserve};
 
 /// Returns `true` if the arguments name a bundle, or have an option that only bundles take.
 pub(crate) fn is_bundle(args: &ImportArgs) -> bool {
-    let ReadingArgs { answers, ask, accept_profile, profile, reference } = &args.reading;
+    let ReadingArgs { answers, ask, accept_profile, profile, reference, limits: _ } = &args.reading;
     let options = answers.is_some() || *ask || *accept_profile || profile.is_some() || reference.is_some();
     options || args.model.is_dir() || args.model.extension().is_some_and(|ending| ending == "kinfer")
 }
 
 /// Reads a bundle, checks it, and writes its description with copies of the networks.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
-    let of_files = args.output.is_some() || !args.state.is_empty() || !args.observe.is_empty();
-    ensure!(!of_files, "a bundle takes no --output, --state and --observe: its description names them");
+    let of_files =
+        args.output.is_some() || !args.state.is_empty() || !args.observe.is_empty() || args.rate_hz.is_some();
+    ensure!(!of_files, "a bundle takes no --output, --state, --observe and --rate-hz: its description has them");
     ensure!(
         !args.check || args.reading.reference.is_some(),
         "--check of a bundle needs --reference RAW.npz:EXPECT.npz"
@@ -42,7 +43,10 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         let shown = || format!("{}: cannot read the profile; pass a TOML file to --profile", path.display());
         bundle = bundle.with_profile(&fs::read_to_string(path).with_context(shown)?);
     }
-    let reading = answered(&bundle, &args.reading)?;
+    let mut reading = answered(&bundle, &args.reading)?;
+    if let Some(limits) = &args.reading.limits {
+        reading.limit(&limits.at(Some(reading.description.rate_hz))?, &bundle)?;
+    }
     let plan = Plan::new(&reading.description, &bundle).context(DESCRIPTION)?;
     let checked = match &args.reading.reference {
         Some((raw, expect)) => Some(compare(&reading.description, plan, &bundle, &Reference::read(raw, expect)?)?),
@@ -79,9 +83,18 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
 /// reference, if there is one.
 pub(crate) fn check_kept(policy: &Path, args: &ReadingArgs) -> Result<()> {
     read_answers(args)?;
+    if args.reference.is_none() && args.limits.is_none() {
+        return Ok(());
+    }
+    let kept = Bundle::open(policy)?;
+    let mut reading = read(&kept, args.accept_profile, Answers::default())?;
+    let description = reading.description.clone();
+    if let Some(limits) = &args.limits {
+        reading.limit(&limits.at(Some(description.rate_hz))?, &kept)?;
+        let is_limited = reading.description == description;
+        ensure!(is_limited, "{DESCRIPTION} is kept, and allows more than --limits; edit it, or remove the folder");
+    }
     if let Some((raw, expect)) = &args.reference {
-        let kept = Bundle::open(policy)?;
-        let description = read(&kept, args.accept_profile, Answers::default())?.description;
         let plan = Plan::new(&description, &kept).context(DESCRIPTION)?;
         print(&compare(&description, plan, &kept, &Reference::read(raw, expect)?)?)?;
     }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use actq::data::{Dataset, Recording, Sizes};
+use actq::import::contract::StatedLimits;
 use actq::import::{FILES, Importer as _};
 use actq_onnx::{Choice, Onnx, import};
 use anyhow::{Result, ensure};
@@ -15,7 +16,10 @@ use crate::terminal::{note, print, reserve};
 
 /// Converts an ONNX file to a policy folder and prints a summary.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
+    let limits = args.reading.limits.as_ref().map(|limits| limits.at(args.rate_hz)).transpose()?;
     let choice = Choice {
+        limits: limits.unwrap_or_default(),
+        rate_hz: args.rate_hz,
         output: args.output.clone(),
         states: args.state.clone(),
         observed: args.observe.clone(),
@@ -46,6 +50,11 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     let _folder = OutputFolder::new(&args.out)?;
     let outputs = reserve(&names, Onnx.files(&args.model).into_iter().chain(args.calib.clone()))?;
     let checked = match args.check {
+        // Another program runs the file without the limits that the caller adds.
+        true if !choice.limits.is_empty() => {
+            let own = import(&args.model, &Choice { limits: StatedLimits::default(), ..choice })?;
+            Some(check(&args.model, &own, &own.policy(&args.out, &args.model)?, calib.as_ref())?)
+        }
         true => Some(check(&args.model, &imported, &policy, calib.as_ref())?),
         false => None,
     };

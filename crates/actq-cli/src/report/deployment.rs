@@ -58,8 +58,8 @@ pub fn without_limits(description: &Description) -> Option<String> {
     let names: Vec<&str> = description.targets.iter().filter(without).map(|target| target.value.as_str()).collect();
     (!names.is_empty()).then(|| {
         format!(
-            "the bundle states no limits for {}: a motor controller refuses to arm without them; add limits = [LOW, HIGH] to its [[target]] in \
-             deploy.toml, each a number or one for each joint",
+            "the bundle states no limits for {}: a motor controller refuses to arm without them; pass --limits LOW:HIGH, or add limits = \
+             [LOW, HIGH] to its [[target]] in deploy.toml, each a number or one for each joint",
             names.join(", ")
         )
     })

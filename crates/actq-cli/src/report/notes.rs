@@ -77,8 +77,8 @@ pub(crate) fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>)
     let without: Vec<usize> = limits.filter(|(_, limits)| !is_limited(*limits)).map(|(i, _)| i).collect();
     (!without.is_empty()).then(|| {
         format!(
-            "no finite limits for {} {}: a motor controller refuses to arm without limits; set low and high of action in \
-             policy.json, or build the firmware by cargo xtask firmware --limits LOW:HIGH",
+            "no finite limits for {} {}: a motor controller refuses to arm without limits; pass --limits LOW:HIGH to actq import, \
+             set low and high of action in policy.json, or build the firmware by cargo xtask firmware --limits LOW:HIGH",
             if without.len() == 1 { "action" } else { "actions" },
             runs(&without)
         )

@@ -107,6 +107,15 @@ impl Plan {
         self.values[self.action].labels.len()
     }
 
+    /// Returns lowest and highest value of each value of each target, infinite where it has no limits.
+    pub(crate) fn target_limits(&self) -> Vec<Vec<[f64; 2]>> {
+        let of = |target: &PlannedTarget| match &target.limits {
+            Some([low, high]) => low.iter().zip(high).map(|(low, high)| [*low, *high]).collect(),
+            None => vec![[f64::NEG_INFINITY, f64::INFINITY]; self.values[target.value].labels.len()],
+        };
+        self.targets.iter().map(of).collect()
+    }
+
     /// Returns the labels of the networks' inputs, one after the other.
     pub(crate) fn observation_labels(&self) -> Vec<Label> {
         let feeds = self.networks.iter().flat_map(|network| network.feeds.iter().zip(&network.inputs));

@@ -1,6 +1,7 @@
 //! Choices of the caller.
 
 use actq::error::{Result, ensure};
+use actq::import::contract::StatedLimits;
 use actq::text::printable;
 
 use crate::file::model::{Graph, Port};
@@ -22,6 +23,10 @@ pub struct Choice {
     pub is_fed: bool,
     /// `true` if factors and limits at the end stay operations of the network: another network reads its output.
     pub is_inner: bool,
+    /// Limits of the actions, beside those of the graph.
+    pub limits: StatedLimits,
+    /// Actions in a second; `None` if the caller does not know.
+    pub rate_hz: Option<f64>,
 }
 
 impl Choice {

@@ -13,7 +13,7 @@ const QUANTILE_EPS: f64 = 1e-8;
 pub type Array = Option<Vec<Option<f64>>>;
 
 /// Keys of `action`.
-#[derive(Default, PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct JsonContract {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -41,13 +41,68 @@ pub struct JsonContract {
 }
 
 /// Keys of `action.binarise`.
-#[derive(PartialEq, Deserialize, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct JsonBinarise {
     on: Array,
     off: Array,
     on_value: Array,
     off_value: Array,
+}
+
+/// Limits that a user states for the actions: one value for all of them, one for each, or none. Infinite values limit
+/// nothing.
+#[derive(Clone, Debug, Default)]
+pub struct StatedLimits {
+    /// Lowest values, in the unit of the actions.
+    pub low: Vec<f64>,
+    /// Highest values.
+    pub high: Vec<f64>,
+    /// Largest changes from one action to the next, above 0.
+    pub max_step: Vec<f64>,
+}
+
+impl StatedLimits {
+    /// Returns `true` if nothing is stated.
+    pub fn is_empty(&self) -> bool {
+        self.low.is_empty() && self.high.is_empty() && self.max_step.is_empty()
+    }
+
+    /// Returns the limits of each of `act_dim` actions: of those stated and those in `known`, the stricter ones. `of`
+    /// says in an error what `known` belongs to.
+    ///
+    /// # Errors
+    ///
+    /// If the number of values is neither 1 nor `act_dim`, a value is NaN or beyond f32, or no value is within both.
+    pub fn within(&self, known: &[[f64; 2]], of: &str) -> Result<Vec<[f64; 2]>> {
+        let sides = [("low", &self.low, f64::NEG_INFINITY), ("high", &self.high, f64::INFINITY)];
+        let [low, high] = sides.map(|(name, values, none)| each(name, values, none, known.len()));
+        let limits = low?.into_iter().zip(high?).zip(known).enumerate();
+        let stricter = |(i, ((low, high), [known_low, known_high])): (usize, ((f64, f64), &[f64; 2]))| {
+            ensure!(low <= high, "low of action {i} is {low:?}, above its high, {high:?}");
+            let both = [low.max(*known_low), high.min(*known_high)];
+            ensure!(
+                both[0] <= both[1],
+                "no value of action {i} is within {low:?} to {high:?}, as you state, and within {known_low:?} to {known_high:?}, as {of} says"
+            );
+            Ok(both)
+        };
+        limits.map(stricter).collect()
+    }
+}
+
+/// Returns a value for each of `len` actions.
+fn each(name: &str, values: &[f64], none: f64, len: usize) -> Result<Vec<f64>> {
+    ensure!(
+        values.len() <= 1 || values.len() == len,
+        "{name} has {} values for {len} actions; give one for each, or one for all",
+        values.len()
+    );
+    if let Some(i) = values.iter().position(|x| x.is_nan() || x.is_finite() && !(*x as f32).is_finite()) {
+        bail!("{name}[{i}] is {:?}; it must be a number within the range of float32", values[i]);
+    }
+    let value = |i: usize| values.get(i).or(values.first()).map_or(none, |x| *x);
+    Ok((0..len).map(value).collect())
 }
 
 /// Keys of `ensemble`.
@@ -79,6 +134,29 @@ impl JsonContract {
             Ok([half, half + first])
         };
         pairs.iter().enumerate().map(affine).collect::<Result<_>>().map(Some)
+    }
+
+    /// Adds what a user states; of two limits, the stricter one holds.
+    ///
+    /// # Errors
+    ///
+    /// As [`StatedLimits::within`], and for a `max_step` that is not above 0.
+    pub fn limited(mut self, stated: &StatedLimits, act_dim: usize) -> Result<Self> {
+        let known = |array: &Array, i: usize, none: f64| array.as_ref().and_then(|array| array[i]).unwrap_or(none);
+        let unlimited = f64::from(f32::MAX);
+        let own = |i: usize| [known(&self.low, i, -unlimited), known(&self.high, i, unlimited)];
+        let limits = stated.within(&(0..act_dim).map(own).collect::<Vec<_>>(), "the network")?;
+        if !stated.low.is_empty() || !stated.high.is_empty() {
+            [self.low, self.high] = [0, 1].map(|side| Some(limits.iter().map(|limits| Some(limits[side])).collect()));
+        }
+        if !stated.max_step.is_empty() {
+            let steps = each("max_step", &stated.max_step, unlimited, act_dim)?;
+            if let Some(i) = steps.iter().position(|step| *step <= 0.0) {
+                bail!("max_step[{i}] is {:?}; it must be above 0", steps[i]);
+            }
+            self.max_step = Some(steps.into_iter().map(|step| Some(step.min(unlimited))).collect());
+        }
+        Ok(self)
     }
 
     /// Returns the contract of `act_dim` actions, with denormalization folded into scale and offset.

@@ -1,0 +1,150 @@
+"""Trained models as they are: their own prediction is that of the policy, limits are the caller's."""
+
+import numpy as np
+import pytest
+
+import actq
+
+torch = pytest.importorskip("torch", reason="torch is not installed (requirements-optional.txt)")
+
+
+def linear(values=3, actions=2):
+    torch.manual_seed(1)
+    return torch.nn.Sequential(torch.nn.Linear(values, 8), torch.nn.ReLU(), torch.nn.Linear(8, actions))
+
+
+def test_a_policy_runs_in_f32():
+    module, observations = linear(), np.random.default_rng(1).normal(size=(5, 3)).astype(np.float32)
+    policy = actq.import_policy(module, torch.zeros(1, 3))
+    expected = module(torch.from_numpy(observations)).detach().numpy()
+    np.testing.assert_allclose(policy(observations), expected, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(policy(observations[0]), expected[0], rtol=1e-5, atol=1e-6)
+    with pytest.raises(actq.Error, match=r"the observations have the shape \[5, 2\]; use \[3\] for one, or \[steps, 3\]"):
+        policy(observations[:, :2])
+
+
+def test_limits_and_rate_become_the_policys():
+    module, observations = linear(), 5 * np.random.default_rng(1).normal(size=(50, 3)).astype(np.float32)
+    free = actq.import_policy(module, torch.zeros(1, 3))
+    policy = actq.import_policy(module, torch.zeros(1, 3), low=[-0.5, -0.1], high=0.25, max_step=0.01, rate_hz=200)
+    assert policy.rate_hz == 200 and policy.digest != free.digest
+    np.testing.assert_array_equal(policy(observations), np.clip(free(observations), np.float32([-0.5, -0.1]), np.float32(0.25)))
+    assert np.ptp(free(observations)) > 1, "limits change the actions"
+    image = actq.quantize(policy, bits=8, method="rtn", progress=False)
+    assert image.rate_hz == 200
+    actions = np.stack([head(row) for head in [actq.Head(image)] for row in observations])
+    assert np.abs(np.diff(actions, axis=0)).max() <= 0.01 + 1e-6
+    # Of two limits, the stricter one.
+    bounded = actq.import_policy(torch.nn.Sequential(linear(), torch.nn.Tanh()), torch.zeros(1, 3), low=-2, high=0.5)
+    head = actq.Head(actq.quantize(bounded, bits=8, method="rtn", progress=False))
+    found = np.stack([head(row) for row in 100 * observations])
+    assert found.min() >= -1 and found.max() == 0.5
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        ({"low": [1, 2, 3]}, "low has 3 values for 2 actions; give one for each, or one for all"),
+        ({"low": 1, "high": 0}, "low of action 0 is 1.0, above its high, 0.0"),
+        ({"high": float("nan")}, r"high\[0\] is NaN"),
+        ({"max_step": [1, 0]}, r"max_step\[1\] is 0.0; it must be above 0"),
+        ({"rate_hz": 0}, "rate_hz is 0; pass a number above 0"),
+        ({"low": "a"}, "low: could not convert string to float"),
+    ],
+)
+def test_bad_limits_are_refused(given, why):
+    with pytest.raises(actq.Error, match=why):
+        actq.import_policy(linear(), torch.zeros(1, 3), **given)
+
+
+def test_limits_without_a_common_value_are_refused():
+    with pytest.raises(actq.Error, match="no value of action 0 is within 2.0 to 3.0, as you state, and within -1.0 to 1.0"):
+        actq.import_policy(torch.nn.Sequential(linear(), torch.nn.Tanh()), torch.zeros(1, 3), low=2, high=3)
+
+
+class Agent(torch.nn.Module):
+    """As CleanRL writes it."""
+
+    def __init__(self):
+        super().__init__()
+        self.critic, self.actor_mean = linear(3, 1), linear()
+        self.actor_logstd = torch.nn.Parameter(torch.zeros(1, 2))
+
+    def get_action_and_value(self, x):
+        mean = self.actor_mean(x)
+        return torch.distributions.Normal(mean, self.actor_logstd.exp()).sample(), self.critic(x)
+
+
+class SacActor(torch.nn.Module):
+    """As CleanRL writes it."""
+
+    def __init__(self):
+        super().__init__()
+        self.fc1, self.fc_mean, self.fc_logstd = linear(3, 8), torch.nn.Linear(8, 2), torch.nn.Linear(8, 2)
+        self.register_buffer("action_scale", torch.tensor([2.0, 3.0]))
+        self.register_buffer("action_bias", torch.tensor([0.0, 1.0]))
+
+    def get_action(self, x):
+        x = torch.relu(self.fc1(x))
+        mean = self.fc_mean(x)
+        drawn = torch.distributions.Normal(mean, self.fc_logstd(x).exp()).rsample()
+        scaled = [torch.tanh(value) * self.action_scale + self.action_bias for value in (drawn, mean)]
+        return scaled[0], drawn, scaled[1]
+
+
+def test_agents_of_cleanrl_give_their_mean():
+    observations = np.random.default_rng(1).normal(size=(20, 3)).astype(np.float32)
+    agent, actor = Agent(), SacActor()
+    with torch.no_grad():
+        for policy, expected in [
+            (actq.import_policy(agent), agent.actor_mean(torch.from_numpy(observations))),
+            (actq.import_policy(actor), actor.get_action(torch.from_numpy(observations))[2]),
+        ]:
+            np.testing.assert_allclose(policy(observations), expected.numpy(), rtol=1e-5, atol=1e-5)
+
+
+def test_runners_of_rsl_rl_give_their_policy(tmp_path):
+    runners = pytest.importorskip("rsl_rl.runners", reason="rsl-rl-lib is not installed")
+    tensordict = pytest.importorskip("tensordict")
+
+    class Env:
+        num_envs, num_actions, max_episode_length, device, cfg = 2, 2, 10, "cpu", {}
+        episode_length_buf = torch.zeros(2)
+
+        def get_observations(self):
+            return tensordict.TensorDict({"policy": torch.randn(2, 3), "height": torch.randn(2, 4)}, batch_size=[2])
+
+    def runner(kind):
+        torch.manual_seed(2)
+        network = {"hidden_dims": [8], "activation": "elu", "obs_normalization": True}
+        if kind != "MLPModel":
+            network |= {"rnn_type": kind, "rnn_hidden_dim": 6, "rnn_num_layers": 1}
+        name = "MLPModel" if kind == "MLPModel" else "RNNModel"
+        distribution = {"class_name": "GaussianDistribution", "init_std": 1.0, "std_type": "scalar"}
+        made = runners.OnPolicyRunner(
+            Env(),
+            {
+                "algorithm": {"class_name": "PPO", "rnd_cfg": None, "symmetry_cfg": None},
+                "actor": {"class_name": name, "distribution_cfg": distribution, **network},
+                "critic": {"class_name": name, **network},
+                "obs_groups": {"actor": ["policy", "height"], "critic": ["policy"]},
+                "num_steps_per_env": 4,
+                "save_interval": 10,
+            },
+            log_dir=None,
+        )
+        for _ in range(5):
+            made.alg.get_policy().update_normalization(Env().get_observations() * 3 + 2)
+        return made
+
+    for kind in ("MLPModel", "lstm", "gru"):
+        made = runner(kind)
+        policy = actq.import_policy(made)
+        assert (policy.obs_len, policy.act_len) == (7, 2)
+        own = made.get_inference_policy(device="cpu")
+        own.reset()
+        rows = np.random.default_rng(1).normal(size=(9, 7)).astype(np.float32)
+        with torch.no_grad():
+            given = [tensordict.TensorDict({"policy": x[:, :3], "height": x[:, 3:]}, [1]) for x in torch.from_numpy(rows)[:, None]]
+            expected = np.concatenate([own(x).numpy() for x in given])
+        np.testing.assert_allclose(policy(rows), expected, rtol=1e-4, atol=1e-5)
