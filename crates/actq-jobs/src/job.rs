@@ -96,7 +96,6 @@ impl Input {
     }
 }
 
-/// Returns the address of a work with its inputs.
 pub(crate) fn address(work: &Work, inputs: &[Input]) -> Result<String> {
     let mut files = Vec::new();
     for input in inputs {

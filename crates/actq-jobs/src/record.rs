@@ -27,7 +27,7 @@ pub struct Record {
 #[serde(tag = "kind", content = "value", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Outcome {
     /// An image, in `ADDRESS.actq`.
-    JobResult(JobResult),
+    Made(JobResult),
     /// The reason why no image is within the budget. Jobs that need the image have the same result.
     Impossible(String),
     /// Errors on the held-out recording.
@@ -38,4 +38,18 @@ pub enum Outcome {
     Merged(Merged),
     /// Result of a job of kind custom.
     Custom(CustomResult),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Outcome;
+
+    #[test]
+    fn results_of_earlier_stores_are_read() {
+        let made = r#"{"kind":"made","value":{"image":"","bytes":0,"cycles":0,"bpw":1.5,"steps":0,"frames":0,"matrices":[],
+            "rows":[{"2":3}],"scores":[]}}"#;
+        for text in [made, r#"{"kind":"impossible","value":"no image"}"#] {
+            serde_json::from_str::<Outcome>(text).expect("a result");
+        }
+    }
 }

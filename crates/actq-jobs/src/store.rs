@@ -183,7 +183,7 @@ impl Store {
     pub fn read_whole(&self, address: &str) -> Result<Outcome, JobError> {
         let result = self.read(address)?;
         let beside = match &result {
-            Outcome::JobResult(made) => Some((self.image(address), &made.image)),
+            Outcome::Made(made) => Some((self.image(address), &made.image)),
             Outcome::Driven(driven) => driven.recording.as_ref().map(|sha256| (self.recording(address), sha256)),
             Outcome::Custom(custom) => {
                 custom.file.as_ref().map(|file| (self.file(address, &file.ending), &file.sha256))

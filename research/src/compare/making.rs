@@ -72,7 +72,6 @@ impl<'a> Maker<'a> {
         Self { subject, steps, seed, ready: BTreeMap::new() }
     }
 
-    /// The policy.
     pub(super) fn policy(&self) -> &Policy {
         &self.subject.policy
     }

@@ -23,7 +23,7 @@ pub enum Coding {
     /// Rounded after learning.
     Rounded,
     /// Learned, from the f32 network's weights on, for this many steps.
-    TrainResult(usize),
+    Learned(usize),
 }
 
 /// A network with codes.
@@ -64,7 +64,7 @@ impl Coder {
     pub fn code(&self, graph: &Graph, coding: Coding, windows: &Windows, progress: &mut dyn FnMut(f64)) -> Coded {
         let widths: Vec<_> = graph.matrices.iter().map(|matrix| vec![Some(self.width); matrix.rows]).collect();
         let importance = column_squares(graph, windows, self.seed);
-        let Coding::TrainResult(steps) = coding else {
+        let Coding::Learned(steps) = coding else {
             let of_matrix = |m: usize| {
                 let matrix = &graph.matrices[m];
                 round_to(matrix, self.width, Scales::fit(matrix, &widths[m], 0, &importance[m]))
@@ -95,14 +95,14 @@ impl Coder {
         fold: Option<&(Windows, Windows)>,
         (trial, steps): (usize, usize),
     ) -> Coding {
-        let (Some(graph), Some((learned_from, held_out))) = (tried, fold) else { return Coding::TrainResult(steps) };
+        let (Some(graph), Some((learned_from, held_out))) = (tried, fold) else { return Coding::Learned(steps) };
         let x_max = vec![INT8; graph.matrices.len()];
-        let [rounded, learned] = [Coding::Rounded, Coding::TrainResult(trial)].map(|coding| {
+        let [rounded, learned] = [Coding::Rounded, Coding::Learned(trial)].map(|coding| {
             let coded = self.code(graph, coding, learned_from, &mut |_| {});
             let network = Network::rounded(&coded.graph, &x_max);
             recorded_error(&network, &coded.weights(), held_out, None, self.seed)
         });
-        if rounded <= learned { Coding::Rounded } else { Coding::TrainResult(steps) }
+        if rounded <= learned { Coding::Rounded } else { Coding::Learned(steps) }
     }
 
     /// Returns the activation magnitudes: int16 where rounding to int8 adds much error.

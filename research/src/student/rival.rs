@@ -120,7 +120,7 @@ impl<'a> Teacher<'a> {
         let coder = Coder { width, widening: by.widening, frames, seed: settings.seed };
         let coding = match form {
             Form::Int8 => coder.coding(chosen.tried.as_ref(), fold.as_ref(), (steps / TRIAL_STEP_DIVISOR, steps / 2)),
-            _ => Coding::TrainResult(steps),
+            _ => Coding::Learned(steps),
         };
         let windows = &self.windows;
         let coded = coder.code(&network, coding, windows, &mut |share| progress("learning codes", share));

@@ -116,5 +116,5 @@ fn made(
         scores: quantizer.method().scores(),
     };
     let kept = Kept { path: store.image(&job.address), bytes: quantized.image };
-    Ok((Outcome::JobResult(result), Some(kept)))
+    Ok((Outcome::Made(result), Some(kept)))
 }

@@ -42,7 +42,7 @@ pub(super) fn path_of(path: Option<&Path>) -> Result<&Path, Error> {
 /// Reads an image of the store; the inner error says why there is none.
 pub(super) fn image(address: &str, store: &Store) -> Result<Result<(JobResult, ImageBuffer), String>, JobError> {
     match store.read(address)? {
-        Outcome::JobResult(made) => {
+        Outcome::Made(made) => {
             let bytes = store.read_blob(&store.image(address), &made.image)?;
             Ok(Ok((made, ImageBuffer::new(&bytes))))
         }

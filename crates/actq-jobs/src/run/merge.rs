@@ -53,7 +53,7 @@ pub fn merge_finished(plan: &Merge, results: &Results<'_>) -> Result<Option<Merg
 
 fn image(row: &Row, read: Read<'_>) -> Result<MergedImage, JobError> {
     let figures = match read(&row.image)? {
-        Outcome::JobResult(made) => Some(figures(row, made, read)?),
+        Outcome::Made(made) => Some(figures(row, made, read)?),
         Outcome::Impossible(_) => None,
         _ => return Err(unexpected(&row.image)),
     };
