@@ -120,3 +120,47 @@ def test_reports_are_those_of_the_command(command, image, tmp_path):
     assert paths[0].read_text() == "by hand"
     assert image.export_c(tmp_path / "py", force=True) == paths
     assert paths[0].read_bytes() == (tmp_path / "c" / paths[0].name).read_bytes()
+
+
+PROFILE = """
+family = "mine"
+[[mark]]
+ending = "yaml"
+keys = ["home_pose"]
+[[rule]]
+key = "last_action"
+meaning = "is the action that is fed back the network's output (\\"raw\\")?"
+value = "raw"
+from = "deploy/run.py:8"
+[stack]
+file = "robot.yaml"
+rate = { period = "dt" }
+joints = { names = "motors", default = "home_pose" }
+observation = [{ terms = ["gyro", "q", "action"], scale = 1.0 }]
+action = { kind = "position", scale = 0.25, relative = true, fed_back = "last_action" }
+[[stack.term]]
+names = ["gyro"]
+is = "raw"
+len = 4
+[[stack.term]]
+names = ["q"]
+is = "joints"
+relative = true
+[[stack.term]]
+names = ["action"]
+is = "action"
+"""
+
+
+def test_a_profile_describes_a_stack_of_ones_own(mlp, tmp_path):
+    bundle, profile = tmp_path / "bundle", tmp_path / "mine.toml"
+    bundle.mkdir()
+    (bundle / "policy.onnx").write_bytes(mlp.read_bytes())
+    (bundle / "robot.yaml").write_text("motors: [a, b, c, d]\nhome_pose: [0.1, 0.2, 0.3, 0.4]\ndt: 0.02\n")
+    profile.write_text(PROFILE)
+    policy = actq.import_policy(bundle, profile=profile)
+    assert (policy.obs_len, policy.act_len, policy.rate_hz) == (8, 4, 50.0)
+    with pytest.raises(actq.Error, match="profile: .*no.toml: "):
+        actq.import_policy(bundle, profile=tmp_path / "no.toml")
+    with pytest.raises(actq.Error, match="mlp.onnx: only a deploy bundle takes accept_profile, answers and profile"):
+        actq.import_policy(mlp, profile=profile)

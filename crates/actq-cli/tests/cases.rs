@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use actq::data::NpzWriter;
-use actq_testkit::{Dtype, Random, onnx, safetensors};
+use actq_testkit::{Dtype, Random, TWO_JOINTS, onnx, safetensors};
 use anyhow::{Context as _, Result, bail, ensure};
 use expect_test::expect_file;
 use rayon::prelude::*;
@@ -23,19 +23,6 @@ const POLICY: &str = r#"{"name": "tiny arm", "kind": "chunk", "chunk": 4, "execu
 "ops": [{"op": "normalize", "mean": "norm.mean", "scale": "norm.scale", "clip": 5}, {"op": "linear", "w": "in.weight", "b": "in.bias"},
 {"op": "tanh", "save": "h"}, {"op": "linear", "w": "mid.weight"}, {"op": "add", "with": "h"},
 {"op": "linear", "w": "out.weight", "b": "out.bias"}]}"#;
-/// A robot of two joints whose motors are in the other order, and a history of two frames.
-const BUNDLE: &str = "
-joint_ids_map: [1, 0]
-step_dt: 0.01
-stiffness: [10.0, 20.0]
-damping: [1.0, 2.0]
-default_joint_pos: [0.5, -0.5]
-actions:
-  JointPositionAction: {clip: null, scale: [0.25, 0.5], offset: [0.5, -0.5], joint_ids: null}
-observations:
-  joint_pos_rel: {clip: [-0.4, 0.4], scale: [2.0, 2.0], history_length: 2}
-  last_action: {clip: null, scale: 1.0, history_length: 2}
-";
 const OBS: usize = 40;
 const EPISODES: usize = 3;
 const STEPS: usize = 20;
@@ -51,7 +38,7 @@ impl Folder {
         folder.write_tensors(None)?;
         folder.write_recording("policy/calib.npz", OBS, 0.5, [20, 7, 20])?;
         folder.write_recording("policy/heldout.npz", OBS, 0.25, [20, 7, 20])?;
-        fs::write(folder.path("bundle/deploy.yaml"), BUNDLE)?;
+        fs::write(folder.path("bundle/deploy.yaml"), TWO_JOINTS)?;
         fs::write(folder.path("bundle/policy.onnx"), onnx::linear(8, 2, &[]))?;
         let mut raw = NpzWriter::new(File::create(folder.path("raw.npz"))?);
         raw.array("joint_pos", &[12, 2], (0..24).map(|i| (0.7 * f64::from(i)).sin()))?;

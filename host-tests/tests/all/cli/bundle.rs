@@ -6,25 +6,12 @@ use std::process::{Command, Output};
 
 use actq::data::{NpzWriter, arrays};
 use actq_bench::command::{actq, failed, run, succeeded};
-use actq_testkit::onnx;
+use actq_testkit::{TWO_JOINTS, onnx};
 use anyhow::{Context, Result, ensure};
 use tempfile::TempDir;
 
 use super::fixture::text;
 
-/// A robot of two joints whose motors are in the other order, and a history of two frames.
-pub(super) const YAML: &str = "
-joint_ids_map: [1, 0]
-step_dt: 0.01
-stiffness: [10.0, 20.0]
-damping: [1.0, 2.0]
-default_joint_pos: [0.5, -0.5]
-actions:
-  JointPositionAction: {clip: null, scale: [0.25, 0.5], offset: [0.5, -0.5], joint_ids: null}
-observations:
-  joint_pos_rel: {clip: [-0.4, 0.4], scale: [2.0, 2.0], history_length: 2}
-  last_action: {clip: null, scale: 1.0, history_length: 2}
-";
 const TICKS: usize = 12;
 
 pub(super) struct Robot {
@@ -84,7 +71,7 @@ fn expect(path: &Path, newest_first: bool) -> Result<()> {
 
 #[test]
 fn open_questions_are_asked_before_any_write() -> Result<()> {
-    let robot = Robot::new(YAML)?;
+    let robot = Robot::new(TWO_JOINTS)?;
     let output = run(robot.import("out", &[]), b"")?;
     let (asked, error) = (String::from_utf8(output.stdout)?, String::from_utf8(output.stderr)?);
     ensure!(output.status.code() == Some(1), "{:?}", output.status);
@@ -98,7 +85,7 @@ fn open_questions_are_asked_before_any_write() -> Result<()> {
 
 #[test]
 fn questions_are_asked_until_all_are_answered() -> Result<()> {
-    let robot = Robot::new(YAML)?;
+    let robot = Robot::new(TWO_JOINTS)?;
     succeeded(&run(robot.import("accepted", &["--accept-profile"]), b"")?)?;
     // A wrong answer is asked for again; an empty line accepts what the deploy code says.
     let answers = format!("sideways\n{}", "\n".repeat(50));
@@ -123,7 +110,7 @@ fn questions_are_asked_until_all_are_answered() -> Result<()> {
 
 #[test]
 fn a_bundle_becomes_a_description_and_an_image() -> Result<()> {
-    let robot = Robot::new(YAML)?;
+    let robot = Robot::new(TWO_JOINTS)?;
     expect(&robot.path("expect.npz"), false)?;
     let (raw, image) = (text(&robot.path("raw.npz")), text(&robot.path("head.actq")));
     let reference = format!("{raw}:{}", text(&robot.path("expect.npz")));
@@ -192,7 +179,7 @@ pub(super) fn recording(robot: &Robot) -> Result<String> {
 
 #[test]
 fn deploy_makes_everything_and_keeps_what_is_made() -> Result<()> {
-    let robot = Robot::new(YAML)?;
+    let robot = Robot::new(TWO_JOINTS)?;
     expect(&robot.path("expect.npz"), false)?;
     let reference = format!("{}:{}", text(&robot.path("raw.npz")), text(&robot.path("expect.npz")));
     let (bundle, out) = (text(&robot.path("bundle")), text(&robot.path("deployed")));
@@ -251,7 +238,7 @@ fn deploy_makes_everything_and_keeps_what_is_made() -> Result<()> {
 
 #[test]
 fn a_difference_from_the_reference_is_explained() -> Result<()> {
-    let robot = Robot::new(YAML)?;
+    let robot = Robot::new(TWO_JOINTS)?;
     expect(&robot.path("expect.npz"), true)?;
     let reference = format!("{}:{}", text(&robot.path("raw.npz")), text(&robot.path("expect.npz")));
     let words = [
@@ -271,7 +258,7 @@ fn a_difference_from_the_reference_is_explained() -> Result<()> {
 #[test]
 fn bad_bundles_are_refused_by_file_and_key() -> Result<()> {
     let cases = [
-        ("step_dt: 0.01", "step_dt: fast", "deploy.yaml: step_dt (line 3) must be finite numbers"),
+        ("step_dt: 0.01", "step_dt: fast", "deploy.yaml: step_dt (line 3) must be a finite number"),
         ("step_dt: 0.01", "step_dt: 0", "step_dt = 0 (deploy.yaml: step_dt): give a number above 0"),
         ("[1, 0]", "[1, 1]", "joint_ids_map: a place occurs twice"),
         ("[1, 0]", "[1, 2]", "joint_ids_map: it has 2 joints of 3"),
@@ -293,8 +280,8 @@ fn bad_bundles_are_refused_by_file_and_key() -> Result<()> {
         ("joint_pos_rel:", "last_action: {}\n  last_action:", "occurs twice"),
     ];
     for (from, to, expected) in cases {
-        ensure!(YAML.matches(from).count() == 1, "{from:?} must occur once");
-        let robot = Robot::new(&YAML.replace(from, to))?;
+        ensure!(TWO_JOINTS.matches(from).count() == 1, "{from:?} must occur once");
+        let robot = Robot::new(&TWO_JOINTS.replace(from, to))?;
         let output = run(robot.import("out", &["--accept-profile"]), b"")?;
         failed(&output, 1, &[expected]).with_context(|| to.to_owned())?;
         ensure!(!robot.path("out").exists(), "{to}: something was written");
@@ -304,7 +291,7 @@ fn bad_bundles_are_refused_by_file_and_key() -> Result<()> {
 
 #[test]
 fn foreign_paths_and_wrong_options_are_refused() -> Result<()> {
-    let robot = Robot::new(YAML)?;
+    let robot = Robot::new(TWO_JOINTS)?;
     succeeded(&run(robot.import("out", &["--accept-profile"]), b"")?)?;
     let again = run(robot.import("out", &["--accept-profile"]), b"")?;
     failed(&again, 1, &["deploy.toml: already exists; use --force to overwrite"])?;

@@ -6,14 +6,15 @@ use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 
 use actq_bench::command::{actq, failed, run, succeeded};
+use actq_testkit::TWO_JOINTS;
 use anyhow::{Result, ensure};
 
-use super::bundle::{Robot, YAML, recording};
+use super::bundle::{Robot, recording};
 use super::fixture::text;
 
 /// Imports the robot's bundle to the folder `out`, and makes the image `head.actq` of it.
 fn with_image() -> Result<Robot> {
-    let robot = Robot::new(YAML)?;
+    let robot = Robot::new(TWO_JOINTS)?;
     succeeded(&run(robot.import("out", &["--accept-profile"]), b"")?)?;
     let (policy, image) = (text(&robot.path("out")), text(&robot.path("head.actq")));
     succeeded(&run(actq(&["quantize", &policy, "--method", "rtn", "--out", &image]), b"")?)?;
@@ -46,7 +47,7 @@ case $* in *'--board stm32f4 --list') exit 1 ;; esac
 #[cfg(unix)]
 #[test]
 fn deploy_refuses_boards_and_recordings_before_the_import() -> Result<()> {
-    let robot = Robot::new(YAML)?;
+    let robot = Robot::new(TWO_JOINTS)?;
     fs::create_dir(robot.path("bin"))?;
     fs::write(robot.path("bin/cargo"), CARGO)?;
     fs::set_permissions(robot.path("bin/cargo"), fs::Permissions::from_mode(0o755))?;

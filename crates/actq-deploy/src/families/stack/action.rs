@@ -6,6 +6,7 @@ use super::super::common::ACTION;
 use super::super::common::action::{add_zero, clip_to, padded};
 use super::Reader;
 use super::observation::{Ports, operand};
+use super::values::SEVERAL;
 use crate::description::{Gains, Op, Operand, Order};
 use crate::facts::Facts;
 
@@ -105,7 +106,7 @@ impl Reader<'_> {
         };
         let mut lists = Vec::new();
         for source in [stiffness, damping] {
-            self.values.require(source, "")?;
+            self.values.require(source, "", SEVERAL)?;
             let n = self.robot.len;
             let (list, at) = self.values.list(source, "")?.unwrap_or_else(|| (vec![0.0], "a question".to_owned()));
             let list = if self.values.is_single(source)? { vec![list[0]; n] } else { list };

@@ -14,6 +14,10 @@ pub(super) struct Values<'a> {
     pub(super) facts: &'a mut Facts,
 }
 
+/// What keys must be.
+pub(super) const ONE: &str = "a finite number";
+pub(super) const SEVERAL: &str = "finite numbers";
+
 /// Reads a number, or several in a list or a text with commas.
 fn numbers(node: &Node) -> Option<Vec<f64>> {
     let parts = || node.text()?.split(',').map(|part| part.trim().parse().ok()).collect();
@@ -40,6 +44,11 @@ impl Values<'_> {
 
     /// Returns numbers and where they are from; `None` if the file has none and no rule answers.
     pub(super) fn list(&mut self, source: &Source, term: &str) -> Result<Option<(Vec<f64>, String)>> {
+        self.read(source, term, SEVERAL)
+    }
+
+    /// Does the same as [`Self::list`]; errors name `what` the key must be.
+    fn read(&mut self, source: &Source, term: &str, what: &str) -> Result<Option<(Vec<f64>, String)>> {
         let all = |numbers: Numbers| match numbers {
             Numbers::All(one) => vec![one],
             Numbers::Each(list) => list,
@@ -52,7 +61,7 @@ impl Values<'_> {
         let rule = given.rule.as_ref().map(|rule| rule.replace("{term}", term));
         if let Some(key) = &given.key {
             let path = self.path(key, term)?;
-            if let Some(list) = self.document.optional(&path, "finite numbers", numbers)? {
+            if let Some(list) = self.document.optional(&path, what, numbers)? {
                 let at = self.document.location(&path);
                 if let (Some(rule), [one]) = (&rule, &list[..]) {
                     self.facts.agrees(rule, one, &at)?;
@@ -67,13 +76,13 @@ impl Values<'_> {
 
     /// Returns one number and where it is from; `open` while a rule is a question.
     pub(super) fn one(&mut self, source: &Source, term: &str, open: f64) -> Result<(f64, String)> {
-        match self.list(source, term)? {
+        match self.read(source, term, ONE)? {
             Some((list, at)) => {
                 ensure!(list.len() == 1, "{at} has {} numbers; give one", list.len());
                 Ok((list[0], at))
             }
             None => {
-                self.require(source, term)?;
+                self.require(source, term, ONE)?;
                 Ok((open, "a question".to_owned()))
             }
         }
@@ -97,11 +106,11 @@ impl Values<'_> {
         })
     }
 
-    /// Refuses a missing key that no rule stands for.
-    pub(super) fn require(&self, source: &Source, term: &str) -> Result<()> {
+    /// Refuses a missing key that no rule stands for; the error names `what` it must be.
+    pub(super) fn require(&self, source: &Source, term: &str, what: &str) -> Result<()> {
         if let Source::Key(key) | Source::Of(Given { key: Some(key), rule: None }) = source {
             let path = self.path(key, term)?;
-            self.document.required(&path, "finite numbers", numbers).map(drop)?;
+            self.document.required(&path, what, numbers).map(drop)?;
         }
         Ok(())
     }
