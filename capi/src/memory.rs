@@ -85,7 +85,6 @@ fn check(address: usize, align: usize, size: usize, len: usize) -> Result<(), Fa
     }
 }
 
-/// Returns the addresses of values.
 pub(crate) fn addresses<T>(values: &[T]) -> Range<usize> {
     let ends = values.as_ptr_range();
     ends.start as usize..ends.end as usize

@@ -133,7 +133,6 @@ impl From<StepError> for Failure {
     }
 }
 
-/// Returns the status of an outcome.
 pub(crate) fn status(outcome: Result<(), Failure>) -> ActqStatus {
     outcome.err().map_or(0, |failure| failure.0.get())
 }

@@ -10,7 +10,6 @@ const MAX_NODES: usize = 100_000;
 /// Most levels.
 const MAX_LEVELS: usize = 64;
 
-/// A value.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Node {
     /// Line of the file, from 1.
@@ -54,7 +53,6 @@ impl Node {
         reader.root.ok_or_else(|| Error::input("the file is empty"))
     }
 
-    /// Returns the value of a key.
     pub(crate) fn get(&self, key: &str) -> Option<&Self> {
         match &self.data {
             Data::Map(entries) => entries.iter().find(|(name, _)| name == key).map(|(_, node)| node),
@@ -90,7 +88,6 @@ impl Node {
         }
     }
 
-    /// Returns a truth value.
     pub(crate) fn truth(&self) -> Option<bool> {
         match self.text()? {
             "true" | "True" | "TRUE" | "yes" | "on" => Some(true),
@@ -99,7 +96,6 @@ impl Node {
         }
     }
 
-    /// Returns a list of numbers.
     pub(crate) fn numbers(&self) -> Option<Vec<f64>> {
         match &self.data {
             Data::List(items) => items.iter().map(Self::number).collect(),
@@ -117,7 +113,6 @@ impl Node {
         self.numbers()?.try_into().ok()
     }
 
-    /// Returns a list of texts.
     pub(crate) fn texts(&self) -> Option<Vec<String>> {
         match &self.data {
             Data::List(items) => items.iter().map(|item| item.text().map(str::to_owned)).collect(),

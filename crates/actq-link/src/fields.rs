@@ -7,7 +7,6 @@ use crate::frame::CRC;
 
 /// A value in a payload.
 pub(crate) trait Field<'a>: Sized {
-    /// Writes the value.
     fn write(&self, w: &mut Writer<'_>);
 
     /// Reads the value; `None` if bytes are missing or are no such value.

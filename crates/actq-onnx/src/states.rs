@@ -164,7 +164,6 @@ pub(crate) struct Chosen<'a> {
     pub(crate) exprs: &'a Exprs,
     pub(crate) cells: &'a Cells,
     pub(crate) outputs: &'a [Output],
-    /// Name of the action.
     pub(crate) action: &'a str,
 }
 

@@ -188,7 +188,6 @@ fn every_operation_matches_its_description() -> Result<()> {
     gives(&deployment, &raw, &targets)
 }
 
-/// Scales a vector to a length.
 fn scaled(vector: &[f64], length: f64) -> Vec<f64> {
     let norm = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
     vector.iter().map(|x| x / norm * length).collect()

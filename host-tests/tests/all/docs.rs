@@ -78,7 +78,6 @@ fn shipped_packages_hold_their_licences() -> Result<()> {
     Ok(())
 }
 
-/// The listings of a document in a language.
 pub(crate) fn listings<'a>(document: &'a str, language: &str) -> Vec<&'a str> {
     let parts = document.split(&format!("```{language}\n")).skip(1).collect::<Vec<_>>();
     parts.into_iter().filter_map(|rest| rest.split("```").next()).collect()

@@ -49,7 +49,6 @@ pub(crate) fn toolchain(release: &str) -> Result<(), String> {
     run("rustup", &arguments).map_err(|_| format!("rustup cannot install {release}"))
 }
 
-/// Returns the output of a program.
 fn output(program: &str, arguments: &[&str]) -> Result<String> {
     let output =
         Command::new(program).args(arguments).output().with_context(|| format!("{program} is not installed"))?;

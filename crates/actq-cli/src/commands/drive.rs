@@ -99,7 +99,6 @@ pub(crate) struct DriveCommand<'a> {
     pub(crate) actq: &'a Path,
     /// The policy that the image was made from.
     pub(crate) policy: &'a Path,
-    /// The image.
     pub(crate) image: &'a Path,
     /// Folder for the recordings, if the observations are to be kept.
     pub(crate) recordings: Option<&'a Path>,

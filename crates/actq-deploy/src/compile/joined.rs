@@ -41,7 +41,6 @@ pub(super) struct Joined {
     pub(super) depends: Vec<bool>,
 }
 
-/// Returns the part that computes an output.
 pub(super) fn part(plan: &Plan, (network, output): Output) -> Result<Part<'_>> {
     let is_own = |value: &Planned| matches!(value.source, ValueSource::Output(n, o) if (n, o) == (network, output));
     let name = || plan.values.iter().position(is_own).map_or("", |index| &plan.names[index]);

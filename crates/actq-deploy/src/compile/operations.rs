@@ -110,7 +110,6 @@ impl Operations {
         self.normalize(src, &vec![0.0; src.len], &vec![factor; src.len], f32::INFINITY)
     }
 
-    /// Adds a number to each value.
     pub(super) fn plus(&mut self, src: Slice, numbers: &[f32]) -> Slice {
         let mean: Vec<f32> = numbers.iter().map(|number| -number).collect();
         self.normalize(src, &mean, &vec![1.0; src.len], f32::INFINITY)

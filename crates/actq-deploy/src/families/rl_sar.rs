@@ -151,7 +151,6 @@ fn refuse_others(config: &Config<'_>) -> Result<()> {
     Ok(())
 }
 
-/// Adds the network.
 fn network(
     bundle: &Bundle,
     config: &Config<'_>,

@@ -86,7 +86,6 @@ impl<'a> Names<'a> {
         &self.of_networks[network]
     }
 
-    /// Returns the names of all values.
     pub(super) fn all(&self) -> impl Iterator<Item = &str> {
         self.own.iter().copied().chain(self.outputs.keys().map(String::as_str))
     }

@@ -7,7 +7,6 @@ use crate::sources::{Array, Compute};
 /// Index of a value among all of a description.
 pub(crate) type ValueIndex = usize;
 
-/// Source of a value.
 pub(crate) enum ValueSource {
     /// Raw input `0`, which the application writes.
     Input(usize),
@@ -23,7 +22,6 @@ pub(crate) enum ValueSource {
     Output(usize, usize),
 }
 
-/// A value.
 pub(crate) struct Planned {
     pub(crate) source: ValueSource,
     /// One for each of its numbers.
@@ -48,13 +46,11 @@ pub(crate) struct PlannedNetwork {
     pub(crate) inputs: Vec<String>,
 }
 
-/// A state.
 pub(crate) struct PlannedState {
     pub(crate) start: Vec<f64>,
     pub(crate) next: ValueIndex,
 }
 
-/// A target.
 pub(crate) struct PlannedTarget {
     pub(crate) kind: TargetKind,
     pub(crate) value: ValueIndex,
@@ -82,7 +78,6 @@ pub struct Plan {
     pub(crate) inputs: Vec<(String, usize)>,
     /// Lowest and highest value of each raw input, if they are given.
     pub(crate) ranges: Vec<Option<[f64; 2]>>,
-    /// Name of each value.
     pub(crate) names: Vec<String>,
     pub(crate) order: Vec<TickStep>,
     pub(crate) action: ValueIndex,

@@ -122,13 +122,11 @@ impl Builder {
         Value { name: self.tensor(name, vec![len], Data::Floats(values)), len }
     }
 
-    /// Adds a number.
     pub(super) fn number(&mut self, number: f32) -> Value {
         let name = format!("number_{:08x}", number.to_bits());
         Value { name: self.tensor(name, Vec::new(), Data::Floats(vec![number])), len: 1 }
     }
 
-    /// Adds integers.
     pub(super) fn integers(&mut self, integers: &[i64]) -> String {
         let words: Vec<String> = integers.iter().map(i64::to_string).collect();
         let name = format!("integers_{}", words.join("_").replace('-', "m"));

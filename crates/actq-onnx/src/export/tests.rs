@@ -44,7 +44,6 @@ impl Made {
         self.graph.add(kind, inputs).expect("it fits")
     }
 
-    /// Returns the image.
     fn image(self) -> ImageBuffer {
         let options = Options { group: 32, ..Options::new(Method::Rtn, Budget::Width(Width::W4)) };
         let policy = Policy::of("made", self.graph);

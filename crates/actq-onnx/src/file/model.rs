@@ -27,7 +27,6 @@ pub(crate) const MAX_DEPTH: usize = 16;
 /// The first operator set whose arithmetic broadcasts as numpy does.
 const MIN_OPSET: i64 = 7;
 
-/// A node.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
     pub(crate) name: String,

@@ -19,7 +19,6 @@ pub(super) struct Observation {
     pub(super) integers: Vec<String>,
     /// First value of each in the observation, by the input's index in the graph.
     pub(super) offsets: HashMap<usize, usize>,
-    /// Number of values.
     pub(super) len: usize,
 }
 

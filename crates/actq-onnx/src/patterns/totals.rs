@@ -69,7 +69,6 @@ impl Exprs {
         self.total_of(Run { of: id, from: 0, len: 1 })
     }
 
-    /// Returns the sum of all elements.
     pub(crate) fn sum_of_elements(&self, id: Id) -> Total {
         self.total_of(Run { of: id, from: 0, len: self.len_of(id) })
     }
@@ -97,7 +96,6 @@ impl Exprs {
         }
     }
 
-    /// Adds parts whose sources are a run of a value.
     fn add_run(&self, parts: &[Part], sources: Run, factor: f64, total: &mut Total, depth: usize) {
         let summands = match *self.get(sources.of) {
             Expr::Sum(x) => vec![self.parts(x)],

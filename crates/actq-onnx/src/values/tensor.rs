@@ -24,7 +24,6 @@ pub(crate) enum Data {
     Open(Vec<Element>),
 }
 
-/// A tensor.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tensor {
     /// Length of each axis.
@@ -85,7 +84,6 @@ impl Tensor {
         !matches!(self.data, Data::Open(_))
     }
 
-    /// Returns all elements.
     pub(crate) fn elements(&self) -> Vec<Element> {
         match &self.data {
             Data::Real(v) => v.iter().map(|&v| Element::Known(v)).collect(),

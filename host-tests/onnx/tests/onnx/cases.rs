@@ -28,7 +28,6 @@ pub(super) struct Case<'t> {
 /// First words of the lines that describe a file.
 const HEADER: [&str; 7] = ["input", "integers", "output", "choose", "observe", "layer", "between"];
 
-/// Reads a file of cases.
 pub(super) fn parse(file: &str) -> Vec<Case<'_>> {
     let mut cases: Vec<Case<'_>> = Vec::new();
     for line in file.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#')) {

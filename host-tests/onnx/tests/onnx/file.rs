@@ -174,7 +174,6 @@ impl File {
         self.model().encode_to_vec()
     }
 
-    /// Returns the model.
     pub(super) fn model(&self) -> proto::Model {
         let opset = proto::OperatorSet { domain: Some(String::new()), version: Some(17) };
         proto::Model {

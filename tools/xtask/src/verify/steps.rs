@@ -67,7 +67,6 @@ pub(super) fn short() -> Vec<Step> {
     steps.0
 }
 
-/// Returns all steps.
 pub(super) fn all(installed: Installed) -> Vec<Step> {
     let mut steps = Steps::default();
     steps.format_and_lints();

@@ -96,7 +96,6 @@ pub(crate) fn merge_of(jobs: &[Job]) -> Result<&Job> {
     Ok(merge)
 }
 
-/// Returns the rows that a job merges.
 fn rows_of(job: &Job) -> Result<&Merge> {
     let Work::Merge(merge) = &job.work else { anyhow::bail!("{}: is not of kind merge", job.title) };
     Ok(merge)

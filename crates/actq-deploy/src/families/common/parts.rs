@@ -76,7 +76,6 @@ impl Parts {
         self.description.inputs.push(Input { name: name.to_owned(), len: None, joints, unit, range: None });
     }
 
-    /// Adds a list of joint names.
     pub(crate) fn joints(&mut self, order: &str, names: Vec<String>) {
         self.description.joints.insert(order.to_owned(), names);
     }

@@ -139,7 +139,6 @@ impl Reader<'_> {
         self.facts.choose_one_of("asap.skill", &skills)
     }
 
-    /// Returns the places of a mask.
     fn places(&self, mask: &[f64], key: &str) -> Result<Vec<usize>> {
         let n = self.robot.len();
         let at = self.yaml.location(key);

@@ -49,7 +49,6 @@ pub(super) struct Given {
 /// A term of the observation.
 #[derive(Debug)]
 pub(super) struct Term {
-    /// Name of its value.
     pub(super) name: String,
     /// Module and name of its function, with a point between them.
     pub(super) function: String,

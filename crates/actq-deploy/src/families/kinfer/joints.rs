@@ -61,7 +61,6 @@ enum Pose {
     Numbers(Vec<f64>),
 }
 
-/// Returns the default pose.
 pub(super) fn default_pose(meta: &Document, robot: Option<&Robot>, n: usize, facts: &mut Facts) -> Result<Vec<f64>> {
     let key = "default_pose";
     let standing = meta.optional("default_standing", "numbers", Node::numbers)?;

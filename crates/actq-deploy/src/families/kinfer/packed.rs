@@ -35,7 +35,6 @@ pub(super) fn recognize(bundle: &Bundle, file: &str) -> Result<Option<Recognized
     Ok(Some(Recognized { documents, networks: vec![step], others: vec![init] }))
 }
 
-/// Makes the description.
 pub(super) fn read(bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Result<Description> {
     let (meta, file) = (&found.documents[0], &found.networks[0]);
     let signature = bundle.signature(file)?;

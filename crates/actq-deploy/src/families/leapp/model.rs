@@ -19,7 +19,6 @@ const MAX_VALUES: usize = u16::MAX as usize;
 /// Stands for an axis of times in `element_names`.
 const TIME: &str = "__temporal_axis__";
 
-/// A model.
 pub(super) struct Model {
     pub(super) name: String,
     pub(super) file: String,

@@ -33,7 +33,6 @@ impl Mode {
         })
     }
 
-    /// Returns the names of its statistics.
     fn statistics(self) -> [&'static str; 2] {
         match self {
             Self::Identity => [""; 2],
