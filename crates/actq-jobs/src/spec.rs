@@ -22,61 +22,50 @@ pub const MAX_JOBS: usize = 1_000_000;
 
 /// Policies, methods, budgets, seeds and episodes of a sweep. Every combination becomes an image.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Spec {
     /// Policy folders or ONNX files; paths in the spec are relative to its folder.
     pub policies: Vec<PathBuf>,
     /// Recordings that a user made, to learn from instead of those beside the policy.
-    #[serde(default)]
     pub calib: Vec<PathBuf>,
     /// The recording that errors are measured on, instead of the one beside the policy.
     pub heldout: Option<PathBuf>,
     /// Methods by name.
-    #[serde(default = "methods")]
     pub methods: Vec<String>,
     /// Budgets: one width for every matrix.
-    #[serde(default, deserialize_with = "widths")]
+    #[serde(deserialize_with = "widths")]
     pub bits: Vec<Width>,
     /// Budgets, in bits per weight.
-    #[serde(default)]
     pub bpw: Vec<f64>,
     /// Budgets: the largest errors on the held-out recording.
-    #[serde(default)]
     pub max_nmse: Vec<f64>,
     /// Budgets, in bytes of the image. With [`Self::ms`], every image keeps one of each.
-    #[serde(default, deserialize_with = "sizes")]
+    #[serde(deserialize_with = "sizes")]
     pub flash: Vec<usize>,
     /// Budgets, in predicted milliseconds of a step.
-    #[serde(default)]
     pub ms: Vec<f64>,
     /// The processor's clock in Hz, for predicted times.
-    #[serde(default = "clock_hz", deserialize_with = "clock")]
+    #[serde(deserialize_with = "clock")]
     pub clock: f64,
     /// Seeds of the quantizer.
-    #[serde(default = "seeds")]
     pub seeds: Vec<u64>,
     /// Columns per u8 scale; without it, the method's default.
     pub group: Option<usize>,
     /// Bits of the activations; without it, chosen by the method.
     pub activations: Option<u32>,
     /// Widths in bits of all rows of a matrix, by its tensor's name (method distill).
-    #[serde(default)]
     pub widths: BTreeMap<String, u32>,
     /// Most steps of distillation; without it, chosen for the network.
     pub steps: Option<usize>,
     /// Effort of distillation, if the steps are not given.
-    #[serde(default)]
     pub effort: Effort,
     /// Refused: learning that time limits depends on the machine.
     minutes: Option<toml::Value>,
     /// `true` if method distill weighs errors relative to the action's size.
-    #[serde(default)]
     pub relative: bool,
     /// Cores of a job that makes an image.
-    #[serde(default = "one")]
     pub cpus: usize,
     /// Measurement on the held-out recording.
-    #[serde(default)]
     pub evaluate: Evaluate,
     /// Closed-loop episodes of every image.
     pub drive: Option<Drive>,
@@ -92,37 +81,20 @@ pub struct Evaluate {
     pub per_job: Option<usize>,
 }
 
-fn methods() -> Vec<String> {
-    ["rtn", "gptq", "distill"].map(str::to_owned).into()
-}
-
-fn seeds() -> Vec<u64> {
-    vec![1]
-}
-
-fn one() -> usize {
-    1
-}
-
-fn clock_hz() -> f64 {
-    CLOCK
-}
-
-impl Spec {
-    /// Makes a spec of these policies, with defaults and without budgets.
-    pub fn new(policies: Vec<PathBuf>) -> Self {
+impl Default for Spec {
+    fn default() -> Self {
         Self {
-            policies,
+            policies: Vec::new(),
             calib: Vec::new(),
             heldout: None,
-            methods: methods(),
+            methods: ["rtn", "gptq", "distill"].map(str::to_owned).into(),
             bits: Vec::new(),
             bpw: Vec::new(),
             max_nmse: Vec::new(),
             flash: Vec::new(),
             ms: Vec::new(),
             clock: CLOCK,
-            seeds: seeds(),
+            seeds: vec![1],
             group: None,
             activations: None,
             widths: BTreeMap::new(),
@@ -135,6 +107,13 @@ impl Spec {
             drive: None,
             learn: None,
         }
+    }
+}
+
+impl Spec {
+    /// Makes a spec of these policies, with defaults and without budgets.
+    pub fn new(policies: Vec<PathBuf>) -> Self {
+        Self { policies, ..Self::default() }
     }
 
     /// Reads a spec, and makes its paths absolute.

@@ -1,4 +1,4 @@
-//! Specs, plans and stores that are refused.
+//! Plans and stores that are refused. Specs that are, are cases of the command.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -14,59 +14,10 @@ use actq_jobs::schedule::{Counts, Ended, Schedule};
 use actq_jobs::store::Store;
 
 #[test]
-fn specs_are_refused_with_the_key() {
-    let cases = [
-        ("bpw = [1, 20]", "bpw = [1, 20]\nbwp = 3", "unknown field `bwp`"),
-        ("[evaluate]", "[evaluation]", "unknown field `evaluation`"),
-        ("per_job = 2\n\n[drive]", "per_jobs = 2\n\n[drive]", "unknown field `per_jobs`"),
-        ("steps = 2", "minutes = 2", "minutes: learning that time limits"),
-        ("steps = 2", "steps = -2", "invalid value"),
-        ("bpw = [1, 20]", "bpw = [1, 0]", "budgets are numbers above 0"),
-        ("bpw = [1, 20]", "bpw = []", "no budget: name at least one"),
-        ("bpw = [1, 20]", "bpw = [2, 2.0]", "bpw: 2 is named twice"),
-        ("bpw = [1, 20]", "bits = [5]", "bits: 5: use 2, 3, 4 or 8"),
-        ("bpw = [1, 20]", "flash = [\"16Q\"]", "flash: 16Q: use a number of bytes"),
-        ("bpw = [1, 20]", "flash = [\"1K\", 1024]", "flash: 1024 is named twice"),
-        ("bpw = [1, 20]", "ms = [-1]", "ms: [-1.0]: budgets are numbers above 0"),
-        ("bpw = [1, 20]", "ms = [1]\nclock = \"fast\"", "clock: fast: use a number of Hz"),
-        ("bpw = [1, 20]", "max_nmse = [0]", "max_nmse: [0.0]: budgets are numbers above 0"),
-        ("steps = 2", "effort = \"much\"", "unknown variant `much`"),
-        ("steps = 2", "steps = 2\neffort = \"quick\"", "steps and effort: both say how long to learn"),
-        ("steps = 2", "group = 48", "group is 48"),
-        ("steps = 2", "activations = 12", "activations: 12; use 8 or 16 bits"),
-        ("steps = 2", "widths = { middle = 8 }", "widths: middle: tiny has no such matrix; it has in, out"),
-        ("steps = 2", "widths = { in = 5 }", "widths: in = 5: use 2, 3, 4 or 8"),
-        ("steps = 2", "calib = [\"none.npz\"]", "none.npz"),
-        (
-            "policies = [\"policy\"]",
-            "policies = [\"policy\", \"b\"]\nheldout = \"h.npz\"",
-            "calib and heldout apply to one policy",
-        ),
-        ("\"distill\"]", "\"rtn\"]", "methods: rtn is named twice"),
-        ("\"rtn\", \"distill\"", "\"rtn\"", "only method distill learns"),
-        ("\"rtn\", ", "\"rtm\", ", "method \"rtm\" is unknown"),
-        ("policies = [\"policy\"]", "policies = [\"nowhere\"]", "nowhere"),
-        ("policies = [\"policy\"]", "policies = [\"policy\", \"./policy\"]", "have one address"),
-        ("episodes = 5", "episodes = 0", "drive.episodes: 0"),
-        ("first_seed = 10\n", "first_seed = 98\n", "seeds 98 to 100 are also seeds of [drive], 100 to 104"),
-        ("command = \"simulator\"", "command = \"s\"\nfiles = [\"missing.py\"]", "missing.py: cannot read the file"),
-        ("command = \"simulator\"", "command = \" \"", "drive.command: is empty"),
-    ];
-    for (from, to, expected) in cases {
-        assert!(SPEC.contains(from), "{from}");
-        let dir = folder(&SPEC.replacen(from, to, 1));
-        let error = format!("{:#}", jobs(&dir).expect_err(to));
-        assert!(error.contains(expected), "{to}: {error}");
-    }
-    let dir = folder(SPEC);
-    fs::remove_file(dir.path().join("policy/heldout.npz")).expect("removed");
-    let error = format!("{:#}", jobs(&dir).expect_err("no recording"));
-    assert!(error.contains("actq sweep needs recorded observations"), "{error}");
-}
-
-/// Returns the plan's text with one address replaced by another.
-fn replaced(jobs: &[Job], from: usize, to: usize) -> String {
-    order::text(jobs).expect("text").replace(&jobs[from].address, &jobs[to].address)
+fn one_policy_has_one_address() {
+    let twice = SPEC.replace("policies = [\"policy\"]", "policies = [\"policy\", \"./policy\"]");
+    let error = jobs(&folder(&twice)).expect_err("two jobs of one address");
+    assert!(format!("{error:#}").contains("have one address"), "{error:#}");
 }
 
 #[test]
@@ -79,12 +30,12 @@ fn damaged_plans_are_refused() {
     let text = order::text(&plan).expect("text");
     refused("", "has no job");
     refused("{}", "line 1");
-    refused(&replaced(&plan, 0, 4), "have one address");
-    refused(&text.lines().skip(1).collect::<Vec<_>>().join("\n"), "which is not in the plan");
-    // The first image waits for the merge, which waits for all.
     let (first, rest) = text.split_once('\n').expect("lines");
+    refused(&format!("{text}{first}"), "have one address");
+    refused(rest, "which is not in the plan");
+    // The first image waits for the merge, which waits for all.
     let waits = first.replace("\"deps\":[]", &format!("\"deps\":[\"{}\"]", plan.last().expect("a job").address));
-    refused(&format!("{waits}\n{rest}"), "form a cycle");
+    refused(&format!("{waits}\n{rest}"), "\"deps\" are not the addresses in its options");
     refused(&text.replacen("\"seed\":1", "\"seed\":2", 1), "must not be edited");
     refused(&text.replacen("\"steps\":null", "\"steps\":null,\"minutes\":1.0", 1), "has the option minutes");
     refused(&text.replacen("\"steps\":null", "\"steps\":null,\"pace\":1", 1), "unknown field `pace`");
