@@ -9,6 +9,7 @@ const WITH_DSP: [&str; 5] = ["cortex-m33", "cortex-m35p", "cortex-m52", "cortex-
 
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(actq_armv7em)");
+    println!("cargo::rustc-check-cfg=cfg(actq_armv7m)");
     println!("cargo::rustc-check-cfg=cfg(actq_armv8m)");
     println!("cargo::rustc-check-cfg=cfg(actq_fpu)");
     println!("cargo::rustc-check-cfg=cfg(actq_soft)");
@@ -27,6 +28,9 @@ fn main() {
     // Neither a product of 64 bits nor a division.
     if target.starts_with("thumbv6m") {
         println!("cargo::rustc-cfg=actq_narrow");
+    }
+    if target.starts_with("thumbv7m") && !portable {
+        println!("cargo::rustc-cfg=actq_armv7m");
     }
     let dsp = target.starts_with("thumbv7em") || target.starts_with("thumbv8m.main") && flags_have_dsp();
     if dsp && !portable {

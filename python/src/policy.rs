@@ -118,7 +118,9 @@ impl Policy {
             [values] if values == len => vec![self.policy.chunk * self.policy.act_len],
             [steps, values] if values == len => vec![steps, self.policy.chunk * self.policy.act_len],
             _ => {
-                return Err(error!("the observations have the shape {given:?}; use [{len}] for one, or [steps, {len}]"));
+                return Err(error!(
+                    "the observations have the shape {given:?}; use [{len}] for one, or [steps, {len}]"
+                ));
             }
         };
         let observations: Vec<f32> = observations.as_array().iter().copied().collect();

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use actq::budget::{Budget, TimeLimit};
 use actq::data::{Recording, Recordings, Sizes, joined};
+use actq::emit::{Core, repack};
 use actq::measure::{check, eval, recorded};
 use actq::methods::{Activations, Effort, MAX_MINUTES, Method, Options};
 use actq::pipeline::{Quantizer, check_budget, minutes_of_image};
@@ -35,6 +36,7 @@ pub(crate) struct Request {
     method: Option<String>,
     group: Option<usize>,
     activations: Option<u32>,
+    core: Option<String>,
     widths: Vec<(String, u32)>,
     steps: Option<usize>,
     minutes: Option<f64>,
@@ -64,6 +66,15 @@ impl Request {
             ));
         }
         budget
+    }
+
+    /// Returns the core; `None` for the default layouts.
+    fn core(&self) -> PyResult<Option<Core>> {
+        let known = |name: &String| {
+            let names = Core::ALL.map(|(name, _)| format!("{name:?}")).join(", ");
+            Core::of_name(name).ok_or_else(|| error!("core is {name:?}; use one of {names}"))
+        };
+        self.core.as_ref().map(known).transpose()
     }
 
     /// Returns the method; `None` for the default, which depends on the recordings.
@@ -132,6 +143,7 @@ pub(crate) fn quantize(
     if !has_calib && method != Some(Method::Rtn) && folder.is_none_or(Path::is_file) {
         return Err(error!("{}", notes::how_to_record(&policy.policy)));
     }
+    let core = request.core()?;
     let options = request.options(method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }))?;
     let (mut options, policy, in_folder) = (options, policy.policy.clone(), folder.is_some());
     let (bytes, warnings, notes) = work::run(py, progress, move |worker| {
@@ -157,7 +169,8 @@ pub(crate) fn quantize(
             notes.push(notes::errors(&check).trim_end().to_owned());
             warnings.extend(notes::of_check(&check, &options));
         }
-        Ok((found.whole_image()?, warnings, notes))
+        let image = found.whole_image()?;
+        Ok((core.map_or(Ok(image.clone()), |core| repack(&image, core))?, warnings, notes))
     })?;
     Ok((Image::of(ImageBuffer::new(&bytes), Path::new("image"))?, warnings, notes))
 }

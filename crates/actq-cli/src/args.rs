@@ -11,7 +11,7 @@ mod values;
 use clap::{Parser, Subcommand};
 
 pub(crate) use deploy::{CheckArgs, DeployArgs, ImportArgs, ReadingArgs};
-pub(crate) use image::{ConstantsArgs, EvalArgs, ExportCArgs, InspectArgs, ServeArgs};
+pub(crate) use image::{ConstantsArgs, EvalArgs, ExportCArgs, InspectArgs, RepackArgs, ServeArgs};
 use jobs::{JobArgs, MergeArgs, PlanArgs};
 use link::{KeygenArgs, LinkArgs, SignArgs};
 pub use quantize::QuantizeArgs;
@@ -75,6 +75,13 @@ pub(crate) enum Command {
     ///
     /// Example: actq inspect ur3.actq --widths --stats ur3.json --svg ur3.svg
     Inspect(InspectArgs),
+    /// Convert an image to the layouts of another core: the same weights, the same actions
+    ///
+    /// Cores with the DSP extension (m4, m4f, m7, m33, m55) and without it (m0, m3, rv32imac, rv32zb) have layouts of
+    /// their own. A core runs images of the others slowly, or refuses them if its build lacks their layouts.
+    ///
+    /// Example: actq repack ur3.actq --core m3 --out ur3-m3.actq
+    Repack(RepackArgs),
     /// Compare an image's actions with the f32 policy's on held-out observations
     ///
     /// The recording is heldout.npz, .npy or .safetensors in POLICY_DIR, or the file that --heldout names. It holds

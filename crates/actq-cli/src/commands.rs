@@ -13,6 +13,7 @@ pub(crate) mod inspect;
 pub mod jobs;
 pub(crate) mod link;
 pub mod quantize;
+pub(crate) mod repack;
 pub(crate) mod serve;
 pub(crate) mod sign;
 pub mod sweep;

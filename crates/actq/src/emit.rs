@@ -2,8 +2,10 @@
 
 mod lower;
 mod raw_values;
+mod repack;
 mod writer;
 
 pub use lower::{Program, lower};
 pub use raw_values::raw_values;
+pub use repack::{Core, repack};
 pub use writer::{bytes_beside_blocks, image, image_around};

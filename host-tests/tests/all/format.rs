@@ -166,6 +166,7 @@ fn lanes(cell: &str) -> Lanes {
     match cell {
         "single" => Lanes::Single,
         "paired" => Lanes::Paired,
+        "scalar" => Lanes::Scalar,
         _ => panic!("{cell:?} are no lanes"),
     }
 }
@@ -204,7 +205,7 @@ impl Documented {
 
     fn new(document: &str, row: &[&str]) -> Self {
         let (width, lanes) = (width(row[1]), lanes(row[0]));
-        let mark = if lanes == Lanes::Paired { "paired" } else { "" };
+        let mark = if lanes == Lanes::Single { "" } else { row[0] };
         let lines = fenced(document, &format!("bits{}{mark}", width.bits()));
         // The entries of a line, from bit 31 down; lines of one label follow each other word by word.
         let entries = |label: &str| -> Vec<Vec<Option<usize>>> {
@@ -308,7 +309,7 @@ fn layouts_and_bit_diagrams_match_the_packer() {
             cols.into_iter().flat_map(move |cols| [0, 32, 64, 128].map(|group| (rows, cols, group)))
         }) {
             let shape = BlockShape { width: layout.width, lanes: layout.lanes, rows, cols, group };
-            assert_eq!(shape.is_valid(), layout.lanes == Lanes::Single || group <= 32);
+            assert_eq!(shape.is_valid(), layout.lanes != Lanes::Paired || group <= 32);
             if !shape.is_valid() {
                 continue;
             }
@@ -319,13 +320,13 @@ fn layouts_and_bit_diagrams_match_the_packer() {
             layout.check(shape, &codes, &scales, &packed);
             shapes += 1;
         }
-        assert_eq!(shapes, if layout.lanes == Lanes::Single { 324 } else { 162 });
+        assert_eq!(shapes, if layout.lanes == Lanes::Paired { 162 } else { 324 });
     }
 }
 
 #[test]
 fn lanes_follow_from_the_matrix_as_documented() {
-    assert_eq!(Lanes::ALL.map(Lanes::code), [0, 1]);
+    assert_eq!(Lanes::ALL.map(Lanes::code), [0, 1, 2]);
     for (x_max, group) in [1, 126, 127, 128, 32767].into_iter().flat_map(|x| [0, 32, 64, 128].map(|g| (x, g))) {
         let expected = if x_max <= 127 && group <= 32 { Lanes::Paired } else { Lanes::Single };
         assert_eq!(Lanes::of(x_max, group), expected, "x_max {x_max}, group {group}");
@@ -374,7 +375,7 @@ fn the_table_of_sizes_matches_the_blocks() {
             "{row:?}"
         );
     }
-    assert_eq!(rows.len(), 12);
+    assert_eq!(rows.len(), 14);
     // The text repeats these figures, wherever its lines break.
     let text = document.split_whitespace().collect::<Vec<_>>().join(" ");
     let example = "Example, 256 x 256 at 3 bits with paired lanes and one scale a row: 64 strips * 32 units * 3 words + \
@@ -403,7 +404,7 @@ fn the_work_area_is_as_long_as_documented() {
     let most = |cols, group| {
         let plans = Width::ALL
             .into_iter()
-            .flat_map(|width| Lanes::ALL.map(|lanes| Plan::new(BlockShape { width, lanes, rows: 1, cols, group })));
+            .flat_map(|width| Lanes::DSP.map(|lanes| Plan::new(BlockShape { width, lanes, rows: 1, cols, group })));
         plans.flatten().map(|plan| plan.room(cols)).max()
     };
     for cols in (1..1200usize).chain([4095, 4096, 65535]) {
@@ -427,6 +428,40 @@ fn the_work_area_is_as_long_as_documented() {
             if group > 32 || cols <= MAX_PAIRED_GROUPED {
                 assert_eq!(most(cols, group), Some(words), "{cols} columns, groups of {group}");
             }
+        }
+    }
+}
+
+#[test]
+fn the_work_area_of_scalar_layouts_is_as_long_as_documented() {
+    let document = document();
+    let rows = table(&document, "| width | words that a block of scalar layout needs");
+    assert_eq!(
+        rows,
+        [
+            ["2, 3", "max(v + 128 * min(ceil(c / 8), 8), v + p / 2 if p > c)"],
+            ["4", "v + 2 * ceil(p / 32), and p / 2 more if p > c"],
+            ["8", "v, and p / 2 more if p > c"],
+        ]
+    );
+    for (cols, group) in (1..700usize).chain([4096, 65535]).flat_map(|cols| [0, 32, 64, 128].map(|group| (cols, group)))
+    {
+        let padded = |unit: usize| cols.next_multiple_of(unit);
+        for width in Width::ALL {
+            let unit = match (group, width) {
+                (0, Width::W4) => 8,
+                (0, _) => 32,
+                _ => group,
+            };
+            let (p, v) = (padded(unit), padded(unit) / 2);
+            let copy = if p > cols { p / 2 } else { 0 };
+            let words = match width {
+                Width::W2 | Width::W3 => (v + 128 * cols.div_ceil(8).min(8)).max(v + copy),
+                Width::W4 => v + 2 * p.div_ceil(32) + copy,
+                Width::W8 => v + copy,
+            };
+            let shape = BlockShape { width, lanes: Lanes::Scalar, rows: 1, cols, group };
+            assert_eq!(Plan::new(shape).map(|plan| plan.work(cols)), Some(words), "{shape:?}");
         }
     }
 }

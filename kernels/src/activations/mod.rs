@@ -16,7 +16,7 @@ pub(crate) use plan::Extent;
 pub use plan::KernelArguments;
 pub use plan::{Plan, max_prepared_words};
 pub use prepared::Prepared;
-#[cfg(not(actq_fpu))]
+#[cfg(any(not(actq_fpu), feature = "scalar"))]
 pub(crate) use prepared::lay_out;
 pub use prepared::prepare;
 pub use scale::Scale;

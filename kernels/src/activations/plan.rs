@@ -81,6 +81,8 @@ impl Plan {
                 extra: match shape.lanes {
                     _ if format.sum => 0usize.wrapping_sub(chunks * format.starts[0].bias as usize),
                     Lanes::Single if shape.group == 0 => 0,
+                    #[cfg(feature = "scalar")]
+                    Lanes::Scalar => 0,
                     _ => 4 * starts + 2 * first,
                 },
                 // Passes and steps are powers of two, and a chunk that is longer than a pass is whole passes.
@@ -105,6 +107,18 @@ impl Plan {
     /// copied to the end of these words and filled with zeros, while the prepared words grow from their start.
     pub const fn room(&self, len: usize) -> usize {
         if len == self.padded { self.words } else { self.words + self.padded / 2 }
+    }
+
+    /// Returns the words of the work area that a product of a vector of `len` values needs: [`Self::room`], or the
+    /// vector and its tables of bit planes.
+    pub const fn work(&self, len: usize) -> usize {
+        let room = self.room(len);
+        #[cfg(feature = "scalar")]
+        if matches!(self.shape.lanes, Lanes::Scalar) && self.shape.cell_cols() == 8 {
+            let with_tables = self.words + crate::arch::Tables::room(self.shape.units());
+            return if with_tables > room { with_tables } else { room };
+        }
+        room
     }
 
     /// Returns the arguments of an assembler kernel.

@@ -47,9 +47,13 @@ mod armv7em;
 #[cfg(actq_fpu)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
 mod armv7em_fpu;
+#[cfg(all(actq_armv7m, feature = "scalar"))]
+#[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
+mod armv7m;
 pub mod portable;
 mod product;
 pub mod reference;
+mod tables;
 
 #[cfg(actq_armv7em)]
 use armv7em as integers;
@@ -63,10 +67,13 @@ use portable as integers;
 pub(crate) use floats::{denoise, gru_elements, lstm_elements, normalize, scale, sqrt, standardize, sum, sum_squares};
 pub(crate) use integers::copy;
 pub use product::{Mismatch, Product};
+pub use tables::Tables;
 
 use crate::activations::{Plan, Prepared, Scale};
 use crate::error::NotFinite;
 use crate::layout::Block;
+#[cfg(feature = "scalar")]
+use crate::layout::Lanes;
 
 /// A backend that can be compiled in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,9 +98,25 @@ pub const BACKEND: Backend = if cfg!(actq_armv7em) { Backend::Armv7em } else { B
 /// # Errors
 ///
 /// [`Mismatch`] if block, vector and `acc` do not fit each other.
-#[inline(never)]
+#[inline(always)]
 pub fn gemv(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) -> Result<(), Mismatch> {
-    integers::gemv(Product::new(block, x, first_row, acc)?);
+    gemv_with(block, x, first_row, acc, Tables::default())
+}
+
+/// Does the same as [`gemv`] with memory for tables. Without it, bit planes take more time and a table on the stack.
+///
+/// # Errors
+///
+/// As [`gemv`].
+#[inline(never)]
+pub fn gemv_with(
+    block: &Block<'_>,
+    x: &Prepared<'_>,
+    first_row: usize,
+    acc: &mut [i32],
+    tables: Tables<'_>,
+) -> Result<(), Mismatch> {
+    integers::gemv(Product { tables, ..Product::new(block, x, first_row, acc)? });
     Ok(())
 }
 
@@ -114,6 +137,12 @@ impl Scale {
     #[inline(never)]
     pub fn quantize<'w>(self, x: &[f32], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
         let x = x.get(..plan.shape.cols).unwrap_or(x);
+        // The assembler has the forms of the DSP extension's layouts.
+        #[cfg(feature = "scalar")]
+        if plan.shape.lanes == Lanes::Scalar {
+            portable::quantize(x, self.inverse(), plan, out)?;
+            return Prepared::new(out, plan);
+        }
         floats::quantize(x, self.inverse(), plan, out)?;
         Prepared::new(out, plan)
     }

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use super::tables::Tables;
 use crate::activations::Prepared;
 use crate::layout::{Block, STRIP};
 
@@ -27,6 +28,9 @@ pub struct Product<'a> {
     pub(super) x: &'a Prepared<'a>,
     pub(super) first_row: usize,
     pub(super) acc: &'a mut [i32],
+    /// Nothing reads it in a build without the layouts that have tables.
+    #[cfg_attr(not(feature = "scalar"), expect(dead_code))]
+    pub(super) tables: Tables<'a>,
 }
 
 impl<'a> Product<'a> {
@@ -49,6 +53,6 @@ impl<'a> Product<'a> {
         if !first_row.is_multiple_of(STRIP) || !ends_well || !x.plan().fits(shape) {
             return Err(Mismatch);
         }
-        Ok(Self { block, x, first_row, acc })
+        Ok(Self { block, x, first_row, acc, tables: Tables::default() })
     }
 }

@@ -14,7 +14,7 @@ pub fn dot(block: &Block<'_>, x: &Prepared<'_>, row: usize) -> i32 {
 }
 
 /// Computes a product as [`crate::arch::gemv`] does.
-pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
+pub fn gemv(Product { block, x, first_row, acc, .. }: Product<'_>) {
     for (row, sum) in (first_row..).zip(acc) {
         *sum = if row < block.shape().rows { dot(block, x, row) } else { 0 };
     }

@@ -121,7 +121,7 @@ const FUNCTIONS: usize = OPERATIONS + op::NAMES.len() * Operation::ALL.len();
 const PREPARES: usize = FUNCTIONS + Function::ALL.len();
 const GEMVS: usize = PREPARES + LAYOUTS * Prepare::ALL.len();
 /// Layouts, each with row scales and with group scales.
-const LAYOUTS: usize = Width::ALL.len() * Lanes::ALL.len() * Scales::ALL.len();
+const LAYOUTS: usize = Width::ALL.len() * Lanes::DSP.len() * Scales::ALL.len();
 
 impl CostItem {
     /// Number of items.
@@ -152,7 +152,9 @@ impl CostItem {
     }
 
     const fn layout(width: Width, lanes: Lanes, scales: Scales) -> usize {
-        (width as usize * Lanes::ALL.len() + lanes as usize) * Scales::ALL.len() + scales as usize
+        // Rates are those of a Cortex-M4, whose layouts have lanes.
+        let lanes = if matches!(lanes, Lanes::Single) { Lanes::Single } else { Lanes::Paired };
+        (width as usize * Lanes::DSP.len() + lanes as usize) * Scales::ALL.len() + scales as usize
     }
 
     pub(super) const fn prepare(width: Width, lanes: Lanes, scales: Scales, which: Prepare) -> Self {
@@ -182,8 +184,8 @@ impl CostItem {
         let i = self.index();
         let layout = |i: usize| {
             let (lanes, scales) = (i / Scales::ALL.len(), i % Scales::ALL.len());
-            let width = *Width::ALL.get(lanes / Lanes::ALL.len())?;
-            Some((width, *Lanes::ALL.get(lanes % Lanes::ALL.len())?, Scales::ALL.get(scales)?))
+            let width = *Width::ALL.get(lanes / Lanes::DSP.len())?;
+            Some((width, *Lanes::DSP.get(lanes % Lanes::DSP.len())?, Scales::ALL.get(scales)?))
         };
         Some(if let Some(single) = SINGLES.get(i) {
             Kind::Single(single)

@@ -408,10 +408,10 @@ fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), Ima
     Ok(())
 }
 
-/// Returns the words that preparing an input for the block takes.
+/// Returns the words that preparing an input for the block takes, with the block's tables.
 #[inline(never)]
 fn room(block: &Block<'_>) -> usize {
-    Plan::of(block).room(block.shape().cols)
+    Plan::of(block).work(block.shape().cols)
 }
 
 /// Returns `true` if a number is above 0 and finite.

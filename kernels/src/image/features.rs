@@ -18,19 +18,24 @@ struct Feature {
 }
 
 macro_rules! features {
-    ($($name:literal)*) => {
+    ($($name:literal $(or $remedy:literal)?)*) => {
         [$(Feature {
             name: $name,
             is_built: cfg!(feature = $name),
             refusal: concat!(
                 "the image needs the feature `", $name, "` of actq-kernels, which this build leaves out; add it in Cargo.toml"
+                $(, ", or ", $remedy)?
             ),
         }),*]
     };
 }
+/// The code of blocks without lanes, which a build without them knows, too.
+const SCALAR: u8 = 2;
+
 /// The features in the order of Cargo.toml.
-const FEATURES: [Feature; 15] = features! {
+const FEATURES: [Feature; 16] = features! {
     "w2" "w3" "w4" "w8" "single" "paired" "groups" "elu" "silu" "functions" "norm" "recurrent" "flow" "chunks" "around"
+    "scalar" or "convert the image to the layouts of this core with `actq repack`"
 };
 
 /// The features of this build, each a bit.
@@ -123,7 +128,10 @@ const fn of_matrix(bytes: &[u8], at: usize) -> u32 {
     let mut i = 0;
     while i < low(count) {
         let head = word(bytes, (blocks as usize).wrapping_add(i * h::BLOCK_WORDS));
-        needed |= bit(Lanes::of(high(levels) as u16, group).feature());
+        needed |= match (head >> 8) as u8 {
+            SCALAR => bit("scalar"),
+            _ => bit(Lanes::of(high(levels) as u16, group).feature()),
+        };
         if let Some(width) = Width::from_bits(head & 0xff) {
             needed |= bit(width.feature());
         }
@@ -157,6 +165,7 @@ mod tests {
         }
         assert_eq!(refusal_of(needed(VALID), all), None);
         assert_eq!(refusal_of(all, all & !bit("around")), Some(FEATURES[14].refusal));
+        assert!(FEATURES[15].refusal.contains("actq repack"));
     }
 
     #[test]

@@ -75,10 +75,18 @@ pub struct BlockRecord {
 }
 
 impl BlockRecord {
-    /// Reads a record; refuses values that no block of a matrix with these lanes has.
+    /// Reads a record of a matrix with activations up to `x_max` and these lanes, by the DSP extension; refuses values
+    /// that no block of it has.
     #[inline(always)]
-    pub fn parse(record: &[u32; BLOCK_WORDS], lanes: Lanes) -> Result<Self, ImageError> {
+    pub fn parse(record: &[u32; BLOCK_WORDS], lanes: Lanes, x_max: u16) -> Result<Self, ImageError> {
         let [head, weights, scales, steps] = record.map(u32::from_le);
+        #[cfg(feature = "scalar")]
+        let lanes = match Lanes::from_code((head >> 8) as u8) {
+            Some(Lanes::Scalar) if x_max <= Lanes::PAIRED_X_MAX => Lanes::Scalar,
+            _ => lanes,
+        };
+        #[cfg(not(feature = "scalar"))]
+        let _ = x_max;
         let width = Width::from_bits(head & 0xff).ok_or(ImageError::Width)?;
         if !width.is_built() || !lanes.is_built() {
             return Err(ImageError::LeftOut);
@@ -162,7 +170,7 @@ impl<'a> RowBlock<'a> {
 }
 
 impl<'a> Matrix<'a> {
-    /// Returns the lanes of the matrix's blocks.
+    /// Returns the lanes of the matrix's blocks in the DSP extension's layouts.
     pub const fn lanes(&self) -> Lanes {
         Lanes::of(self.x_max, self.group)
     }
@@ -230,7 +238,7 @@ pub(crate) fn row_block<'a>(
     record: &[u32; BLOCK_WORDS],
     first_row: usize,
 ) -> Result<RowBlock<'a>, ImageError> {
-    let record = BlockRecord::parse(record, matrix.lanes())?;
+    let record = BlockRecord::parse(record, matrix.lanes(), matrix.x_max)?;
     let BlockRecord { width, lanes, rows, weights, scales, steps } = record;
     let shape = BlockShape { width, lanes, rows, cols: matrix.cols, group: matrix.group };
     if !shape.is_valid() || rows > matrix.rows {

@@ -4,6 +4,9 @@ use crate::activations::{Plan, Scale, max_prepared_words};
 use crate::arch::gemv;
 use crate::layout::{Block, BlockShape, MAX_GROUP, PAD_COLS, STRIP};
 
+/// Words that start values of the scalar layouts take beside those of the others.
+const SCALAR_STARTS: usize = if cfg!(feature = "scalar") { 8 } else { 0 };
+
 /// Computes the largest magnitude that an int32 sum of the block's rows can reach for activations up to `x_max`: the
 /// largest row sum of `|level| * scale`, times `x_max`. It is exact, in time linear in the number of weights.
 pub fn worst_case(block: &Block<'_>, x_max: u16) -> i64 {
@@ -18,7 +21,7 @@ pub fn worst_case(block: &Block<'_>, x_max: u16) -> i64 {
 /// codes.
 #[inline(never)]
 fn largest_sum(block: &Block<'_>) -> Option<u32> {
-    let mut work = [0; max_prepared_words(MAX_GROUP - 1, MAX_GROUP)];
+    let mut work = [0; max_prepared_words(MAX_GROUP - 1, MAX_GROUP) + SCALAR_STARTS];
     let mut column = [0; STRIP];
     let (shape, mut words) = (block.shape(), block.words());
     let (mut first, mut largest) = (0, 0);

@@ -226,6 +226,13 @@ impl<'a> Image<'a> {
         Ok(Op { kind, regions: [dst, src, third], record: op, form, image: self.words })
     }
 
+    /// Iterates over the matrices in the order of their records, without biases.
+    #[cfg(feature = "writer")]
+    pub fn matrices(&self) -> impl Iterator<Item = Matrix<'a>> + use<'a> {
+        let image = *self;
+        (0..self.matrix_count()).filter_map(move |i| matrix(image.words, image.matrix_at(i), 0).ok())
+    }
+
     /// Returns the number of matrices.
     pub(super) fn matrix_count(&self) -> usize {
         self.header.matrix_count()

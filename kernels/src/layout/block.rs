@@ -30,6 +30,8 @@ impl BlockShape {
         let (group, cols) = match self.lanes {
             Lanes::Single => (is_group(self.group), 0xffff),
             Lanes::Paired => (self.group == 0 || self.group == PAIRED_GROUP, MAX_PAIRED_GROUPED),
+            #[cfg(feature = "scalar")]
+            Lanes::Scalar => (is_group(self.group), 0xffff),
         };
         let cols = if self.group == 0 { 0xffff } else { cols };
         self.rows >= 1 && self.rows <= 0xffff && self.cols >= 1 && self.cols <= cols && group

@@ -45,7 +45,7 @@ pub struct XLayout {
     pub chunk: usize,
     /// Columns of a pass through the loop of the kernel for row scales; the first pass may be short.
     pub run: usize,
-    /// Words before a chunk's pairs, 1 or 2: the start values of the kernel's sums.
+    /// Words before a chunk's pairs, at most 2: the start values of the kernel's sums.
     pub start_words: usize,
     /// Start values in these words.
     pub starts: [Start; 2],
@@ -75,6 +75,10 @@ impl XLayout {
     /// A column chunk that holds any group, or a row without groups: rows have at most 65535 columns.
     pub const ALL: usize = 1 << 16;
 
+    /// Pairs, and nothing else.
+    #[cfg(feature = "scalar")]
+    pub(super) const PLAIN: Self = Self { start_words: 0, ..Self::single(0) };
+
     /// Returns the form for single lanes: one start value a group.
     pub(super) const fn single(factor: i32) -> Self {
         let starts = [Start { bias: 0, factor }, Start::NONE];
@@ -83,7 +87,18 @@ impl XLayout {
 }
 
 /// Sums of a cell before they are separated.
-pub type Sums = [i32; 3];
+pub type Sums = [i32; 4];
+
+/// A kernel in Rust.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kernel {
+    /// It takes strips one by one, by [`Format::mac`] and [`Format::finish`].
+    Strips,
+    /// It looks up sums of columns by bit planes: word `p` of a cell has bit `p` of every code.
+    Planes,
+    /// It multiplies pairs of rows, chunk by chunk.
+    Pairs,
+}
 
 /// A layout. Each layout file implements it.
 pub trait Format {
@@ -97,6 +112,10 @@ pub trait Format {
     const STEP: usize;
     /// Form of the prepared activations.
     const X: XLayout;
+    /// Units that a pass of the portable kernel's loop takes. Columns of a row are a multiple of the step.
+    const PASS: usize = if Self::STEP > Self::CELL.cols { 2 } else { 1 };
+    /// The portable kernel.
+    const KERNEL: Kernel = Kernel::Strips;
 
     /// The bits of a code.
     const CODE_BITS: u32 = (1 << Self::WIDTH.bits()) - 1;
@@ -131,15 +150,29 @@ pub trait Format {
 
     /// Returns the initial sums of a chunk, from its start words.
     fn start(starts: &[u32]) -> Sums {
-        [starts.first().map_or(0, |w| *w as i32); 3]
+        [starts.first().map_or(0, |w| *w as i32); 4]
     }
 
     /// Adds a cell's products to its sums, modulo 2^32. `x` holds `CELL.cols / 2` int16 pairs.
     fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums);
 
-    /// Separates a chunk's sums and adds `sum(level * x)` for each of the cell's rows. With [`XLayout::sum`], the sum
-    /// of the group's x is still missing in rows of odd index.
-    fn finish(t: &Sums, rows: &mut [i32]);
+    /// Separates the sums of a chunk of `cols` columns and adds `sum(level * x)` for each of the cell's rows. With
+    /// [`XLayout::sum`], the sum of the group's x is still missing in rows of odd index.
+    fn finish(t: &Sums, cols: usize, rows: &mut [i32]);
+}
+
+/// Writes a code's bits into a cell's planes, whose bits must be zero before.
+#[cfg(feature = "scalar")]
+pub(super) fn set_plane_code<F: Format>(planes: &mut [u32; 3], row: usize, col: usize, code: u8) {
+    for (p, plane) in planes.iter_mut().enumerate().take(F::CELL.words) {
+        *plane |= (u32::from(code) >> p & 1) << (8 * row + col);
+    }
+}
+
+/// Returns the code of a cell's planes.
+#[cfg(feature = "scalar")]
+pub(super) fn plane_code<F: Format>(planes: [u32; 3], row: usize, col: usize) -> u8 {
+    (0..F::CELL.words).fold(0, |code, p| code | ((planes[p] >> (8 * row + col) & 1) as u8) << p)
 }
 
 /// Computes `c + a.lo * b.lo + a.hi * b.hi` over signed 16-bit halves, modulo 2^32, as the SMLAD instruction does.

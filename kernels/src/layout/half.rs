@@ -12,3 +12,10 @@ pub(crate) fn half_word(words: &[u32], i: usize) -> u16 {
 pub(crate) fn bf16(bits: u16) -> f32 {
     f32::from_bits(u32::from(bits) << 16)
 }
+
+/// Returns the signed halves of a word, the low one first.
+#[cfg(feature = "scalar")]
+#[inline(always)]
+pub(crate) fn halves(word: u32) -> (i32, i32) {
+    (word as i16 as i32, word as i32 >> 16)
+}

@@ -20,7 +20,7 @@ pub const fn is_group(group: usize) -> bool {
     matches!(group, 0 | SMALL | MIDDLE | MAX_GROUP)
 }
 
-/// Weights in a 16-bit lane of an SMLAD operand.
+/// Weights in a 16-bit lane of an SMLAD operand, or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Lanes {
@@ -28,16 +28,26 @@ pub enum Lanes {
     Single,
     /// Two, of different rows; activations are at most 127.
     Paired,
+    /// No lanes: layouts for cores without the DSP extension; activations are at most 127.
+    #[cfg(feature = "scalar")]
+    Scalar,
 }
 
 impl Lanes {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Single, Self::Paired];
+    #[cfg(feature = "scalar")]
+    pub const ALL: [Self; 3] = [Self::Single, Self::Paired, Self::Scalar];
+    /// All of them.
+    #[cfg(not(feature = "scalar"))]
+    pub const ALL: [Self; 2] = Self::DSP;
 
-    /// Largest activation of paired lanes.
+    /// Those of the DSP extension.
+    pub const DSP: [Self; 2] = [Self::Single, Self::Paired];
+
+    /// Largest activation of paired lanes, and without lanes.
     pub const PAIRED_X_MAX: u16 = 127;
 
-    /// Returns the lanes of a matrix with activations up to `x_max` and group size `group`: paired for int8 activations
+    /// Returns the DSP extension's lanes of a matrix with activations up to `x_max` and group size `group`: paired for int8 activations
     /// with row scales or groups of 32 ([`GROUPS`]), otherwise single.
     pub const fn of(x_max: u16, group: usize) -> Self {
         if x_max <= Self::PAIRED_X_MAX && matches!(group, 0 | PAIRED_GROUP) { Self::Paired } else { Self::Single }
@@ -48,6 +58,8 @@ impl Lanes {
         match self {
             Self::Single => "single",
             Self::Paired => "paired",
+            #[cfg(feature = "scalar")]
+            Self::Scalar => "scalar",
         }
     }
 
@@ -56,12 +68,17 @@ impl Lanes {
         match self {
             Self::Single => cfg!(feature = "single"),
             Self::Paired => cfg!(feature = "paired"),
+            #[cfg(feature = "scalar")]
+            Self::Scalar => true,
         }
     }
 
     /// The lanes with entries in tables: the only ones of this build, otherwise all. (A writer packs others, too.)
     pub(crate) const IN_TABLES: &'static [Self] = match (Self::Single.is_built(), Self::Paired.is_built()) {
         _ if cfg!(feature = "writer") => &Self::ALL,
+        #[cfg(feature = "scalar")]
+        (false, false) => &[Self::Scalar],
+        _ if cfg!(feature = "scalar") => &Self::ALL,
         (true, false) => &[Self::Single],
         (false, true) => &[Self::Paired],
         _ => &Self::ALL,
@@ -73,11 +90,13 @@ impl Lanes {
         if Self::IN_TABLES.len() == 1 { 0 } else { self as usize }
     }
 
-    /// Returns the code in a block record: 0 or 1.
+    /// Returns the code in a block record.
     pub const fn code(self) -> u8 {
         match self {
             Self::Single => 0,
             Self::Paired => 1,
+            #[cfg(feature = "scalar")]
+            Self::Scalar => 2,
         }
     }
 
@@ -86,6 +105,8 @@ impl Lanes {
         match code {
             0 => Some(Self::Single),
             1 => Some(Self::Paired),
+            #[cfg(feature = "scalar")]
+            2 => Some(Self::Scalar),
             _ => None,
         }
     }

@@ -16,9 +16,11 @@
 //! one, up to the strip's end, and columns after the last, up to a multiple of the kernel's step, are padding with code
 //! 0.
 //!
-//! Every width has two layouts. In **single** lanes, each signed 16-bit lane of an SMLAD operand holds one weight, and
+//! Every width has three layouts. Two are for the DSP extension. In **single** lanes, each signed 16-bit lane of an SMLAD operand holds one weight, and
 //! the activations may have 16 bits. In **paired** lanes a lane holds the weights of two rows, one SMLAD computes four
-//! MACs, and the sums are separated when they are full; that needs `|x| <= 127`.
+//! MACs, and the sums are separated when they are full; that needs `|x| <= 127`. The **scalar** layouts, of the feature
+//! `scalar`, are for cores without that extension: bit planes that index tables of sums at 2 and 3 bits, two rows in one
+//! product at 4 and 8. They need `|x| <= 127`, too.
 //!
 //! | layout | levels (weight / scale) | cell: rows x columns in words | strip | bits per weight before scales |
 //! |---|---|---|---|---|
@@ -30,28 +32,32 @@
 //! | [`w3_paired`] | as w3 | 4 x 8 in 3 | 4 | 3 |
 //! | [`w4_paired`] | as w4 | 4 x 2 in 1 | 8 | 4 |
 //! | [`w8_paired`] | as w8 | 2 x 2 in 1 | 4 | 8 |
+//! | `w2_scalar` | as w2 | 4 x 8 in 2 | 8 | 2 |
+//! | `w3_scalar` | as w3 | 4 x 8 in 3 | 8 | 3 |
+//! | `w4_scalar` | as w4 | 4 x 2 in 1 | 8 | 4 |
+//! | `w8_scalar` | as w8 | 4 x 2 in 2 | 8 | 8 |
 //!
 //! Narrow widths use the mid-rise grid of odd levels: for bell-shaped weights four levels at ±1, ±3 lose about a third
 //! less than -2 .. 1 do. A level is `2*code - (2^b - 1)`. The kernels multiply with the codes, and the start values in
 //! the prepared activations ([`XLayout`]) cancel the offset of the codes.
 //!
-//! To add a width: its two layout files here, its line in `registry!` below and in the table above, its kernels' line
+//! To add a width: its layout files here, its line in `registry!` below and in the table above, its kernels' line
 //! in `arch/armv7em/table.rs`, and another [`LAYOUT_STAMP`].
 
 /// The registry: a line for every width, with its bits, its feature, the grid of its levels (`Grid`), and its layouts
-/// of single and of paired lanes. It passes all lines to another macro, after a first argument for that.
+/// of single lanes, of paired lanes and without lanes. It passes all lines to another macro, after a first argument for that.
 macro_rules! registry {
     ($for_all:ident $first:tt) => {
         $for_all! {
             $first
             /// 2 bits: levels -3, -1, 1, 3.
-            W2 = 2 if "w2", Odd: crate::layout::w2::W2, crate::layout::w2_paired::W2Paired;
+            W2 = 2 if "w2", Odd: crate::layout::w2::W2, crate::layout::w2_paired::W2Paired, crate::layout::w2_scalar::W2Scalar;
             /// 3 bits: odd levels -7 to 7.
-            W3 = 3 if "w3", Odd: crate::layout::w3::W3, crate::layout::w3_paired::W3Paired;
+            W3 = 3 if "w3", Odd: crate::layout::w3::W3, crate::layout::w3_paired::W3Paired, crate::layout::w3_scalar::W3Scalar;
             /// 4 bits: odd levels -15 to 15.
-            W4 = 4 if "w4", Odd: crate::layout::w4::W4, crate::layout::w4_paired::W4Paired;
+            W4 = 4 if "w4", Odd: crate::layout::w4::W4, crate::layout::w4_paired::W4Paired, crate::layout::w4_scalar::W4Scalar;
             /// 8 bits: levels -128 to 127.
-            W8 = 8 if "w8", Whole: crate::layout::w8::W8, crate::layout::w8_paired::W8Paired;
+            W8 = 8 if "w8", Whole: crate::layout::w8::W8, crate::layout::w8_paired::W8Paired, crate::layout::w8_scalar::W8Scalar;
         }
     };
 }
@@ -65,17 +71,25 @@ mod pow2;
 mod table;
 pub mod w2;
 pub mod w2_paired;
+#[cfg(feature = "scalar")]
+pub mod w2_scalar;
 pub mod w3;
 pub mod w3_paired;
+#[cfg(feature = "scalar")]
+pub mod w3_scalar;
 pub mod w4;
 pub mod w4_paired;
+#[cfg(feature = "scalar")]
+pub mod w4_scalar;
 pub mod w8;
 pub mod w8_paired;
+#[cfg(feature = "scalar")]
+pub mod w8_scalar;
 pub(crate) mod width;
 
 pub use block::{Block, BlockShape};
 pub use format::{Cell, Start};
-pub use format::{Format, Sums};
+pub use format::{Format, Kernel, Sums};
 pub use format::{PAD_COLS, QUAD, STRIP, XLayout};
 pub(crate) use lanes::PAIRED_GROUP;
 pub use lanes::{GROUPS, MAX_PAIRED_GROUPED};

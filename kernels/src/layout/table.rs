@@ -61,12 +61,14 @@ impl Layout {
 }
 
 macro_rules! table {
-    (() $($(#[$doc:meta])* $width:ident = $bits:literal if $feature:literal, $grid:ident: $single:path, $paired:path;)*) => {
+    (() $($(#[$doc:meta])* $width:ident = $bits:literal if $feature:literal, $grid:ident: $single:path, $paired:path, $scalar:path;)*) => {
         /// Returns the layout of a width and lanes.
         pub(crate) const fn layout(width: Width, lanes: Lanes) -> Layout {
             match (width, lanes) {
                 $((Width::$width, Lanes::Single) => Layout::of::<$single>(),
-                (Width::$width, Lanes::Paired) => Layout::of::<$paired>(),)*
+                (Width::$width, Lanes::Paired) => Layout::of::<$paired>(),
+                #[cfg(feature = "scalar")]
+                (Width::$width, Lanes::Scalar) => Layout::of::<$scalar>(),)*
             }
         }
 
@@ -77,7 +79,9 @@ macro_rules! table {
                 use $crate::layout::width::Width;
                 match ($shape.width, $shape.lanes) {
                     $((Width::$width, Lanes::Single) => $call::<$single>$arguments,
-                    (Width::$width, Lanes::Paired) => $call::<$paired>$arguments,)*
+                    (Width::$width, Lanes::Paired) => $call::<$paired>$arguments,
+                    #[cfg(feature = "scalar")]
+                    (Width::$width, Lanes::Scalar) => $call::<$scalar>$arguments,)*
                 }
             }};
         }

@@ -38,7 +38,7 @@ impl Format for W2 {
         }
     }
 
-    fn finish(t: &Sums, rows: &mut [i32]) {
+    fn finish(t: &Sums, _: usize, rows: &mut [i32]) {
         rows[0] = rows[0].wrapping_add(t[0]);
     }
 }

@@ -63,7 +63,7 @@ impl Format for W2Paired {
         }
     }
 
-    fn finish(t: &Sums, rows: &mut [i32]) {
+    fn finish(t: &Sums, _: usize, rows: &mut [i32]) {
         let even = (t[0] & 0xffff) - 0x8000;
         rows[0] = rows[0].wrapping_add(even >> 1);
         rows[1] = rows[1].wrapping_add(2 * (t[0] >> 16));

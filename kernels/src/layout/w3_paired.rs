@@ -92,7 +92,7 @@ impl Format for W3Paired {
         }
     }
 
-    fn finish(t: &Sums, rows: &mut [i32]) {
+    fn finish(t: &Sums, _: usize, rows: &mut [i32]) {
         for (rows, t) in rows.chunks_exact_mut(2).zip(t) {
             let even = (t & 0xffff) - 0x8000;
             rows[0] = rows[0].wrapping_add(even >> 2);

@@ -61,18 +61,18 @@ impl Format for W4Paired {
 
     fn start(starts: &[u32]) -> Sums {
         let start = |i: usize| starts.get(i).map_or(0, |w| *w as i32);
-        [start(0), start(0), start(1)]
+        [start(0), start(0), start(1), 0]
     }
 
     #[inline(always)]
-    fn mac(words: &[u32; 3], x: &[u32], [p, q, k]: &mut Sums) {
+    fn mac(words: &[u32; 3], x: &[u32], [p, q, k, _]: &mut Sums) {
         let x = x.first().copied().unwrap_or(0);
         *p = smlad(words[0] & MASK, x, *p);
         *q = smlad(words[0].rotate_right(8) & MASK, x, *q);
         *k = smlad(words[0] & CHECK, x, *k);
     }
 
-    fn finish(&[p, q, k]: &Sums, rows: &mut [i32]) {
+    fn finish(&[p, q, k, _]: &Sums, _: usize, rows: &mut [i32]) {
         let a = k.wrapping_sub(q << 8) << 12 >> 12;
         let b = p.wrapping_sub(a) >> 12;
         let c = k.wrapping_sub(a) >> 8;

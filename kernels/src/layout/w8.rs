@@ -40,7 +40,7 @@ impl Format for W8 {
         }
     }
 
-    fn finish(t: &Sums, rows: &mut [i32]) {
+    fn finish(t: &Sums, _: usize, rows: &mut [i32]) {
         rows[0] = rows[0].wrapping_add(t[0]);
     }
 }

@@ -50,7 +50,7 @@ impl Format for W8Paired {
         t[1] = smlad(words[0], x, t[1]);
     }
 
-    fn finish(t: &Sums, rows: &mut [i32]) {
+    fn finish(t: &Sums, _: usize, rows: &mut [i32]) {
         rows[0] = rows[0].wrapping_add(t[0]);
         rows[1] = rows[1].wrapping_add(t[1].wrapping_sub(t[0]) >> 8);
     }

@@ -10,8 +10,8 @@ use core::ops::Range;
 use super::elementwise::copy_le;
 use crate::activations::{Plan, Prepared, Scale};
 use crate::arch;
-use crate::arch::Mismatch;
-use crate::arch::gemv;
+use crate::arch::gemv_with;
+use crate::arch::{Mismatch, Tables};
 use crate::cursor::LinearCursor;
 use crate::error::Fault;
 use crate::image::header::BLOCK_WORDS;
@@ -51,35 +51,54 @@ impl RowBlock<'_> {
         start: Option<&[u32]>,
         y: &mut [f32],
     ) -> Result<(), Mismatch> {
-        self.apply_rows(0..self.block.shape().rows, &mut 0, x, x_scale, start, y).ok_or(Mismatch)
+        self.apply_with(x, Tables::default(), x_scale, start, y)
+    }
+
+    /// Does the same as [`Self::apply`] with memory for tables.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::apply`].
+    #[inline(always)]
+    pub fn apply_with(
+        &self,
+        x: &Prepared<'_>,
+        mut tables: Tables<'_>,
+        x_scale: Scale,
+        start: Option<&[u32]>,
+        y: &mut [f32],
+    ) -> Result<(), Mismatch> {
+        self.apply_rows(0..self.block.shape().rows, &mut 0, x, &mut tables, x_scale, start, y).ok_or(Mismatch)
     }
 
     /// Computes successive rows of the block as `apply` does. They start at a multiple of [`STRIP`], and end at another
     /// or at the block's end. With output steps, `output` is the previous row's output (0 before the first row), and
     /// becomes the last row's. `None` if `start` or `y` is too short.
+    #[expect(clippy::too_many_arguments, reason = "a piece of a product has no fewer")]
     pub(crate) fn apply_rows(
         &self,
         rows: Range<usize>,
         output: &mut usize,
         x: &Prepared<'_>,
+        tables: &mut Tables<'_>,
         x_scale: Scale,
         start: Option<&[u32]>,
         y: &mut [f32],
     ) -> Option<()> {
         let x_scale = x_scale.get();
         if start.is_none() || !self.steps.is_empty() {
-            return self.apply_runs(&mut [0; RUN], rows, output, x, x_scale, start, y);
+            return self.apply_runs(&mut [0; RUN], rows, output, x, tables, x_scale, start, y);
         }
         // Sums of rows in order fit in y itself, except those of a last strip with padding.
         let whole = if rows.end.is_multiple_of(QUAD) { rows.end } else { rows.end & !(STRIP - 1) };
         if rows.start < whole {
             let first = self.first_row + rows.start;
             let (start, y) = outputs(first, whole - rows.start, start, y)?;
-            gemv(&self.block, x, rows.start, bytemuck::must_cast_slice_mut(y)).ok()?;
+            gemv_with(&self.block, x, rows.start, bytemuck::must_cast_slice_mut(y), tables.lend()).ok()?;
             self.scale_in_order(rows.start, None, x_scale, start, y);
         }
         if whole < rows.end {
-            self.apply_runs(&mut [0; STRIP], whole..rows.end, output, x, x_scale, start, y)?;
+            self.apply_runs(&mut [0; STRIP], whole..rows.end, output, x, tables, x_scale, start, y)?;
         }
         Some(())
     }
@@ -93,6 +112,7 @@ impl RowBlock<'_> {
         rows: Range<usize>,
         output: &mut usize,
         x: &Prepared<'_>,
+        tables: &mut Tables<'_>,
         x_scale: f32,
         start: Option<&[u32]>,
         y: &mut [f32],
@@ -101,7 +121,7 @@ impl RowBlock<'_> {
         while first < rows.end {
             let run = sums.len().min(rows.end.next_multiple_of(QUAD) - first);
             let sums = sums.get_mut(..run)?;
-            gemv(&self.block, x, first, sums).ok()?;
+            gemv_with(&self.block, x, first, sums, tables.lend()).ok()?;
             let sums = sums.get(..rows.end - first).unwrap_or(sums);
             if self.steps.is_empty() {
                 let (start, y) = outputs(self.first_row + first, sums.len(), start, y)?;
@@ -196,11 +216,13 @@ impl Matrix<'_> {
                     x_scale.quantize(x, plan, work).ok_or(Fault::Damaged)?;
                 }
             }
-            let x = plan.as_ref().and_then(|plan| Prepared::new(work, plan)).ok_or(Fault::Damaged)?;
+            let Some(plan) = &plan else { return Err(Fault::Damaged) };
+            let (words, mut tables) = Tables::split(work, plan.words());
+            let x = Prepared::new(words, plan).ok_or(Fault::Damaged)?;
             let work = Work::Strips { shape, in_order: rows.steps.is_empty(), start: start.is_some() };
             let strips = budget.take((shape.rows - at.row).div_ceil(STRIP), work);
             let end = shape.rows.min(at.row + strips * STRIP);
-            rows.apply_rows(at.row..end, &mut at.output, &x, x_scale, start, y).ok_or(Fault::Damaged)?;
+            rows.apply_rows(at.row..end, &mut at.output, &x, &mut tables, x_scale, start, y).ok_or(Fault::Damaged)?;
             at.row = end;
             if end < shape.rows {
                 return Ok(false);

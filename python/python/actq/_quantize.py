@@ -19,12 +19,13 @@ log = logging.getLogger("actq")
 
 #: Hz; that of an STM32F405.
 CLOCK = 168e6
+CORES = '"m0", "m3", "rv32imac", "rv32zb", "m4", "m4f", "m7", "m33" or "m55"'
 
 
 def request(**given: Any) -> Dict[str, Any]:
     """Completes the options of a quantization by the defaults of the command."""
     unset = dict.fromkeys(
-        ["bits", "bpw", "flash", "ms", "max_nmse", "method", "group", "activations", "steps", "minutes", "effort"]
+        ["bits", "bpw", "flash", "ms", "max_nmse", "method", "group", "activations", "core", "steps", "minutes", "effort"]
     )
     options: Dict[str, Any] = {**unset, "clock": CLOCK, "widths": [], "relative": False, "seed": 1, **given}
     if options["widths"] is not None and not isinstance(options["widths"], (list, Mapping)):
@@ -37,7 +38,8 @@ def request(**given: Any) -> Dict[str, Any]:
     for name in ("bpw", "ms", "max_nmse", "minutes", "clock"):
         if options[name] is not None and not isinstance(options[name], Real):
             raise Error(f"{name} is {options[name]!r}; use a number")
-    for name, known in (("method", '"rtn", "gptq" or "distill"'), ("effort", '"quick", "default" or "thorough"')):
+    texts = {"method": '"rtn", "gptq" or "distill"', "effort": '"quick", "default" or "thorough"', "core": CORES}
+    for name, known in texts.items():
         if not isinstance(options[name], (str, type(None))):
             raise Error(f"{name} is {options[name]!r}; use {known}")
     if not isinstance(options["relative"], (bool, np.bool_)):
@@ -72,6 +74,7 @@ def quantize(
     method: Optional[str] = None,
     group: Optional[int] = None,
     activations: Optional[int] = None,
+    core: Optional[str] = None,
     widths: Optional[Mapping[str, int]] = None,
     steps: Optional[int] = None,
     minutes: Optional[float] = None,
@@ -101,6 +104,8 @@ def quantize(
     method: "distill" (the default with recordings), "gptq" or "rtn" (the default without).
     group: columns that share a scale: 0, 32, 64 or 128.
     activations: bits of the activations: 8 or 16.
+    core: the core to pack the image for: "m0", "m3", "rv32imac", "rv32zb", "m4", "m4f", "m7", "m33" or "m55". The default is
+        the layouts of those with the DSP extension, from "m4" on.
     widths: bits of single matrices, by their names.
     steps, minutes: most steps or minutes of learning; steps=0 for error feedback instead.
     effort: how long to learn: "quick", "default" or "thorough".
@@ -113,7 +118,8 @@ def quantize(
     """
     options = request(
         bits=bits, bpw=bpw, flash=flash, ms=ms, clock=clock, max_nmse=max_nmse, method=method, group=group,
-        activations=activations, widths=widths, steps=steps, minutes=minutes, effort=effort, relative=relative, seed=seed,
+        activations=activations, core=core, widths=widths, steps=steps, minutes=minutes, effort=effort, relative=relative,
+        seed=seed,
     )  # fmt: skip
     with reporter(progress) as report:
         image, warnings, notes = _actq.quantize(policy, recordings, heldout, options, report)

@@ -123,6 +123,8 @@ impl Core {
         ensure!(is_free, "{}: exists already; remove it, or name another file or folder", out.display());
         let mut files = Files::default();
         let mut features = image.map_or_else(|| vec!["default"], |image| image.features().collect());
+        // The layouts of the core's own images.
+        features.extend((image.is_none() && !self.has_assembler()).then_some("scalar"));
         features.extend(compact.then_some("compact"));
         let features = features.join(" ");
         let library = self.library(&features)?;

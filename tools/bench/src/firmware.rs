@@ -12,7 +12,7 @@ use actq_boards::{Target, root, target_dir};
 use actq_cli::outputs::files;
 use actq_kernels::Width;
 use anyhow::{Context, Result, anyhow, ensure};
-use object::{Object as _, ObjectSection as _, ObjectSymbol as _};
+use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SymbolKind};
 
 use crate::{rtn, ur3};
 
@@ -139,6 +139,13 @@ pub fn compact_binary(name: &str) -> Result<PathBuf> {
     Ok(build_once((BENCH, "", "compact", target), build)?.join(name))
 }
 
+/// Does the same as [`binary`] for a Cortex-M4 with the kernels' feature `scalar`.
+pub fn scalar_binary(name: &'static str) -> Result<PathBuf> {
+    let target = Target::Fpu;
+    let build = || build(BENCH, &[name], "scalar", target, target.profile(), &[]);
+    Ok(build_once((BENCH, name, "scalar", target), build)?.join(name))
+}
+
 /// Does the same as [`binary`] without the assembler (`ACTQ_BACKEND=portable`).
 pub fn portable_binary(name: &'static str, target: Target) -> Result<PathBuf> {
     if !target.has_assembler() {
@@ -190,6 +197,24 @@ fn write_built_in() -> Result<PathBuf> {
         files::write(&path, &bytes)?;
     }
     Ok(path)
+}
+
+/// Returns the bytes of the kernels' functions in a program, those in assembler too.
+///
+/// # Errors
+///
+/// If the file cannot be read, or is not an ELF file.
+pub fn kernel_bytes(elf: &Path) -> Result<u64> {
+    let data = fs::read(elf).with_context(|| format!("cannot read {}", elf.display()))?;
+    let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
+    let is_of_kernels =
+        |name: &str| name.contains("actq_kernels") || name.starts_with("actq_") && !name.starts_with("actq_count");
+    let sizes: BTreeMap<u64, u64> = file
+        .symbols()
+        .filter(|symbol| symbol.kind() == SymbolKind::Text && symbol.name().is_ok_and(is_of_kernels))
+        .map(|symbol| (symbol.address(), symbol.size()))
+        .collect();
+    Ok(sizes.values().sum())
 }
 
 /// Returns the address (without the Thumb bit) and length of a symbol; `None` if the file lacks it.

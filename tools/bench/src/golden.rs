@@ -140,13 +140,18 @@ pub fn cases(seed: u64) -> Vec<Case> {
                 let rows = 1 + random.below(17);
                 let x_max = match lanes {
                     Lanes::Single => [127, i16::MAX][random.below(2)],
-                    Lanes::Paired => 127,
+                    Lanes::Paired | Lanes::Scalar => 127,
                 };
                 cases.push(Case::draw(&mut random, BlockShape { width, lanes, rows, cols, group }, x_max, draw));
             }
         }
     }
     cases
+}
+
+/// Draws the cases of [`cases`] for layouts of the DSP extension.
+pub fn dsp_cases(seed: u64) -> Vec<Case> {
+    cases(seed).into_iter().filter(|case| Lanes::DSP.contains(&case.shape.lanes)).collect()
 }
 
 /// Lists all valid combinations of width, lanes and group.

@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
+use actq::emit::Core;
+
 use super::quantize::{BudgetArgs, LearnArgs, RunArgs};
-use super::values::{LimitList, limits, pair, positive, two_files};
+use super::values::{LimitList, core, limits, pair, positive, two_files};
 
 #[derive(clap::Args)]
 pub(crate) struct ImportArgs {
@@ -92,6 +94,10 @@ pub(crate) struct DeployArgs {
     pub(crate) max_nmse: Option<f64>,
     #[command(flatten)]
     pub(crate) budget: BudgetArgs,
+    /// The core to pack the image for: m0, m3, rv32imac, rv32zb, m4, m4f, m7, m33 or m55 [default: those with the DSP
+    /// extension, from m4 on]
+    #[arg(long, value_name = "CORE", value_parser = core)]
+    pub(crate) core: Option<Core>,
     #[command(flatten)]
     pub(crate) learn: LearnArgs,
     #[command(flatten)]

@@ -3,7 +3,9 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use super::values::{clock, npz, steps};
+use actq::emit::Core;
+
+use super::values::{clock, core, npz, steps};
 
 #[derive(clap::Args)]
 pub(crate) struct InspectArgs {
@@ -24,6 +26,18 @@ pub(crate) struct InspectArgs {
     /// Draw the widths as SVG
     #[arg(long, value_name = "FILE", requires = "widths")]
     pub(crate) svg: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct RepackArgs {
+    /// The image
+    pub(crate) image: PathBuf,
+    /// The core: m0, m3, rv32imac, rv32zb, m4, m4f, m7, m33 or m55
+    #[arg(long, value_name = "CORE", value_parser = core)]
+    pub(crate) core: Core,
+    /// The image to write
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
 }
 
 #[derive(clap::Args)]

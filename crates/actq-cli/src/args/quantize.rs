@@ -3,12 +3,15 @@
 use std::path::PathBuf;
 
 use actq::budget::{Budget, TimeLimit};
+use actq::emit::Core;
 use actq::methods::{Effort, Method};
 use actq_kernels::Width;
 use anyhow::{Result, bail};
 use clap::ValueEnum;
 
-use super::values::{clock, command, effort, forced, group, minutes, positive, rounds, seed, size, threads, width};
+use super::values::{
+    clock, command, core, effort, forced, group, minutes, positive, rounds, seed, size, threads, width,
+};
 
 /// Arguments of `actq quantize`, without the method.
 #[derive(clap::Args, Debug)]
@@ -46,6 +49,10 @@ pub struct QuantizeArgs {
     /// else 8]
     #[arg(long, value_name = "BITS")]
     pub(crate) activations: Option<ActivationArg>,
+    /// The core to pack the image for: m0, m3, rv32imac, rv32zb, m4, m4f, m7, m33 or m55 [default: those with the DSP
+    /// extension, from m4 on]
+    #[arg(long, value_name = "CORE", value_parser = core)]
+    pub(crate) core: Option<Core>,
     #[command(flatten)]
     pub(crate) learn: LearnArgs,
     #[command(flatten)]

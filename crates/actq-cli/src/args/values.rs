@@ -4,6 +4,7 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use actq::emit::Core;
 use actq::error::ensure;
 use actq::import::contract::StatedLimits;
 use actq::methods::{Effort, MAX_MINUTES};
@@ -15,6 +16,11 @@ use actq_kernels::layout::is_group;
 pub(super) fn width(text: &str) -> Result<Width, String> {
     let known = text.parse().ok().and_then(Width::from_bits);
     known.ok_or_else(|| "use 2, 3, 4 or 8 bits".to_owned())
+}
+
+pub(super) fn core(text: &str) -> Result<Core, String> {
+    let names = Core::ALL.map(|(name, _)| name).join(", ");
+    Core::of_name(text).ok_or_else(|| format!("use one of {names}"))
 }
 
 pub(super) fn pair(text: &str) -> Result<(String, String), String> {

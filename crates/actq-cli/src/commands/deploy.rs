@@ -182,6 +182,7 @@ fn quantize_args(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs
         protect: Vec::new(),
         group: None,
         activations: None,
+        core: args.core,
         learn: LearnArgs {
             minutes: if is_limited { args.learn.minutes } else { Some(DEFAULT_MINUTES) },
             ..args.learn.clone()
@@ -194,6 +195,9 @@ fn quantize_args(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs
 /// Returns what an image depends on beside the policy, as text.
 fn made_with(args: &DeployArgs) -> Result<String> {
     let mut text = format!("{:?}, {:?}, seed {}\n", args.budget, args.learn, args.run.seed);
+    if let Some(core) = args.core {
+        text += &format!("{core:?}\n");
+    }
     let files = match args.recordings.is_empty() {
         true => args.reading.reference.iter().map(|(raw, _)| raw.clone()).collect(),
         false => files_of(&args.recordings)?,

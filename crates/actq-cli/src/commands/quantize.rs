@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use actq::budget::Budget;
 use actq::data::{Recording, Recordings, Share, Sizes, driven_by, files_of};
+use actq::emit::repack;
 use actq::measure::size::{Beside, file_bits_per_weight};
 use actq::measure::time::{CLOCK, StepTime};
 use actq::measure::{check, own, recorded};
@@ -68,6 +69,9 @@ pub fn run(
     // The error is that of the network, on its own inputs.
     let network = found.buffer();
     found.image = found.whole_image()?;
+    if let Some(core) = args.core {
+        found.image = repack(&found.image, core)?;
+    }
     let mut contents = vec![found.image.clone()];
     if args.save_stats.is_some() {
         contents.push(Stats::new(&quantizer, &options, &found)?.json()?.into_bytes());

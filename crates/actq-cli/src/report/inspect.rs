@@ -75,7 +75,12 @@ pub fn report(image: &Image<'_>) -> String {
     let _ = writeln!(text, "values        {} bytes, {} of them in use at op {op} ({name})", 4 * placed, 4 * words);
     let _ = writeln!(text, "self-test     {}", count(image.self_test_steps(), "step"));
     let features: Vec<_> = image.features().collect();
-    let _ = writeln!(text, "features      {}, of the kernels on the target\n", features.join(" "));
+    let _ = writeln!(text, "features      {}, of the kernels on the target", features.join(" "));
+    if features.contains(&"scalar") {
+        let _ =
+            writeln!(text, "layouts       of cores without the DSP extension; slow on others: `actq repack` converts");
+    }
+    let _ = writeln!(text);
     let mut ops = table(&["op", "output", "input", "detail", "bits", "group", "x max", "bytes"]);
     for op in image.ops() {
         ops.add_row(row(&op));

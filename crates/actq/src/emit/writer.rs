@@ -93,7 +93,7 @@ struct Draft {
 }
 
 /// Returns the image's bytes with length and checksum.
-fn sealed(words: &[u32]) -> Result<Vec<u8>> {
+pub(super) fn sealed(words: &[u32]) -> Result<Vec<u8>> {
     let mut bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
     seal(&mut bytes).context("the image is larger than 4 GB")?;
     Ok(bytes)

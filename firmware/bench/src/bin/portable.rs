@@ -19,7 +19,7 @@ mod firmware {
     use actq_firmware_support::machine::{entry, singleton};
     use actq_firmware_support::{count, host};
     use actq_kernels::activations::{Plan, Prepared, Scale};
-    use actq_kernels::arch::{BACKEND, reference};
+    use actq_kernels::arch::{BACKEND, Tables, reference};
     use actq_kernels::image::RowBlock;
     use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
 
@@ -30,7 +30,7 @@ mod firmware {
         codes: [u8; ROWS * COLS],
         scales: [u8; ROWS * COLS / 32],
         words: [u32; ROWS * COLS / 4 + ROWS * COLS / 128],
-        prepared: [u32; 2 * COLS],
+        prepared: [u32; 5 * COLS],
     }
 
     #[entry]
@@ -39,7 +39,7 @@ mod firmware {
             codes: [0; ROWS * COLS],
             scales: [0; ROWS * COLS / 32],
             words: [0; ROWS * COLS / 4 + ROWS * COLS / 128],
-            prepared: [0; 2 * COLS],
+            prepared: [0; 5 * COLS],
         });
         host::exit(buffers.is_some_and(|buffers| run(buffers).is_some()))
     }
@@ -52,7 +52,8 @@ mod firmware {
         let x: [f32; COLS] = core::array::from_fn(|_| random() as i32 as f32);
         let bias: [u32; ROWS] = core::array::from_fn(|_| (random() as i32 as f32).to_bits());
         let row_scales: [u32; ROWS / 2] = core::array::from_fn(|_| 0x3c00_3c00 | random() & 0x7f_007f);
-        for (lanes, x_max) in [(Lanes::Paired, 127), (Lanes::Single, 2047)] {
+        for lanes in Lanes::ALL {
+            let x_max = if lanes == Lanes::Single { 2047 } else { 127 };
             for width in Width::ALL {
                 for group in [0, 32] {
                     let shape = BlockShape { width, lanes, rows: ROWS, cols: COLS, group };
@@ -89,7 +90,10 @@ mod firmware {
         y: &mut [f32],
     ) -> Option<Scale> {
         let scale = Scale::new(x, x_max).ok()?;
-        rows.apply(&scale.quantize(x, &Plan::of(&rows.block), prepared)?, scale, Some(bias), y).ok()?;
+        let plan = Plan::of(&rows.block);
+        scale.quantize(x, &plan, prepared)?;
+        let (words, tables) = Tables::split(prepared.get_mut(..plan.work(x.len()))?, plan.words());
+        rows.apply_with(&Prepared::new(words, &plan)?, tables, scale, Some(bias), y).ok()?;
         Some(scale)
     }
 }

@@ -12,7 +12,7 @@ use super::qemu::gives_the_sums_in;
 
 #[test]
 fn short_loops_give_the_golden_sums() -> Result<()> {
-    gives_the_sums_in(&firmware::compact_binary("golden")?, Target::Fpu, &actq_bench::golden::cases(1), "Armv7em")
+    gives_the_sums_in(&firmware::compact_binary("golden")?, Target::Fpu, &actq_bench::golden::dsp_cases(1), "Armv7em")
 }
 
 /// Upper limits of the ratio of short loops to the usual ones, of a whole call's instructions and modelled cycles, by

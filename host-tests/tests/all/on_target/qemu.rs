@@ -15,6 +15,7 @@ pub(crate) use actq_bench::qemu::same_bits;
 use actq_bench::{Target, golden, rtn, shared_policies, ur3};
 use actq_kernels::Width;
 use actq_kernels::image::{op, worst_case};
+use actq_kernels::layout::Lanes;
 use anyhow::{Context, Result, ensure};
 
 use crate::draft::Draft;
@@ -27,9 +28,17 @@ fn kernels_give_the_golden_sums_on_the_target() -> Result<()> {
     Target::ALL.into_iter().filter(|target| target.has_assembler()).try_for_each(kernels_give_the_golden_sums)
 }
 
+/// An image of another core's layouts has the same sums, slowly.
+#[test]
+fn scalar_layouts_give_the_golden_sums_beside_the_assembler() -> Result<()> {
+    let is_scalar = |case: &golden::Case| case.shape.lanes == Lanes::Scalar;
+    let (scalar, _): (Vec<_>, Vec<_>) = golden::cases(1).into_iter().partition(is_scalar);
+    gives_the_sums_in(&firmware::scalar_binary("golden")?, Target::Fpu, &scalar, "Armv7em")
+}
+
 /// Requires that the kernels in assembler give the host's sums on a target that has them.
 pub(crate) fn kernels_give_the_golden_sums(target: Target) -> Result<()> {
-    gives_the_sums(target, &golden::cases(1), "Armv7em")
+    gives_the_sums(target, &golden::dsp_cases(1), "Armv7em")
 }
 
 fn gives_the_sums(target: Target, cases: &[golden::Case], backend: &str) -> Result<()> {

@@ -22,7 +22,12 @@ assembler!("vector.s");
 
 /// Computes a product as [`crate::arch::gemv`] does.
 #[inline(always)]
-pub(crate) fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
+pub(crate) fn gemv(product: Product<'_>) {
+    #[cfg(feature = "scalar")]
+    if product.block.shape().lanes == crate::layout::Lanes::Scalar {
+        return super::portable::gemv(product);
+    }
+    let Product { block, x, first_row, acc, .. } = product;
     let [kernel, four] = kernels(block.shape());
     let layout = x.plan().layout;
     let strip_log = layout.strip_log as u8;

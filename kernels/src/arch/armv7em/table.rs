@@ -63,6 +63,9 @@ const fn built(width: Width, lanes: Lanes) -> Both {
         }
         (Width::W8, Lanes::Single) => [[actq_w8; 2]; 2],
         (Width::W8, Lanes::Paired) => [[actq_w8_paired_row; 2], [actq_w8_paired_group; 2]],
+        // In Rust.
+        #[cfg(feature = "scalar")]
+        (_, Lanes::Scalar) => [[left_out; 2]; 2],
     };
     if cfg!(feature = "groups") { both } else { [both[0], [left_out; 2]] }
 }

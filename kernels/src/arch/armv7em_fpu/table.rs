@@ -40,8 +40,8 @@ static QUANTIZERS: [Quantize; 4] = {
 /// Returns the least shift, from `least` on, of a layout of this build; 0 if there is none.
 const fn shift_from(least: usize) -> usize {
     let (mut found, mut i) = (usize::MAX, 0);
-    while i < Width::ALL.len() * Lanes::ALL.len() {
-        let (width, lanes) = (Width::ALL[i / Lanes::ALL.len()], Lanes::ALL[i % Lanes::ALL.len()]);
+    while i < Width::ALL.len() * Lanes::DSP.len() {
+        let (width, lanes) = (Width::ALL[i / Lanes::DSP.len()], Lanes::DSP[i % Lanes::DSP.len()]);
         let shift = layout(width, lanes).x.shift as usize;
         if width.is_built() && lanes.is_built() && shift >= least && shift < found {
             found = shift;
@@ -68,8 +68,8 @@ const fn suits(x: &XLayout) -> bool {
 
 const _: () = {
     let mut i = 0;
-    while i < Width::ALL.len() * Lanes::ALL.len() {
-        assert!(suits(&layout(Width::ALL[i / Lanes::ALL.len()], Lanes::ALL[i % Lanes::ALL.len()]).x));
+    while i < Width::ALL.len() * Lanes::DSP.len() {
+        assert!(suits(&layout(Width::ALL[i / Lanes::DSP.len()], Lanes::DSP[i % Lanes::DSP.len()]).x));
         i += 1;
     }
 };

@@ -3,13 +3,14 @@
 //! The loops suit a compiler that has few registers and knows the layout. They process a strip's cells together, so
 //! that one load of an activation serves all of them. Lengths that the layout determines are constants.
 
-use crate::activations::Prepared;
 use crate::arch::product::Product;
-use crate::layout::{Block, Format, QUAD, Sums, XLayout, with_format};
+#[cfg(feature = "scalar")]
+use crate::layout::Kernel;
+use crate::layout::{Format, QUAD, Sums, XLayout, with_format};
 
 /// Computes a product as [`crate::arch::gemv`] does.
-pub fn gemv(Product { block, x, first_row, acc }: Product<'_>) {
-    with_format!(block.shape(), strips::<_>(block, x, first_row, acc));
+pub fn gemv(product: Product<'_>) {
+    with_format!(product.block.shape(), strips::<_>(product));
 }
 
 /// Columns of the usual groups.
@@ -28,7 +29,14 @@ struct Lengths {
     quad_scales: usize,
 }
 
-fn strips<F: Format>(block: &Block<'_>, x: &Prepared<'_>, first_row: usize, acc: &mut [i32]) {
+fn strips<F: Format>(product: Product<'_>) {
+    #[cfg(feature = "scalar")]
+    match F::KERNEL {
+        Kernel::Planes => return super::planes::gemv::<F>(product),
+        Kernel::Pairs => return super::pairs::gemv(product),
+        Kernel::Strips => {}
+    }
+    let Product { block, x, first_row, acc, .. } = product;
     let shape = block.shape();
     let group = x.groups().next().unwrap_or(&[]);
     let first_chunk = x.chunks(split(group, group.len().wrapping_sub(usize::from(F::X.sum))).0).next().unwrap_or(&[]);
@@ -68,8 +76,6 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
     let quads = CELLS * F::CELL.rows / QUAD;
     let scales = lengths.quad_scales * quads;
     let weights_and_scales = lengths.quad_group * quads + scales;
-    // Columns of a row are a multiple of the step. If a step has several units, their number is even.
-    let pass = if F::STEP > F::CELL.cols { 2 } else { 1 };
     let mut totals = [[0i32; QUAD]; CELLS];
     while !x.is_empty() {
         let (group, rest) = split(x, lengths.x_group);
@@ -81,19 +87,20 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
         let mut sums = [[0i32; QUAD]; CELLS];
         let length = F::X.start_words + F::X.chunk / 2;
         if F::X.chunk == XLayout::ALL {
-            chunk::<F, CELLS>(weights, group, pass, &mut sums);
+            chunk::<F, CELLS>(weights, group, F::PASS, &mut sums);
         } else {
             // All chunks except the first have a constant length.
             if lengths.first_chunk != length {
                 let (x, rest) = split(group, lengths.first_chunk);
                 let (now, rest_weights) = split(weights, weights_of::<F>(x.len()) * CELLS);
-                chunk::<F, CELLS>(now, x, pass, &mut sums);
+                chunk::<F, CELLS>(now, x, F::PASS, &mut sums);
                 (group, weights) = (rest, rest_weights);
             }
             if !group.is_empty() {
-                let weights = weights.chunks_exact(weights_of::<F>(length) * CELLS);
+                // In a last group, the weights may end inside a chunk.
+                let weights = weights.chunks(weights_of::<F>(length) * CELLS);
                 for (weights, x) in weights.zip(group.chunks_exact(length)) {
-                    chunk::<F, CELLS>(weights, x, pass, &mut sums);
+                    chunk::<F, CELLS>(weights, x, F::PASS, &mut sums);
                 }
             }
         }
@@ -221,8 +228,10 @@ fn chunk<F: Format, const CELLS: usize>(weights: &[u32], x: &[u32], pass: usize,
     } else {
         cells::<F, CELLS, CELLS>(weights, x, pass, 0, &mut t);
     }
+    // Weights may end before the zeros that fill up the activations.
+    let units = weights.len() / (F::CELL.words * CELLS);
     for (t, sums) in t.iter().zip(sums) {
-        F::finish(t, &mut sums[..F::CELL.rows]);
+        F::finish(t, units * F::CELL.cols, &mut sums[..F::CELL.rows]);
     }
 }
 

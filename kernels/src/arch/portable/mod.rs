@@ -4,13 +4,17 @@ mod cells;
 mod elementwise;
 mod gemv;
 mod norm;
+#[cfg(feature = "scalar")]
+mod pairs;
+#[cfg(feature = "scalar")]
+mod planes;
 mod vector;
 
 pub use cells::{gru_elements, lstm_elements};
 pub use elementwise::{denoise, normalize};
 pub use gemv::gemv;
 pub use norm::{standardize, sum, sum_squares};
-#[cfg(not(actq_fpu))]
+#[cfg(any(not(actq_fpu), feature = "scalar"))]
 pub(crate) use vector::quantize;
 pub use vector::{copy, magnitude};
 pub use vector::{scale, sqrt};

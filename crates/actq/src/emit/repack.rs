@@ -1,0 +1,243 @@
+//! The same weights in the layouts of another core.
+
+use actq_kernels::activations::{Plan, max_prepared_words};
+use actq_kernels::image::{BlockRecord, Image, Matrix, MatrixRecord, Port, Records, header as h, op};
+use actq_kernels::layout::{BlockShape, Lanes, pack};
+
+use super::writer::sealed;
+use crate::error::{Context, Result, ensure};
+use crate::runtime::{ImageBuffer, with_head};
+
+/// A core that images are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Core {
+    /// Cortex-M0, M0+.
+    M0,
+    /// Cortex-M3.
+    M3,
+    /// RV32IMAC.
+    Rv32imac,
+    /// RV32IMAC with Zba and Zbb.
+    Rv32zb,
+    /// Cortex-M4 without FPU.
+    M4,
+    /// Cortex-M4 with FPU.
+    M4f,
+    /// Cortex-M7.
+    M7,
+    /// Cortex-M33 with the DSP extension.
+    M33,
+    /// Cortex-M55.
+    M55,
+}
+
+impl Core {
+    /// All cores with their names.
+    pub const ALL: [(&str, Self); 9] = [
+        ("m0", Self::M0),
+        ("m3", Self::M3),
+        ("rv32imac", Self::Rv32imac),
+        ("rv32zb", Self::Rv32zb),
+        ("m4", Self::M4),
+        ("m4f", Self::M4f),
+        ("m7", Self::M7),
+        ("m33", Self::M33),
+        ("m55", Self::M55),
+    ];
+
+    /// Returns the core of this name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find_map(|(known, core)| (known == name).then_some(core))
+    }
+
+    /// Returns `true` if the core has the DSP extension, whose layouts are the default.
+    pub fn has_dsp(self) -> bool {
+        !matches!(self, Self::M0 | Self::M3 | Self::Rv32imac | Self::Rv32zb)
+    }
+
+    /// Returns the lanes of a matrix for the core. Activations of more than 8 bits have only the DSP extension's.
+    fn lanes(self, x_max: u16, group: usize) -> Lanes {
+        match self.has_dsp() || x_max > Lanes::PAIRED_X_MAX {
+            true => Lanes::of(x_max, group),
+            false => Lanes::Scalar,
+        }
+    }
+}
+
+/// Returns the image with its weights in the layouts of `core`: the same codes and scales, the same actions. An image that
+/// has them already stays as it is, byte for byte.
+///
+/// # Errors
+///
+/// If the image is not valid, or needs more scratch memory than the format has.
+pub fn repack(bytes: &[u8], core: Core) -> Result<Vec<u8>> {
+    let buffer = ImageBuffer::new(bytes);
+    let image = Image::new_checked(buffer.bytes()).context("the image to repack")?;
+    let old: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+    let matrices = Repacked::of(&image, core)?;
+    let packed = sealed(&matrices.image(&image, &old)?)?;
+    let buffer = ImageBuffer::new(&packed);
+    let image = Image::new_checked(buffer.bytes()).context("the repacked image")?;
+    with_head(image, |head| head.self_test().context("self-test of the repacked image"))?;
+    Ok(packed)
+}
+
+/// The matrices' sections in another layout.
+struct Repacked {
+    /// From the header to the end of the matrix records.
+    words: Vec<u32>,
+    /// Offset of the matrix records.
+    records: usize,
+    /// Words of the work area.
+    work: usize,
+}
+
+impl Repacked {
+    fn of(image: &Image<'_>, core: Core) -> Result<Self> {
+        let (mut words, mut records, mut work) = (vec![0; h::WORDS], Vec::new(), 0);
+        for matrix in image.matrices() {
+            let lanes = core.lanes(matrix.x_max, matrix.group);
+            let mut blocks = Vec::new();
+            for block in matrix.blocks() {
+                let from = block.block.shape();
+                let shape = BlockShape { lanes, ..from };
+                let places = || (0..shape.rows).flat_map(|row| (0..shape.cols).map(move |col| (row, col)));
+                let codes: Vec<u8> = places().map(|(row, col)| block.block.code(row, col)).collect();
+                let scales: Vec<u8> = match shape.group {
+                    0 => Vec::new(),
+                    group => places()
+                        .filter(|(_, col)| col % group == 0)
+                        .map(|(row, col)| block.block.group_scale(row, col))
+                        .collect(),
+                };
+                let mut packed = vec![0; shape.words()];
+                pack(shape, &codes, &scales, &mut packed)?;
+                let weights = push(&mut words, packed.into_iter().map(u32::from_le));
+                let scales = push(&mut words, little_endian(block.scales));
+                let steps = if block.steps.is_empty() { 0 } else { push(&mut words, little_endian(block.steps)) };
+                let record = BlockRecord { width: shape.width, lanes, rows: shape.rows, weights, scales, steps };
+                blocks.extend(record.emit()?);
+                let plan = Plan::new(shape).context("a block has no plan")?;
+                work = work.max(match core.has_dsp() {
+                    true => max_prepared_words(shape.cols, shape.group),
+                    false => plan.work(shape.cols),
+                });
+            }
+            let blocks = Records { count: blocks.len() / h::BLOCK_WORDS, offset: push(&mut words, blocks) };
+            let Matrix { rows, cols, group, x_max, .. } = matrix;
+            records.extend(MatrixRecord { rows, cols, group, x_max, blocks }.emit()?);
+        }
+        let records = push(&mut words, records) as usize;
+        Ok(Self { words, records, work })
+    }
+
+    /// Returns the words of the whole image, without length and checksum.
+    fn image(self, image: &Image<'_>, old: &[u32]) -> Result<Vec<u32>> {
+        let old_records = old[h::W_MATRICES] as usize;
+        let after = old_records + h::MATRIX_WORDS * image.matrices().count();
+        // What follows the matrices moves by this much.
+        let moved = (self.words.len() as u32).wrapping_sub(after as u32);
+        let mut words = self.words;
+        words[..h::WORDS].copy_from_slice(&old[..h::WORDS]);
+        words.extend(&old[after..]);
+        let move_offset = |word: &mut u32| {
+            if *word as usize >= after {
+                *word = word.wrapping_add(moved);
+            }
+        };
+        words[h::W_MATRICES] = self.records as u32;
+        for at in [h::W_OPS, h::W_CONTRACT, h::W_SELF_TEST, h::W_NAME] {
+            move_offset(&mut words[at]);
+        }
+        let ops = words[h::W_OPS] as usize;
+        for record in words[ops..].as_chunks_mut::<{ h::OP_WORDS }>().0.iter_mut().take(image.ops().count()) {
+            if (record[0] & 0xff) as u8 == op::LINEAR {
+                move_offset(&mut record[2]);
+                record[3] = (record[3] as usize - old_records + self.records) as u32;
+            } else {
+                move_offset(&mut record[3]);
+            }
+        }
+        let ports = image.ports().count();
+        if ports > 0 {
+            let steps = image.self_test_steps() * (image.obs_len() + image.act_len());
+            let records = words[h::W_SELF_TEST] as usize + steps + 1;
+            for record in words[records..].as_chunks_mut::<{ Port::WORDS }>().0.iter_mut().take(ports) {
+                record[3..].iter_mut().for_each(move_offset);
+            }
+        }
+        let work = image.work();
+        let scratch = work.offset + self.work;
+        ensure!(
+            scratch <= usize::from(u16::MAX),
+            "the image needs {scratch} words of scratch memory for this core, but at most 65535 are supported"
+        );
+        words[h::W_SCRATCH] = scratch as u32;
+        words[h::W_WORK_FLAGS] = words[h::W_WORK_FLAGS] & 0xffff_0000 | self.work as u32;
+        Ok(words)
+    }
+}
+
+/// Appends words and returns their offset.
+fn push(words: &mut Vec<u32>, more: impl IntoIterator<Item = u32>) -> u32 {
+    let offset = words.len() as u32;
+    words.extend(more);
+    offset
+}
+
+/// Returns the values of words in the image's order.
+fn little_endian(words: &[u32]) -> impl Iterator<Item = u32> {
+    words.iter().map(|word| u32::from_le(*word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image with every kind of section.
+    const VALID: &[u8] = include_bytes!("../../../../kernels/tests/valid.actq");
+
+    #[test]
+    fn there_and_back_are_the_same_bytes() -> Result<()> {
+        for (_, core) in Core::ALL {
+            let packed = repack(VALID, core)?;
+            assert_eq!(packed == VALID, core.has_dsp(), "{core:?}");
+            assert_eq!(repack(&packed, core)?, packed, "{core:?}");
+            assert_eq!(repack(&packed, Core::M4f)?, VALID, "{core:?}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn codes_scales_and_outputs_stay() -> Result<()> {
+        let packed = repack(VALID, Core::M3)?;
+        let buffers = [ImageBuffer::new(VALID), ImageBuffer::new(&packed)];
+        let [old, new] = [0, 1].map(|i| Image::new_checked(buffers[i].bytes()).expect("the image is valid"));
+        assert!(new.features().any(|feature| feature == "scalar"));
+        let mut rows = 0;
+        for (old, new) in old.matrices().zip(new.matrices()) {
+            for (old, new) in old.blocks().zip(new.blocks()) {
+                let shape = old.block.shape();
+                let is_int8 = new.block.shape().lanes == Lanes::Scalar;
+                assert_eq!(BlockShape { lanes: shape.lanes, ..new.block.shape() }, shape);
+                assert!(is_int8 || new.block.words() == old.block.words());
+                let at = |block: &actq_kernels::Block<'_>, i: usize| {
+                    let (row, col) = (i / shape.cols, i % shape.cols);
+                    (block.code(row, col), block.group_scale(row, col))
+                };
+                for i in 0..shape.rows * shape.cols {
+                    assert_eq!(at(&old.block, i), at(&new.block, i));
+                }
+                assert_eq!((old.scales, old.steps), (new.scales, new.steps));
+                rows += shape.rows;
+            }
+        }
+        assert!(rows > 0);
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_not_an_image_is_refused() {
+        assert!(repack(&VALID[..VALID.len() - 4], Core::M3).is_err());
+    }
+}

@@ -1,0 +1,64 @@
+//! Memory for the tables of bit planes.
+
+/// Words of a table: 256 halfwords.
+#[cfg(feature = "scalar")]
+pub(super) const TABLE_WORDS: usize = 128;
+
+/// A table of sums.
+#[cfg(feature = "scalar")]
+pub(super) type Table = [u16; 2 * TABLE_WORDS];
+
+/// Most tables that are of use at a time: more of them save less than they take.
+#[cfg(feature = "scalar")]
+const MAX_TABLES: usize = 8;
+
+/// Memory for tables. A build without the scalar layouts has none, and passes nothing.
+#[derive(Debug, Default)]
+pub struct Tables<'w> {
+    #[cfg(feature = "scalar")]
+    words: &'w mut [u32],
+    #[cfg(not(feature = "scalar"))]
+    words: core::marker::PhantomData<&'w mut [u32]>,
+}
+
+#[cfg(feature = "scalar")]
+impl<'w> Tables<'w> {
+    /// Splits a work area behind the `prepared` words of a vector.
+    #[inline(always)]
+    pub fn split(work: &'w mut [u32], prepared: usize) -> (&'w [u32], Self) {
+        let (prepared, words) = work.split_at_mut(prepared.min(work.len()));
+        (prepared, Self { words })
+    }
+
+    /// Lends the memory.
+    #[inline(always)]
+    pub(crate) fn lend(&mut self) -> Tables<'_> {
+        Tables { words: self.words }
+    }
+
+    /// Returns the memory.
+    #[inline(always)]
+    pub(super) fn words(self) -> &'w mut [u32] {
+        self.words
+    }
+
+    /// Returns the words that are of use for rows of `units` units of eight columns.
+    pub(crate) const fn room(units: usize) -> usize {
+        TABLE_WORDS * if units < MAX_TABLES { units } else { MAX_TABLES }
+    }
+}
+
+#[cfg(not(feature = "scalar"))]
+impl<'w> Tables<'w> {
+    /// Splits a work area behind the words of a vector.
+    #[inline(always)]
+    pub fn split(work: &'w mut [u32], _: usize) -> (&'w [u32], Self) {
+        (work, Self::default())
+    }
+
+    /// Lends the memory.
+    #[inline(always)]
+    pub(crate) fn lend(&mut self) -> Tables<'_> {
+        Tables::default()
+    }
+}

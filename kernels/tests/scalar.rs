@@ -1,0 +1,56 @@
+//! The kernels of the scalar layouts against the reference, with memory for any number of tables.
+#![expect(clippy::expect_used, reason = "a test")]
+
+use actq_kernels::activations::{Plan, prepare};
+use actq_kernels::arch::{Product, Tables, gemv_with, reference};
+use actq_kernels::image::worst_case;
+use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
+use actq_testkit::Random;
+
+/// Draws values at the ends of their range in every third case, and all at one end in every other third.
+fn check(random: &mut Random, shape: BlockShape, case: usize) {
+    let BlockShape { rows, cols, width, .. } = shape;
+    let mut byte = |i: usize| match case % 3 {
+        0 => random.byte(),
+        1 => [0, 255][usize::from(random.byte() & 1)],
+        _ => [0, 255][i % 2],
+    };
+    // 0x80 is the lowest code at 8 bits.
+    let codes: Vec<u8> =
+        (0..rows * cols).map(|i| byte(i / cols)).map(|c| if width == Width::W8 { c ^ 0x80 } else { c }).collect();
+    let x: Vec<i16> = (0..cols).map(|_| byte(case)).map(|x| i16::from(x.max(1)) - 128).collect();
+    let scales: Vec<u8> = (0..rows * shape.groups()).map(&mut byte).collect();
+    let mut words = vec![0; shape.words()];
+    pack(shape, &codes, &scales, &mut words).expect("the codes fit the shape");
+    let block = Block::new(shape, &words).expect("the words fit the shape");
+    let plan = Plan::of(&block);
+    let mut prepared = vec![0; plan.words()];
+    let x = prepare(&x, &plan, &mut prepared).expect("there is room");
+    let mut expected = vec![0; shape.padded_rows()];
+    reference::gemv(Product::new(&block, &x, 0, &mut expected).expect("they fit"));
+    let weight = |row, col| block.level(row, col).unsigned_abs() * u32::from(block.group_scale(row, col));
+    let largest = (0..rows).map(|row| (0..cols).map(|col| weight(row, col)).sum::<u32>()).max();
+    assert_eq!(Some(worst_case(&block, 127)), largest.map(|sum| 127 * i64::from(sum)), "{shape:?}");
+    for memory in [0, 127, 128, 3 * 128, 8 * 128, 9 * 128 + 5] {
+        let (mut work, mut sums) = (vec![!0; memory], vec![!0; shape.padded_rows()]);
+        let (_, tables) = Tables::split(&mut work, 0);
+        gemv_with(&block, &x, 0, &mut sums, tables).expect("they fit");
+        assert_eq!(sums[..rows], expected[..rows], "{shape:?}, {memory} words for tables");
+        for first in (8..shape.padded_rows()).step_by(8) {
+            let (_, tables) = Tables::split(&mut work, 0);
+            gemv_with(&block, &x, first, &mut sums[first..], tables).expect("they fit");
+        }
+        assert_eq!(sums[..rows], expected[..rows], "{shape:?}, in parts");
+    }
+}
+
+#[test]
+fn sums_are_those_of_the_reference() {
+    let mut random = Random::new(1);
+    for case in 0..1500 {
+        let width = Width::ALL[random.below(4)];
+        let (rows, cols) = (1 + random.below(21), 1 + random.below([70, 300][case % 2]));
+        let group = [0, 0, 32, 64, 128][random.below(5)];
+        check(&mut random, BlockShape { width, lanes: Lanes::Scalar, rows, cols, group }, case);
+    }
+}

@@ -1,0 +1,125 @@
+//! An MLP on every core: instructions, memory and code of our own rows.
+
+use std::fs;
+use std::path::Path;
+
+use actq::emit::{Core, repack};
+use actq::graph::ops::{Linear, Pointwise};
+use actq::methods::Activations;
+use actq::runtime::ImageBuffer;
+use actq_bench::Target;
+use actq_bench::firmware::{harness, kernel_bytes};
+use actq_bench::networks::Builder;
+use actq_bench::qemu::{self, Counter};
+use actq_cli::report::table::table;
+use actq_kernels::Width;
+use actq_kernels::math::Function;
+use anyhow::{Context as _, Result, ensure};
+use serde::Serialize;
+
+/// Lengths of the values: those of a policy that walks a Go1.
+const LENGTHS: [usize; 5] = [48, 512, 256, 128, 12];
+
+/// Cores that run in QEMU, with the harness of a board.
+const CORES: [(&str, Core, Target); 4] = [
+    ("m4f", Core::M4f, Target::Fpu),
+    ("m3", Core::M3, Target::NoDsp),
+    ("m0", Core::M0, Target::V6m),
+    ("rv32imac", Core::Rv32imac, Target::Riscv),
+];
+
+/// Cores that are left out, and why.
+const SKIPPED: [(&str, &str); 2] = [
+    ("rv32zb", "the table of boards has no core with Zba and Zbb"),
+    ("m55", "the table of boards has no Cortex-M55, and no kernels use Helium"),
+];
+
+/// The figures of an image on a core.
+#[derive(Debug, Serialize)]
+struct Row {
+    core: &'static str,
+    function: &'static str,
+    bits: u32,
+    /// Instructions of a step.
+    instructions: u64,
+    macs: usize,
+    /// Bytes of scratch memory.
+    scratch: usize,
+    /// Bytes of stack of a step; `None` where it is not measured.
+    stack: Option<u64>,
+    /// Bytes of the kernels' functions in the program, which runs any image.
+    code: u64,
+}
+
+/// Measures all rows, prints them, and writes them to `json`. Rows of other projects are not measured.
+pub(crate) fn run(ours: bool, json: Option<&Path>) -> Result<()> {
+    ensure!(ours, "only our own rows can be measured; pass --ours");
+    for (core, why) in SKIPPED {
+        eprintln!("{core}: skipped: {why}");
+    }
+    let counter = Counter::build()?;
+    let mut rows = Vec::new();
+    for (name, core, target) in CORES {
+        let elf = harness(target)?;
+        let code = kernel_bytes(&elf)?;
+        for (function, kind) in [("relu", Function::Relu), ("elu", Function::Elu)] {
+            for width in Width::ALL {
+                let bytes = repack(&mlp(kind, width)?, core)?;
+                let buffer = ImageBuffer::new(&bytes);
+                let scratch = 4 * buffer.image(Path::new("mlp"))?.scratch_words();
+                let slot = qemu::slot(&bytes)?;
+                let (_, regions) = counter.run(target, &elf, Some(slot.path()), &[])?;
+                let instructions = regions.first().context("the harness has run no step")?.instructions;
+                let stack = stack(target, &elf, slot.path())?;
+                let macs = LENGTHS.windows(2).map(|pair| pair[0] * pair[1]).sum();
+                rows.push(Row { core: name, function, bits: width.bits(), instructions, macs, scratch, stack, code });
+            }
+        }
+    }
+    let mut shown = table(&["core", "function", "bits", "instructions", "per MAC", "scratch", "stack", "code"]);
+    for row in &rows {
+        shown.add_row([
+            row.core.to_owned(),
+            row.function.to_owned(),
+            row.bits.to_string(),
+            row.instructions.to_string(),
+            format!("{:.3}", row.instructions as f64 / row.macs as f64),
+            row.scratch.to_string(),
+            row.stack.map_or("-".to_owned(), |stack| stack.to_string()),
+            row.code.to_string(),
+        ]);
+    }
+    println!("{shown}");
+    if let Some(path) = json {
+        let text = serde_json::to_string_pretty(&rows)? + "\n";
+        fs::write(path, text).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+/// Returns the image of the network with random weights, row scales and int8 activations.
+fn mlp(function: Function, width: Width) -> Result<Vec<u8>> {
+    let mut builder = Builder::new(LENGTHS[0]);
+    let mut value = 0;
+    for (i, pair) in LENGTHS.windows(2).enumerate() {
+        let (rows, cols) = (pair[1], pair[0]);
+        let matrix = builder.matrix(rows, cols, Activations::Int8, &vec![Some(width); rows], 0)?;
+        let bias = builder.values(rows);
+        value = builder.node(Linear { matrix, bias }, &[value])?;
+        if i + 2 < LENGTHS.len() {
+            value = builder.node(Pointwise(function), &[value])?;
+        }
+    }
+    builder.image("mlp")
+}
+
+/// Returns the bytes of stack that a step takes, which the harness prints; `None` on cores whose stack it cannot read.
+fn stack(target: Target, elf: &Path, slot: &Path) -> Result<Option<u64>> {
+    if target == Target::Riscv {
+        return Ok(None);
+    }
+    let output = qemu::run(qemu::command_on(target, elf, Some(slot), "stack")?, &[])?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let bytes = text.lines().find_map(|line| line.strip_prefix("stack ")?.parse().ok());
+    Ok(Some(bytes.with_context(|| format!("the harness has not measured its stack: {output:?}"))?))
+}
