@@ -121,7 +121,7 @@ fn exports_replace_only_exported_files() -> Result<()> {
             }
             fs::write(at("out").join(name), foreign)?;
             let before = content(&at("out"))?;
-            failed(&export("walk", &[])?, 1, &[&format!("{name}: exists, and actq did not write it"), "--force"])?;
+            failed(&export("walk", &[])?, 1, &[&format!("{name}: already exists, and actq did not write it"), "--force"])?;
             ensure!(content(&at("out"))? == before, "{name}: something was written");
         }
         succeeded(&export("walk", &["--force"])?)?;
@@ -135,5 +135,5 @@ fn exports_replace_only_exported_files() -> Result<()> {
     succeeded(&export("stand", &[])?)?;
     let both = content(&at("out"))?;
     ensure!(both.len() == 8 && exported.iter().all(|(name, bytes)| both.get(name) == Some(bytes)), "{:?}", both.keys());
-    failed(&export("walk_golden", &[])?, 1, &["walk_golden.c: exists, and actq did not write it"])
+    failed(&export("walk_golden", &[])?, 1, &["walk_golden.c: already exists, and actq did not write it"])
 }
