@@ -156,9 +156,10 @@ impl Image {
 
     /// Returns the report of `actq inspect`.
     #[pyo3(signature = (*, clock = CLOCK))]
-    fn inspect(&self, #[pyo3(from_py_with = given)] clock: f64) -> PyResult<String> {
+    fn inspect<'py>(&self, py: Python<'py>, #[pyo3(from_py_with = given)] clock: f64) -> PyResult<Bound<'py, PyAny>> {
         let image = self.image()?;
-        Ok(format!("{}\n{}", inspect::report(&image), time::report(&StepTime::new(&image, positive("clock", clock)?))))
+        let time = time::report(&StepTime::new(&image, positive("clock", clock)?));
+        py.import("actq._report")?.getattr("Report")?.call1((format!("{}\n{time}", inspect::report(&image)),))
     }
 
     /// Predicts the cost of a step on a board, as a dict.

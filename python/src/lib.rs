@@ -25,9 +25,9 @@ mod _actq {
     #[pymodule_export]
     use crate::link::Link;
     #[pymodule_export]
-    use crate::policy::{Policy, import_onnx, import_path};
+    use crate::policy::{Policy, import_onnx, import_path, policy_of_files};
     #[pymodule_export]
-    use crate::quantize::{evaluate, quantize};
+    use crate::quantize::{bytes_of, evaluate, quantize};
     #[pymodule_export]
     use crate::tune::{stand_in, tune};
 

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use actq::import::Importer as _;
 use actq::import::contract::StatedLimits;
+use actq::import::{FILES, Importer as _};
 use actq::measure::actions::actions;
 use actq::measure::size::hex;
 use actq_cli::commands::bundle::{Gathered, refuse_open_questions};
@@ -20,7 +20,7 @@ use numpy::{
     AllowTypeChange, IntoPyArray as _, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _, PyUntypedArrayMethods as _,
 };
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::error::{OrRaise as _, error, given, raise_of_import};
 
@@ -30,13 +30,15 @@ use crate::error::{OrRaise as _, error, given, raise_of_import};
 #[pyclass(frozen, module = "actq")]
 pub(crate) struct Policy {
     pub(crate) policy: Arc<actq::policy::Policy>,
+    /// Its two files, which `pickle` writes; a bundle has more.
+    files: Option<[Vec<u8>; 2]>,
     /// Folder of a bundle's description, which recordings of raw values need.
     _folder: Option<Scratch>,
 }
 
 impl Policy {
-    fn new(policy: actq::policy::Policy) -> Self {
-        Self { policy: Arc::new(policy), _folder: None }
+    fn new(policy: actq::policy::Policy, files: Option<[Vec<u8>; 2]>) -> Self {
+        Self { policy: Arc::new(policy), files, _folder: None }
     }
 
     /// Returns the folder of its recordings; `None` if it was not read from files.
@@ -137,9 +139,16 @@ impl Policy {
         slf
     }
 
-    /// Refuses what `pickle` asks for.
-    fn __reduce__(&self) -> PyResult<()> {
-        Err(error!("a policy cannot be pickled; import it in each process by actq.import_policy"))
+    /// Returns how `pickle` makes the policy again: from the contents of its files.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>, Bound<'py, PyBytes>))> {
+        let Some([json, weights]) = &self.files else {
+            return Err(error!("a policy of a deploy bundle cannot be pickled; import it in each process"));
+        };
+        let make = py.import("actq._actq")?.getattr("policy_of_files")?;
+        Ok((make, (PyBytes::new(py, json), PyBytes::new(py, weights))))
     }
 
     fn __repr__(&self) -> String {
@@ -151,6 +160,14 @@ impl Policy {
             self.policy.parameters
         )
     }
+}
+
+/// Reads a policy from the contents of its two files.
+#[pyfunction]
+pub(crate) fn policy_of_files(json: Vec<u8>, weights: Vec<u8>) -> PyResult<Policy> {
+    let name = Path::new("a pickled policy");
+    let policy = actq::policy::Policy::of_files(Path::new(""), [name, name], &json, &weights).or_raise()?;
+    Ok(Policy::new(policy, Some([json, weights])))
 }
 
 /// Reads a policy folder, an ONNX file, or a deploy bundle.
@@ -180,12 +197,13 @@ pub(crate) fn import_path(
                 return Err(refuse_answers());
             }
             let imported = import(&path, &choice).map_err(raise_of_import)?;
-            return Ok(Policy::new(imported.policy(&path, &path).or_raise()?));
+            let policy = imported.policy(&path, &path).or_raise()?;
+            return Ok(Policy::new(policy, Some([imported.json, imported.weights])));
         }
         if choice.output.is_some() || !choice.states.is_empty() || !choice.observed.is_empty() {
             return Err(error!("{}: only an ONNX file takes output, states and observe", path.display()));
         }
-        let is_policy = DeployFolder.accepts(&path) || path.join(actq::import::FILES[0]).is_file();
+        let is_policy = DeployFolder.accepts(&path) || path.join(FILES[0]).is_file();
         let is_bundle = path.is_dir() || path.extension().is_some_and(|ending| ending == "kinfer");
         if choice.rate_hz.is_some() {
             return Err(error!("{}: only an ONNX file takes rate_hz; this source states its rate", path.display()));
@@ -199,7 +217,10 @@ pub(crate) fn import_path(
         if is_answered {
             return Err(refuse_answers());
         }
-        Ok(Policy::new(load(&path).or_raise()?))
+        let policy = load(&path).or_raise()?;
+        let files = FILES.map(|name| fs::read(path.join(name)));
+        let own = if let [Ok(json), Ok(weights)] = files { Some([json, weights]) } else { None };
+        Ok(Policy::new(policy, own.filter(|_| !DeployFolder.accepts(&path))))
     })
 }
 
@@ -230,7 +251,7 @@ fn import_bundle(
     }
     let mut policy = load(folder.path()).map_err(|error| error.context(DESCRIPTION)).or_raise()?;
     policy.dir = folder.path().to_owned();
-    Ok(Policy { policy: Arc::new(policy), _folder: Some(folder) })
+    Ok(Policy { policy: Arc::new(policy), files: None, _folder: Some(folder) })
 }
 
 /// Returns the lowest and highest values and the largest steps that a caller passes.
@@ -271,7 +292,8 @@ pub(crate) fn import_onnx<'py>(
         let probes = probes(&imported, &policy, &MAGNITUDES, FRAMES);
         let actions = actions(&policy, &probes);
         let limited = Choice { limits: stated(limits), rate_hz, ..choice };
-        PyResult::Ok((imported, import(&limited)?.1, probes, actions))
+        let (own, policy) = import(&limited)?;
+        PyResult::Ok((imported, Policy::new(policy, Some([own.json, own.weights])), probes, actions))
     })?;
     let plan = PyDict::new(py);
     plan.set_item("inputs", imported.inputs)?;
@@ -281,5 +303,5 @@ pub(crate) fn import_onnx<'py>(
         let shape = [rows.len() / FRAMES, FRAMES, rows.first().map_or(0, Vec::len)];
         plan.set_item(key, rows.concat().into_pyarray(py).reshape(shape)?)?;
     }
-    Ok((Policy::new(policy), plan))
+    Ok((policy, plan))
 }

@@ -10,6 +10,7 @@ use actq::measure::{check, eval, recorded};
 use actq::methods::{Activations, Effort, MAX_MINUTES, Method, Options};
 use actq::pipeline::{Quantizer, check_budget, minutes_of_image};
 use actq::runtime::ImageBuffer;
+use actq::units;
 use actq_cli::importers::{learned, learned_from, recorded_sizes};
 use actq_cli::report::notes;
 use actq_kernels::Width;
@@ -239,4 +240,10 @@ pub(crate) fn evaluate<'py>(
     errors.set_item("bpw", report.bpw)?;
     errors.set_item("bytes", report.bytes)?;
     Ok((errors, difference.map(|difference| difference.to_string())))
+}
+
+/// Returns the bytes of a text such as "96K".
+#[pyfunction]
+pub(crate) fn bytes_of(text: &str) -> PyResult<usize> {
+    units::bytes(text).map_err(|error| error!("flash: {error}"))
 }

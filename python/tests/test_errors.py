@@ -117,7 +117,7 @@ def test_wrong_types_are_errors_of_actq(mlp, observations):
         "output": lambda: actq.import_policy(mlp, output=3),
         "states": lambda: actq.import_policy(mlp, states={"h": 3}),
         "copy of a head": lambda: copy.deepcopy(head),
-        "pickle of a policy": lambda: pickle.dumps(policy),
+        "pickle of a head": lambda: pickle.dumps(head),
     }
     for name, call in calls.items():
         with pytest.raises(Exception) as raised:
@@ -128,7 +128,7 @@ def test_wrong_types_are_errors_of_actq(mlp, observations):
 
 def test_sources_of_policies_are_checked(mlp, tmp_path):
     for source, text in [
-        (None, "the policy is of type NoneType; pass a path, or a torch.nn.Module"),
+        (None, "the policy is of type NoneType; pass a path, a torch.nn.Module or a trained model"),
         (b"x", "the policy is of type bytes"),
         ("", "the path of the policy is empty"),
         (tmp_path / "none.pt", "none.pt: there is no such file"),

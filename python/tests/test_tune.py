@@ -51,6 +51,27 @@ def test_rollouts_record_what_the_policy_acted_on(mlp, mode):
     assert np.array_equal(observations[0], Reach().reset(seed=5)[0])
 
 
+class Long(Reach):
+    """Robots whose episodes take longer and longer."""
+
+    def __init__(self, length):
+        super().__init__(length)
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_every_robot_drives_as_many_whole_episodes(mlp, mode):
+    image = actq.quantize(actq.import_policy(mlp), bits=8, method="rtn", progress=False)
+    env = SyncVectorEnv([lambda length=length: Long(length) for length in (5, 20, 40)], autoreset_mode=mode)
+    shares = []
+    driven = actq.rollout(actq.Head(image, 3), env, episodes=7, progress=lambda work, share: shares.append(share))
+    assert sorted(episode.length for episode in driven.episodes) == [5, 5, 5, 20, 20, 40, 40]
+    observations, starts = driven.recording
+    assert starts.sum() == 7 and len(observations) == 135 and np.isfinite(observations).all()
+    assert shares[-1] == 1 and repr(driven).startswith("Rollout(7 episodes, 135 frames, mean return -")
+    with pytest.raises(actq.Error, match="frames and episodes are given; pass one of them"):
+        actq.rollout(actq.Head(image, 3), env, episodes=7, frames=100)
+
+
 def test_rounds_learn_from_their_rollouts(mlp):
     policy = actq.import_policy(mlp)
     tuned = [
@@ -124,18 +145,26 @@ def test_arguments_of_rollouts_are_named():
     ]:
         with pytest.raises(actq.Error, match=text):
             actq.rollout(**{"policy": act, "env": env, "frames": 10, **arguments})
-    dictionary = gymnasium.spaces.Dict({"x": gymnasium.spaces.Box(-1, 1, (2,))})
+    box = gymnasium.spaces.Box(-1, 1, (2,))
 
-    class Named(Reach):
-        def __init__(self):
+    class Parts(Reach):
+        def __init__(self, space):
             super().__init__()
-            self.observation_space = dictionary
+            self.observation_space = space
 
         def reset(self, *, seed=None, options=None):
-            return {"x": np.zeros(2, np.float32)}, {}
+            parts = [np.full(2, i, np.float32) for i in range(2)]
+            return (dict(zip("ba", parts)) if isinstance(self.observation_space, gymnasium.spaces.Dict) else tuple(parts)), {}
 
-    with pytest.raises(actq.Error, match="the environment's observations are Dict.*; pass observe"):
-        actq.rollout(act, SyncVectorEnv([Named]), frames=10)
+    with pytest.raises(actq.Error, match="the environment's observations are Tuple.*; pass observe"):
+        actq.rollout(act, SyncVectorEnv([lambda: Parts(gymnasium.spaces.Tuple([box, box]))]), frames=10)
+    # The order of the space, as import_policy takes it.
+    seen = []
+    with pytest.raises(actq.Error, match=r"the policy's actions are \(1, 3\)"):
+        dictionary = gymnasium.spaces.Dict({"b": box, "a": box})
+        env = SyncVectorEnv([lambda: Parts(dictionary)])
+        actq.rollout(lambda x, reset: seen.append(x) or x[:, :3], env, frames=10)
+    assert list(dictionary.spaces) == ["a", "b"] and seen[0].tolist() == [[1, 1, 0, 0]]
 
 
 def test_discrete_actions_are_the_largest(mlp):

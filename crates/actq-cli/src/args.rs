@@ -18,13 +18,47 @@ pub use quantize::QuantizeArgs;
 pub(crate) use quantize::{ActivationArg, DistillArgs, LearnArgs, MethodArg, TuneArgs};
 pub use sweep::SweepArgs;
 
+/// The commands by what they are for; a test compares them with [`Command`].
+const HELP: &str = "\
+{before-help}{about-with-newline}
+{usage-heading} {usage}
+
+Make an image:
+  import     Convert an ONNX file to a policy folder, or a deploy bundle to a description
+  quantize   Quantize a policy into an image
+  tune       Quantize in on-policy rounds: roll out the image, record, and learn again (DAgger)
+
+Check it:
+  inspect    Show an image: operations, matrices, bits, memory, predicted time, action contract
+  eval       Compare an image's actions with the f32 policy's on held-out observations
+  check      Compare an image of a deploy bundle with a run of the deploy code
+  serve      Run an image as a policy over standard input and output
+
+Put it on a robot:
+  deploy     Turn a deploy bundle into an image and firmware, in one command that can be run again
+  constants  Write an image's sizes, names and places as constants of Rust, or of C
+  export-c   Write an image as source code of C, to be linked into a firmware
+  link       Talk to a motor controller: watch, arm, stream observations, send an image
+  keygen     Generate a key that signs images
+  sign       Sign an image and its version, for controllers that require signatures
+
+Compare many:
+  sweep      Compare methods at several budgets on held-out observations
+  plan       Print the jobs of a sweep, one JSON object a line
+  job        Run one job, and put its result into a store
+  merge      Print the results of a sweep: tables, the frontier and its plot
+
+Options:
+{options}{after-help}";
+const EXAMPLE: &str = "Example: actq quantize model.onnx --calib obs.npy --bpw 2 --out model.actq\n\n`actq COMMAND --help` explains a command, with examples.";
+
 /// Quantizes robot policies to 2, 3, 4 or 8 bits and packs them into one image for a microcontroller.
 ///
 /// Exit status: 0 on success, 1 on an error, 2 on a wrong command line, 75 if the same job may succeed later, 128 + N
 /// if signal N ended the command (130 for Ctrl-C). Long work shows its progress on standard error: a bar on a terminal,
 /// else a line every 10 s.
 #[derive(Parser)]
-#[command(name = "actq", version, max_term_width = 100)]
+#[command(name = "actq", version, max_term_width = 100, help_template = HELP, after_help = EXAMPLE)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -90,7 +124,7 @@ pub(crate) enum Command {
     /// command warns when the observations leave its range. With --driven, the report adds the error on the image's own
     /// path. Its own actions led to these observations, which may differ from those of the f32 policy.
     ///
-    /// Example: actq eval ur3.actq --policy policies/ur3
+    /// Example: actq eval ur3.actq policies/ur3
     Eval(EvalArgs),
     /// Turn a deploy bundle into an image and firmware, in one command that can be run again
     ///
@@ -221,4 +255,23 @@ pub(crate) enum Command {
     ///
     /// Example: actq sign ur3.actq --key fleet.pem --version 3 --out ur3.sig
     Sign(SignArgs),
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn the_help_lists_every_command_once() {
+        let listed = |name: &str| HELP.lines().filter(|line| line.split_whitespace().next() == Some(name)).count();
+        for command in Cli::command().get_subcommands() {
+            assert_eq!(listed(command.get_name()), usize::from(!command.is_hide_set()), "{}", command.get_name());
+        }
+        assert_eq!(
+            HELP.lines().filter(|line| line.starts_with("  ")).count(),
+            Cli::command().get_subcommands().count()
+        );
+    }
 }

@@ -70,12 +70,11 @@ fn statistics_sum_to_the_image_and_explain_widths() -> Result<()> {
     }
     // All matrices but the last make elements of one residual stream: they lose the same ones, and the others keep
     // their order.
-    let without: usize = stats.matrices.iter().flat_map(|m| &m.widths).filter(|w| **w == 0).count();
     let [first, blocks @ .., last] = &stats.matrices[..] else { bail!("fewer than two matrices") };
     ensure!(last.image_rows.iter().copied().eq(0..last.rows));
     ensure!(first.image_rows.is_sorted() && blocks.iter().all(|m| m.image_rows == first.image_rows));
     let removed = first.rows - first.image_rows.len();
-    let text = format!("rows: {without} without bits ({} {removed} of {} removed, ", first.name, first.rows);
+    let text = format!("neurons removed: {removed} of the {} of {}, ", first.rows, first.name);
     ensure!(removed > 0 && printed.contains(&text) && printed.contains("\nTook "), "{printed}");
     Ok(())
 }

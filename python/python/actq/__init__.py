@@ -7,7 +7,7 @@
     action = head(observation)
 
 `import_policy` reads a policy, `quantize` and `tune` make an `Image` of it, `Head` runs the image, `rollout` drives
-Gymnasium's environments by it, `evaluate` measures its errors, `FakeQuant` is its network in torch, and `Link` talks
+Gymnasium's environments by it, `sweep` makes images of several sizes, `evaluate` measures errors, `FakeQuant` is its network in torch, and `Link` talks
 to a motor controller. Every failure is an `actq.Error` with the text of the command `actq`. The logger `actq` receives
 the command's notes.
 """
@@ -21,6 +21,7 @@ from ._evaluate import ErrorReport, evaluate
 from ._import import import_policy
 from ._quantize import quantize
 from ._rollout import Episode, Rollout, rollout
+from ._sweep import Point, Sweep, sweep
 from ._tune import Round, Tuned, tune
 
 if TYPE_CHECKING:
@@ -34,15 +35,18 @@ __all__ = [
     "Head",
     "Image",
     "Link",
+    "Point",
     "Policy",
     "Rollout",
     "Round",
+    "Sweep",
     "Tuned",
     "__version__",
     "evaluate",
     "import_policy",
     "quantize",
     "rollout",
+    "sweep",
     "tune",
 ]
 

@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import final
 
+from ._report import Report
+
 _Path = Union[str, os.PathLike[str]]
 _Report = Optional[Callable[[str, float], object]]
 _Floats = npt.NDArray[np.float32]
@@ -85,7 +87,7 @@ class Image:
 
         Raises `actq.Error` if the file cannot be written.
         """
-    def inspect(self, *, clock: float = 168e6) -> str:
+    def inspect(self, *, clock: float = 168e6) -> Report:
         """Returns the report of `actq inspect`: operations, bits, memory, contract, time at `clock` in Hz."""
     def cost(self, board: str = "stm32f405", *, clock: float = 168e6) -> Cost:
         """Predicts the cost of a step on a board at `clock` in Hz.
@@ -266,6 +268,8 @@ def import_onnx(
     limits: Tuple[List[float], List[float], List[float]],
     rate_hz: Optional[float],
 ) -> Tuple[Policy, Dict[str, Any]]: ...
+def policy_of_files(json: bytes, weights: bytes) -> Policy: ...
+def bytes_of(text: str) -> int: ...
 def quantize(
     policy: Policy, recordings: Any, heldout: Any, request: Dict[str, Any], progress: _Report
 ) -> Tuple[Image, List[str], List[str]]: ...

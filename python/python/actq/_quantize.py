@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from numbers import Real
 from operator import index
-from typing import Any, Dict, Mapping, Optional
+from typing import Any, Dict, Mapping, Optional, Union
 
 import numpy as np
 
@@ -31,6 +31,8 @@ def request(**given: Any) -> Dict[str, Any]:
     if options["widths"] is not None and not isinstance(options["widths"], (list, Mapping)):
         raise Error(f"widths is of type {type(options['widths']).__name__}; pass a mapping of matrices to bits")
     options["widths"] = [(name, _whole(f"widths[{name!r}]", bits)) for name, bits in dict(options["widths"] or {}).items()]
+    if isinstance(options["flash"], str):
+        options["flash"] = _actq.bytes_of(options["flash"])
     for name in ("bits", "flash", "group", "activations", "steps"):
         if options[name] is not None:
             options[name] = _whole(name, options[name])
@@ -66,7 +68,7 @@ def quantize(
     *,
     bits: Optional[int] = None,
     bpw: Optional[float] = None,
-    flash: Optional[int] = None,
+    flash: Union[None, int, str] = None,
     ms: Optional[float] = None,
     clock: float = CLOCK,
     max_nmse: Optional[float] = None,
@@ -95,7 +97,7 @@ def quantize(
         Without them, those in the policy's folder.
     bits: bits of every weight: 2, 3, 4 or 8. The default is 3.
     bpw: bits per weight of all weights, with scales and padding.
-    flash: most bytes of the image.
+    flash: most bytes of the image, a number or a text as "96K".
     ms, clock: most milliseconds of a step on a Cortex-M4 at a clock in Hz, as predicted.
     max_nmse: largest error; searches the fewest bits that keep it. At most one of these budgets may be given, or flash and
         ms, which are then both kept.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, 
 import numpy as np
 
 from ._actq import Error
+from ._progress import Progress, reporter
 from ._quantize import _whole
 from ._typing import Array, Floats
 
@@ -38,7 +39,7 @@ class Episode:
 Success = Callable[[Episode], bool]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Rollout:
     """A rollout of a policy."""
 
@@ -50,6 +51,13 @@ class Rollout:
     #: Share of them that succeeded; `None` if that is not known.
     success: Optional[float]
 
+    def __repr__(self) -> str:
+        frames = len(self.recording[1])
+        known = [("mean return", self.mean_return), ("success", self.success)]
+        return f"Rollout({len(self.episodes)} episodes, {frames} frames" + "".join(
+            f", {name} {value:.4g}" for name, value in known if value is not None
+        ) + ")"
+
     @property
     def mean_return(self) -> Optional[float]:
         """Mean of the episodes' sums of rewards; `None` if none has ended."""
@@ -60,18 +68,22 @@ def rollout(
     policy: Drive,
     env: VectorEnv,
     *,
-    frames: int = 10_000,
+    frames: Optional[int] = None,
+    episodes: Optional[int] = None,
     seed: int = 1,
     observe: Optional[Observe] = None,
     act: Optional[Act] = None,
     success: Optional[Success] = None,
     every: int = 1,
+    progress: Progress = False,
 ) -> Rollout:
-    """Steps all robots of `env` by a policy until `frames` frames are recorded.
+    """Steps all robots of `env` by a policy until `frames` frames are recorded, or `episodes` episodes have ended.
 
     policy: an `actq.Head`, or any function of (observations [n, n_obs], reset [n]) that returns actions [n, n_act].
     env: a vector environment of Gymnasium. It stays open.
-    frames: frames of all robots together.
+    frames: frames of all robots together; the default is 10,000 without `episodes`.
+    episodes: whole episodes, as many for each robot, so that short ones do not count more than long ones. Only their frames
+        are recorded.
     seed: seed of the environment's first episodes.
     observe: makes the policy's observations [n, n_obs] of the environment's; the default flattens arrays.
     act: makes the environment's actions of the policy's; the default clips to a Box, and takes the largest value for
@@ -79,10 +91,13 @@ def rollout(
     success: is called with each `Episode` and says if it succeeded. The default reads "is_success" or "success" of the
         environment's info.
     every: record only every n-th frame of an episode: those at which a policy with chunks plans.
+    progress: as for `quantize`.
 
     Raises what policy and environment raise.
     """
-    for name, number in (("frames", frames), ("every", every)):
+    if frames is not None and episodes is not None:
+        raise Error("frames and episodes are given; pass one of them")
+    for name, number in (("frames", 1 if frames is None else frames), ("episodes", episodes or 1), ("every", every)):
         if _whole(name, number) < 1:
             raise Error(f"{name} is {number}; use a whole number from 1 on")
     if not callable(policy):
@@ -92,38 +107,45 @@ def rollout(
     n, mode = env.num_envs, _autoreset(env)
     observe, act = observe or _flat(env), act or _actions(env)
     kept: List[Tuple[Floats, Array, Array]] = []
-    episodes: List[Episode] = []
+    ended: List[Episode] = []
+    most_frames = (10_000 if episodes is None else np.inf) if frames is None else frames
+    # Episodes that each robot still begins or drives.
+    left = np.full(n, np.iinfo(np.int64).max) if episodes is None else episodes // n + (np.arange(n) < episodes % n)
     totals, lengths = np.zeros(n), np.zeros(n, dtype=np.int64)
     # The first observation of an episode; the environment resets instead of acting.
     fresh, ignored = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
     observations, _ = env.reset(seed=seed)
     recorded = 0
-    while recorded < frames:
-        x = np.asarray(observe(observations), dtype=np.float32)
-        if x.ndim != 2 or len(x) != n:
-            raise Error(f"the observations of the environment are {x.shape}; ({n}, values) is needed: pass observe")
-        # The last observation of an episode may be anything.
-        x = np.where(ignored[:, None], np.float32(0), x)
-        actions = policy(x, fresh)
-        lengths[fresh] = 0
-        used = ~ignored & (lengths % every == 0)
-        kept.append((x, fresh.copy(), used))
-        recorded += int(used.sum())
-        observations, rewards, terminated, truncated, infos = env.step(act(actions))
-        done = (terminated | truncated) & ~ignored
-        totals += np.where(ignored, 0.0, rewards)
-        lengths += ~ignored
-        for i in np.flatnonzero(done):
-            info = _info(infos, int(i), n, mode)
-            episodes.append(Episode(float(totals[i]), int(lengths[i]), bool(terminated[i]), info))
-        totals[done] = 0.0
-        if mode == "NextStep":
-            fresh, ignored = ignored, done
-        else:
-            fresh = done
-            if mode == "Disabled" and done.any():
-                observations, _ = env.reset(options={"reset_mask": done})
-    return Rollout(_joined(kept), episodes, _share(episodes, success or _succeeded))
+    with reporter(progress) as report:
+        while recorded < most_frames and left.any():
+            x = np.asarray(observe(observations), dtype=np.float32)
+            if x.ndim != 2 or len(x) != n:
+                raise Error(f"the observations of the environment are {x.shape}; ({n}, values) is needed: pass observe")
+            # The last observation of an episode may be anything.
+            x = np.where(ignored[:, None], np.float32(0), x)
+            actions = policy(x, fresh)
+            lengths[fresh] = 0
+            used = ~ignored & (lengths % every == 0) & (left > 0)
+            kept.append((x, fresh.copy(), used))
+            recorded += int(used.sum())
+            observations, rewards, terminated, truncated, infos = env.step(act(actions))
+            done = (terminated | truncated) & ~ignored
+            totals += np.where(ignored, 0.0, rewards)
+            lengths += ~ignored
+            for i in np.flatnonzero(done & (left > 0)):
+                info = _info(infos, int(i), n, mode)
+                ended.append(Episode(float(totals[i]), int(lengths[i]), bool(terminated[i]), info))
+            left[done & (left > 0)] -= 1
+            totals[done] = 0.0
+            if report is not None:
+                report("driving", recorded / most_frames if episodes is None else len(ended) / episodes)
+            if mode == "NextStep":
+                fresh, ignored = ignored, done
+            else:
+                fresh = done
+                if mode == "Disabled" and done.any():
+                    observations, _ = env.reset(options={"reset_mask": done})
+    return Rollout(_joined(kept), ended, _share(ended, success or _succeeded))
 
 
 def _joined(kept: List[Tuple[Floats, Array, Array]]) -> Tuple[Floats, Array]:
@@ -173,7 +195,11 @@ def _autoreset(env: VectorEnv) -> str:
 
 def _flat(env: VectorEnv) -> Observe:
     def flat(observations: Any) -> Array:
-        if isinstance(observations, (Mapping, tuple)):
+        if isinstance(observations, Mapping):
+            # In the order of the space, as `import_policy` takes them.
+            parts = [observations[key] for key in env.single_observation_space.spaces]  # type: ignore[attr-defined]
+            return np.concatenate([np.reshape(part, (env.num_envs, -1)) for part in parts], axis=1)
+        if isinstance(observations, tuple):
             raise Error(f"the environment's observations are {env.single_observation_space}; pass observe")
         return np.reshape(observations, (env.num_envs, -1))
 

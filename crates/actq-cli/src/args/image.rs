@@ -44,8 +44,11 @@ pub(crate) struct RepackArgs {
 pub(crate) struct EvalArgs {
     /// The image
     pub(crate) image: PathBuf,
-    /// The policy folder, with the recordings
-    #[arg(long, value_name = "POLICY_DIR", required_unless_present = "heldout")]
+    /// The policy folder, with the recordings, or an ONNX file
+    #[arg(value_name = "POLICY_DIR", required_unless_present_any = ["heldout", "policy"], conflicts_with = "policy")]
+    pub(crate) source: Option<PathBuf>,
+    /// As POLICY_DIR
+    #[arg(long, value_name = "POLICY_DIR")]
     pub(crate) policy: Option<PathBuf>,
     /// The held-out recording: .npz, .npy or .safetensors [default: the one in POLICY_DIR]
     #[arg(long, value_name = "FILE")]

@@ -25,7 +25,7 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
         "{}: it takes raw inputs; compare it with a reference by `actq check`",
         args.image.display()
     );
-    let policy = args.policy.as_deref();
+    let policy = args.source.as_deref().or(args.policy.as_deref());
     let driven = files_of(&args.driven)?;
     let _progress = Progress::new(args.quiet, "running the image over the recordings")?;
     let source = policy.map(|dir| source_of(dir, &image)).transpose()?.flatten();

@@ -2,7 +2,7 @@
 
 use actq::measure::eval::ErrorReport;
 use actq::methods::distill::balance::balance_bytes;
-use actq::methods::{Choice, Imagined, Learning, Sampled, Trial};
+use actq::methods::{Choice, Imagined, Learning, Sampled};
 use actq::pipeline::{QuantizedPolicy, Search, Try};
 use actq::text::count;
 use comfy_table::Table;
@@ -13,21 +13,24 @@ use super::widths;
 /// Formats a row for every matrix, and the sum of their bytes.
 pub fn matrices(quantized: &QuantizedPolicy) -> String {
     let QuantizedPolicy { policy, outcomes, .. } = quantized;
-    let mut rows = table(&["matrix", "shape", "bits", "group", "bytes", "x max", "error"]);
+    let has_errors = outcomes.iter().any(|outcome| outcome.error.is_some());
+    let columns = ["matrix", "shape", "bits", "group", "bytes", "x max", "error"];
+    let mut rows = table(&columns[..columns.len() - usize::from(!has_errors)]);
     let mut total = 0;
     for (matrix, outcome) in policy.graph.matrices.iter().zip(outcomes) {
         let quantized = &outcome.quantized;
         let bytes = outcome.bytes();
         total += bytes;
-        rows.add_row([
+        let mut cells = vec![
             matrix.name.clone(),
             format!("{}x{}", matrix.rows, matrix.cols),
             quantized.width_counts(),
             group_name(quantized.group),
             bytes.to_string(),
             outcome.x_max.to_string(),
-            outcome.error.map_or("-".to_owned(), |e| format!("{e:.2e}")),
-        ]);
+        ];
+        cells.extend(has_errors.then(|| outcome.error.map_or("-".to_owned(), |e| format!("{e:.2e}"))));
+        rows.add_row(cells);
     }
     let added = balance_bytes(&policy.graph);
     let with = if added > 0 { format!(" and {added} of balance factors") } else { String::new() };
@@ -53,25 +56,20 @@ pub fn imagined(imagined: &Imagined) -> String {
     }
 }
 
-/// Formats the choice of learning, and the settings that were tried.
+/// Formats how long learning took, and among how many settings it chose.
 pub fn learning(learning: &Learning) -> String {
     let Learning { steps, discarded, choice, tried } = learning;
-    let mut text = match choice {
+    match choice {
         Choice::Feedback { .. } if *discarded > 0 => format!(
-            "learned {}, and discarded the result: its error is higher than without learning; took {choice}\n",
+            "learned {}, and discarded the result: its error is higher than without learning\n",
             count(*discarded, "step")
         ),
-        Choice::Learning(recipe) => format!("learned {} with {recipe}\n", count(*steps, "step")),
-        Choice::Feedback { .. } => format!("not learned: {choice}\n"),
-    };
-    if !tried.is_empty() {
-        let mut rows = table(&["setting", "error", "with noise"]);
-        for Trial { choice, recorded, widened } in tried {
-            rows.add_row([choice.to_string(), format!("{recorded:.2e}"), format!("{widened:.2e}")]);
+        Choice::Learning(_) if tried.is_empty() => format!("learned {}\n", count(*steps, "step")),
+        Choice::Learning(_) => {
+            format!("learned {}, with the best of {}\n", count(*steps, "step"), count(tried.len(), "setting"))
         }
-        text += &format!("\n{rows}\n");
+        Choice::Feedback { .. } => "not learned: weights are rounded with error feedback\n".to_owned(),
     }
-    text
 }
 
 /// Formats the tries of the search for `--max-nmse`, and the result.

@@ -167,27 +167,29 @@ impl Widths {
     }
 }
 
-/// Formats in one line how many rows of the trained policy have which width, and which matrices have rows without bits.
+/// Formats which rows of the trained policy's matrices, each of them a neuron, are removed, and how many have which width.
+/// Rows without bits that stay give a constant.
 pub fn line(policy: &Policy, outcomes: &[Outcome]) -> String {
     let of = |outcome: &Outcome, width| outcome.trained_widths().iter().filter(|w| **w == width).count();
-    let mut parts = Vec::new();
-    for width in ALL {
-        let count: usize = outcomes.iter().map(|outcome| of(outcome, width)).sum();
-        match width {
-            _ if count == 0 => {}
-            Some(width) => parts.push(format!("{count} at {} bits", width.bits())),
-            None => {
-                let matrices = policy.graph.matrices.iter().zip(outcomes).filter(|(_, outcome)| of(outcome, None) > 0);
-                let named = matrices.map(|(matrix, outcome)| {
-                    let all = outcome.trained_widths().len();
-                    let gone = if outcome.quantized.rows < all { " removed" } else { "" };
-                    format!("{} {} of {all}{gone}", matrix.name, of(outcome, None))
-                });
-                parts.push(format!("{count} without bits ({})", named.collect::<Vec<_>>().join(", ")));
-            }
+    let (mut removed, mut constant) = (Vec::new(), Vec::new());
+    for (matrix, outcome) in policy.graph.matrices.iter().zip(outcomes).filter(|(_, outcome)| of(outcome, None) > 0) {
+        let all = outcome.trained_widths().len();
+        let to = if outcome.quantized.rows < all { &mut removed } else { &mut constant };
+        to.push(format!("{} of the {all} of {}", of(outcome, None), matrix.name));
+    }
+    let count = |width| outcomes.iter().map(|outcome| of(outcome, Some(width))).sum::<usize>();
+    let widths = ALL.iter().flatten().map(|width| (count(*width), width.bits())).filter(|(count, _)| *count > 0);
+    let mut lines = Vec::new();
+    for (name, parts) in [("neurons removed", removed), ("neurons with a constant value", constant)] {
+        if !parts.is_empty() {
+            lines.push(format!("{name}: {}", parts.join(", ")));
         }
     }
-    format!("rows: {}", parts.join(", "))
+    lines.push(format!(
+        "rows: {}",
+        widths.map(|(count, bits)| format!("{count} at {bits} bits")).collect::<Vec<_>>().join(", ")
+    ));
+    lines.join("\n")
 }
 
 fn row(stats: &MatrixRecord, r: usize) -> Result<Row> {
