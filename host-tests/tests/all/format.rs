@@ -441,7 +441,7 @@ fn the_work_area_of_scalar_layouts_is_as_long_as_documented() {
         [
             ["2, 3", "max(v + 128 * min(ceil(c / 8), 8), v + p / 2 if p > c)"],
             ["4", "v + 2 * ceil(p / 32), and p / 2 more if p > c"],
-            ["8", "v, and p / 2 more if p > c"],
+            ["8", "max(v + 4 * min(ceil(c / 8) * 4, 64), v + p / 2 if p > c)"],
         ]
     );
     for (cols, group) in (1..700usize).chain([4096, 65535]).flat_map(|cols| [0, 32, 64, 128].map(|group| (cols, group)))
@@ -458,7 +458,7 @@ fn the_work_area_of_scalar_layouts_is_as_long_as_documented() {
             let words = match width {
                 Width::W2 | Width::W3 => (v + 128 * cols.div_ceil(8).min(8)).max(v + copy),
                 Width::W4 => v + 2 * p.div_ceil(32) + copy,
-                Width::W8 => v + copy,
+                Width::W8 => (v + 4 * (cols.div_ceil(8) * 4).min(64)).max(v + copy),
             };
             let shape = BlockShape { width, lanes: Lanes::Scalar, rows: 1, cols, group };
             assert_eq!(Plan::new(shape).map(|plan| plan.work(cols)), Some(words), "{shape:?}");

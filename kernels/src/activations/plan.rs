@@ -110,12 +110,12 @@ impl Plan {
     }
 
     /// Returns the words of the work area that a product of a vector of `len` values needs: [`Self::room`], or the
-    /// vector and its tables of bit planes.
+    /// vector and its tables.
     pub const fn work(&self, len: usize) -> usize {
         let room = self.room(len);
         #[cfg(feature = "scalar")]
-        if matches!(self.shape.lanes, Lanes::Scalar) && self.shape.cell_cols() == 8 {
-            let with_tables = self.words + crate::arch::Tables::room(self.shape.units());
+        if matches!(self.shape.lanes, Lanes::Scalar) {
+            let with_tables = self.words + crate::arch::Tables::room(self.shape.width, self.shape.units());
             return if with_tables > room { with_tables } else { room };
         }
         room

@@ -1,4 +1,7 @@
-//! Memory for the tables of bit planes.
+//! Memory for the tables of bit planes, and for activations with start values.
+
+#[cfg(feature = "scalar")]
+use crate::layout::Width;
 
 /// Words of a table: 256 halfwords.
 #[cfg(feature = "scalar")]
@@ -11,6 +14,14 @@ pub(super) type Table = [u16; 2 * TABLE_WORDS];
 /// Most tables that are of use at a time: more of them save less than they take.
 #[cfg(feature = "scalar")]
 const MAX_TABLES: usize = 8;
+
+/// Words of two columns' activations with their start values.
+#[cfg(feature = "scalar")]
+pub(super) const TWO_COLUMNS: usize = 4;
+
+/// Most pairs of columns that are of use at a time.
+#[cfg(feature = "scalar")]
+const MAX_PAIRS: usize = 64;
 
 /// Memory for tables. A build without the scalar layouts has none, and passes nothing.
 #[derive(Debug, Default)]
@@ -42,9 +53,14 @@ impl<'w> Tables<'w> {
         self.words
     }
 
-    /// Returns the words that are of use for rows of `units` units of eight columns.
-    pub(crate) const fn room(units: usize) -> usize {
-        TABLE_WORDS * if units < MAX_TABLES { units } else { MAX_TABLES }
+    /// Returns the words that are of use for rows of this width and of `units` units.
+    pub(crate) const fn room(width: Width, units: usize) -> usize {
+        let (words, most) = match width {
+            Width::W2 | Width::W3 => (TABLE_WORDS, MAX_TABLES),
+            Width::W4 => (0, 0),
+            Width::W8 => (TWO_COLUMNS, MAX_PAIRS),
+        };
+        words * if units < most { units } else { most }
     }
 }
 

@@ -98,6 +98,8 @@ pub enum Kernel {
     Planes,
     /// It multiplies pairs of rows, chunk by chunk.
     Pairs,
+    /// It multiplies pairs of rows, two columns by two.
+    Bytes,
 }
 
 /// A layout. Each layout file implements it.

@@ -35,7 +35,7 @@
 //! | `w2_scalar` | as w2 | 4 x 8 in 2 | 8 | 2 |
 //! | `w3_scalar` | as w3 | 4 x 8 in 3 | 8 | 3 |
 //! | `w4_scalar` | as w4 | 4 x 2 in 1 | 8 | 4 |
-//! | `w8_scalar` | as w8 | 4 x 2 in 2 | 8 | 8 |
+//! | `w8_scalar` | as w8 | 4 x 2 in 2 | 4 | 8 |
 //!
 //! Narrow widths use the mid-rise grid of odd levels: for bell-shaped weights four levels at ±1, ±3 lose about a third
 //! less than -2 .. 1 do. A level is `2*code - (2^b - 1)`. The kernels multiply with the codes, and the start values in

@@ -13,12 +13,12 @@
 //! of `t` is added to one sum modulo 2^32, and `t >> 16` to another. The first minus `2^16` times the second and
 //! the biases is the sum of all low halves.
 
-use super::format::{Cell, Format, STRIP, Sums, XLayout};
-use super::half::halves;
+use super::format::{Cell, Format, Kernel, QUAD, Sums, XLayout};
 use super::width::Width;
 
 /// A column of two rows.
-const MASK: u32 = 0x00ff_00ff;
+#[cfg(not(actq_armv7m))]
+pub(crate) const MASK: u32 = 0x00ff_00ff;
 
 /// The 8-bit layout without lanes.
 pub struct W8Scalar;
@@ -29,40 +29,16 @@ const _: () = assert!(Width::W8.max_level() * 127 * (W8Scalar::CELL.cols as i32)
 impl Format for W8Scalar {
     const WIDTH: Width = Width::W8;
     const CELL: Cell = Cell { rows: 4, cols: 2, words: 2 };
-    const STRIP: usize = STRIP;
+    const STRIP: usize = QUAD;
     const STEP: usize = 8;
-    const PASS: usize = 2;
+    const KERNEL: Kernel = Kernel::Bytes;
     const X: XLayout = XLayout::PLAIN;
 
     fn place(row: usize, col: usize) -> (usize, usize, u32) {
         (col, 8 * (row / 2) + 16 * (row % 2), 0x80)
     }
 
-    #[inline(always)]
-    fn start(_: &[u32]) -> Sums {
-        [0; 4]
-    }
+    fn mac(_: &[u32; 3], _: &[u32], _: &mut Sums) {}
 
-    #[inline(always)]
-    fn mac(words: &[u32; 3], x: &[u32], t: &mut Sums) {
-        let Some(&x) = x.first() else { return };
-        let (even, odd) = halves(x);
-        let start = 0x8000i32.wrapping_sub((even + odd).wrapping_mul(128 * 0x1_0001));
-        let product = |word: u32, x: i32| ((word & MASK) as i32).wrapping_mul(x);
-        for (sums, shift) in t.chunks_exact_mut(2).zip([0, 8]) {
-            let both = product(words[0] >> shift, even).wrapping_add(product(words[1] >> shift, odd));
-            let both = both.wrapping_add(start);
-            sums[0] = sums[0].wrapping_add(both);
-            sums[1] = sums[1].wrapping_add(both >> 16);
-        }
-    }
-
-    #[inline(always)]
-    fn finish(t: &Sums, cols: usize, rows: &mut [i32]) {
-        let biases = (cols as i32 / 2).wrapping_mul(0x8000);
-        for (rows, sums) in rows.chunks_exact_mut(2).zip(t.chunks_exact(2)) {
-            rows[0] = rows[0].wrapping_add(sums[0]).wrapping_sub(sums[1] << 16).wrapping_sub(biases);
-            rows[1] = rows[1].wrapping_add(sums[1]);
-        }
-    }
+    fn finish(_: &Sums, _: usize, _: &mut [i32]) {}
 }

@@ -2,7 +2,7 @@
 
 use actq_kernels::activations::{Plan, max_prepared_words};
 use actq_kernels::image::{BlockRecord, Image, Matrix, MatrixRecord, Port, Records, header as h, op};
-use actq_kernels::layout::{BlockShape, Lanes, pack};
+use actq_kernels::layout::{BlockShape, Lanes, Width, pack};
 
 use super::writer::sealed;
 use crate::error::{Context, Result, ensure};
@@ -55,9 +55,11 @@ impl Core {
         !matches!(self, Self::M0 | Self::M3 | Self::Rv32imac | Self::Rv32zb)
     }
 
-    /// Returns the lanes of a matrix for the core. Activations of more than 8 bits have only the DSP extension's.
-    fn lanes(self, x_max: u16, group: usize) -> Lanes {
-        match self.has_dsp() || x_max > Lanes::PAIRED_X_MAX {
+    /// Returns the lanes of a block for the core. Activations of more than 8 bits have only the DSP extension's. On a
+    /// Cortex-M0, so have 8 bits with group scales: the other layout takes a quarter more there.
+    fn lanes(self, width: Width, x_max: u16, group: usize) -> Lanes {
+        let is_slower = self == Self::M0 && width == Width::W8 && group != 0;
+        match self.has_dsp() || x_max > Lanes::PAIRED_X_MAX || is_slower {
             true => Lanes::of(x_max, group),
             false => Lanes::Scalar,
         }
@@ -96,10 +98,10 @@ impl Repacked {
     fn of(image: &Image<'_>, core: Core) -> Result<Self> {
         let (mut words, mut records, mut work) = (vec![0; h::WORDS], Vec::new(), 0);
         for matrix in image.matrices() {
-            let lanes = core.lanes(matrix.x_max, matrix.group);
             let mut blocks = Vec::new();
             for block in matrix.blocks() {
                 let from = block.block.shape();
+                let lanes = core.lanes(from.width, matrix.x_max, matrix.group);
                 let shape = BlockShape { lanes, ..from };
                 let places = || (0..shape.rows).flat_map(|row| (0..shape.cols).map(move |col| (row, col)));
                 let codes: Vec<u8> = places().map(|(row, col)| block.block.code(row, col)).collect();
@@ -118,9 +120,9 @@ impl Repacked {
                 let record = BlockRecord { width: shape.width, lanes, rows: shape.rows, weights, scales, steps };
                 blocks.extend(record.emit()?);
                 let plan = Plan::new(shape).context("a block has no plan")?;
-                work = work.max(match core.has_dsp() {
-                    true => max_prepared_words(shape.cols, shape.group),
-                    false => plan.work(shape.cols),
+                work = work.max(match lanes {
+                    Lanes::Scalar => plan.work(shape.cols),
+                    Lanes::Single | Lanes::Paired => max_prepared_words(shape.cols, shape.group),
                 });
             }
             let blocks = Records { count: blocks.len() / h::BLOCK_WORDS, offset: push(&mut words, blocks) };

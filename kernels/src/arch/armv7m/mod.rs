@@ -3,13 +3,15 @@
 //!
 //! The compiler takes an instruction more for each lookup: it adds the base to an index before it loads the entry.
 
-use super::tables::{TABLE_WORDS, Table};
-use crate::layout::STRIP;
+use super::tables::{TABLE_WORDS, TWO_COLUMNS, Table};
+use crate::layout::{QUAD, STRIP};
 
 core::arch::global_asm!(include_str!("planes.s"), options(raw));
 core::arch::global_asm!(include_str!("pairs.s"), options(raw));
+core::arch::global_asm!(include_str!("bytes.s"), options(raw));
 
 unsafe extern "C" {
+    fn actq_bytes_w8(weights: *const u32, tile: *const i32, acc: *mut i32, end: *const i32, skip: usize, pairs: usize);
     fn actq_pairs_w4(
         weights: *const u32,
         chunk: *const u32,
@@ -80,4 +82,20 @@ pub(super) fn add_pairs(weights: &[u32], stride: usize, chunk: &[u32], strips: &
     // strip: `weights` has all of them. It reads two words of the chunk and four for eight columns, and adds to eight
     // sums for each strip, up to the end.
     unsafe { actq_pairs_w4(weights.as_ptr(), chunk.as_ptr(), acc.start, acc.end, 4 * (stride - words), eights) }
+}
+
+/// Adds the products of a tile, whole fours of pairs of columns, to the sums of strips, whose weights are `stride` words
+/// apart.
+pub(super) fn add_bytes(weights: &[u32], stride: usize, tile: &[[i32; TWO_COLUMNS]], strips: &mut [[i32; QUAD]]) {
+    let pairs = tile.len() & !3;
+    let words = 2 * pairs;
+    let needed = strips.len().saturating_sub(1) * stride + words;
+    if pairs == 0 || strips.is_empty() || weights.len() < needed || stride < words {
+        return;
+    }
+    let acc = strips.as_flattened_mut().as_mut_ptr_range();
+    // SAFETY: both lengths are at least 1, and the pairs are a multiple of 4. For each strip it reads two words a pair,
+    // then skips to the next strip: `weights` has all of them. It reads four words of the tile a pair, and adds to four
+    // sums for each strip, up to the end.
+    unsafe { actq_bytes_w8(weights.as_ptr(), tile.as_ptr().cast(), acc.start, acc.end, 4 * (stride - words), pairs) }
 }

@@ -34,6 +34,7 @@ fn strips<F: Format>(product: Product<'_>) {
     match F::KERNEL {
         Kernel::Planes => return super::planes::gemv::<F>(product),
         Kernel::Pairs => return super::pairs::gemv(product),
+        Kernel::Bytes => return super::bytes::gemv(product),
         Kernel::Strips => {}
     }
     let Product { block, x, first_row, acc, .. } = product;

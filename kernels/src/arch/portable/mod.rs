@@ -1,5 +1,7 @@
 //! All kernels in Rust, for any target: the arithmetic of the assembler backends, operation for operation.
 
+#[cfg(feature = "scalar")]
+mod bytes;
 mod cells;
 mod elementwise;
 mod gemv;
