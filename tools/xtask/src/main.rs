@@ -1,5 +1,5 @@
 //! The commands for users and CI: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`,
-//! `cargo xtask fit`, `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`,
+//! `cargo xtask fit`, `cargo xtask peers`, `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`,
 //! `cargo xtask capi`, `cargo xtask python`, `cargo xtask doctor`.
 //!
 //! This crate has few dependencies, so that it builds fast and prints soon. The binaries of `actq-bench` and
@@ -74,6 +74,9 @@ enum Command {
     /// Measure the cost model's rates again (after every change of the kernels)
     #[command(disable_help_flag = true)]
     Fit(Words),
+    /// Measure an MLP on every core in QEMU
+    #[command(disable_help_flag = true)]
+    Peers(Words),
     /// Package the C interface for a core
     #[command(disable_help_flag = true)]
     Capi(Words),
@@ -99,6 +102,7 @@ fn main() -> ExitCode {
         Command::Bench(options) => measure(&[Target::Fpu], "bench", options),
         Command::Descriptions(options) => measure(&[Target::Fpu], "descriptions", options),
         Command::Faults(options) => measure(&[Target::Fpu], "faults", options),
+        Command::Peers(options) => measure(&[Target::Fpu, Target::NoDsp, Target::V6m, Target::Riscv], "peers", options),
         Command::Fit(options) => measure(&[Target::Fpu], "fit", options),
         Command::Budgets(options) => measure(&[Target::Fpu, Target::M33], "budgets", options),
     };

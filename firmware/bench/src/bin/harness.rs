@@ -3,7 +3,7 @@
 //! Without arguments it replays the image's self-test observations and prints the actions' bits. With the argument
 //! `serve` it reads observations from standard input and writes actions to standard output, in the protocol of `actq
 //! serve`. `poll N` does the same in polls of N instructions, `ops N` in polls of one operation each. `restart` saves
-//! the state before every step, resets, and restores it. Every step, or begin and each poll, is a counted region.
+//! the state before every step, resets, and restores it. `stack` prints the stack of a step. Every step, or begin and each poll, is a counted region.
 //!
 //! The image is the one in the slot, if any, else the built-in one (environment variable `ACTQ_IMAGE`).
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -19,6 +19,8 @@ mod firmware {
     use core::task::Poll;
 
     use actq_firmware_support::machine::{entry, singleton};
+    #[cfg(all(target_arch = "arm", not(actq_small)))]
+    use actq_firmware_support::stack::Room;
     use actq_firmware_support::{count, host, slot};
     use actq_kernels::{Head, Image, StepError, include_image};
     use actq_link::{NO_ACTION, RESET, STEP};
@@ -67,6 +69,8 @@ mod firmware {
         match (arguments.split(' ').next(), number) {
             _ if arguments.is_empty() => replay(&mut head),
             _ if arguments == "serve" => serve(&mut head, Run::Whole),
+            #[cfg(all(target_arch = "arm", not(actq_small)))]
+            _ if arguments == "stack" => stack(&mut head),
             _ if arguments == "restart" => serve(&mut head, Run::Restarts),
             (Some("poll"), Some(budget)) => serve(&mut head, Run::Polls(budget)),
             (Some("ops"), Some(budget)) => serve(&mut head, Run::Ops(budget)),
@@ -139,6 +143,23 @@ mod firmware {
             step += 1;
         }
         Ok(())
+    }
+
+    /// Prints the bytes of stack that a step takes.
+    #[cfg(all(target_arch = "arm", not(actq_small)))]
+    #[inline(never)]
+    fn stack(head: &mut Head<'_, '_>) -> Result<(), Message> {
+        const WORDS: usize = 4 * 1024;
+        let mut out = host::stdout().ok_or_else(|| message("output", "no semihosting host"))?;
+        let image = *head.image();
+        let Some((observation, _)) = image.self_test(0) else { return Err(message("image", "no self-test")) };
+        // SAFETY: the stack is at the end of RAM with more than WORDS free words, and no interrupt is enabled.
+        let room = unsafe { Room::below_here(WORDS) };
+        // SAFETY: as above.
+        unsafe { room.paint() };
+        let stepped = head.step(bytemuck::must_cast_slice(observation)).map(|_| ());
+        let _ = writeln!(out, "stack {}", room.used());
+        stepped.map_err(|e| message("step", e))
     }
 
     /// Answers requests of the pipe protocol from standard input until it ends. A step without an action, because the

@@ -12,6 +12,7 @@ mod faults;
 mod fit;
 mod heads;
 mod kernels;
+mod peers;
 mod stack;
 mod trials;
 
@@ -88,6 +89,15 @@ enum Command {
         #[arg(long, conflicts_with = "board")]
         elf: Option<PathBuf>,
     },
+    /// Measure an MLP of 48-512-256-128-12 on every core in QEMU: instructions, scratch, stack, code
+    Peers {
+        /// Only our own rows, which need neither a C compiler nor a network
+        #[arg(long)]
+        ours: bool,
+        /// Write the rows as JSON: a list of objects
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
     /// Measure the cost model's rates again (after every change of the kernels)
     Fit,
     /// Package the C interface: header, static library, files for build systems, licences and a manifest
@@ -130,6 +140,7 @@ fn main() -> ExitCode {
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
         Command::Fit => fit::run(),
+        Command::Peers { ours, json } => peers::run(ours, json.as_deref()),
         Command::Capi { target, out, image, compact } => capi(&target, &out, image.as_deref(), compact),
         Command::Stack { board: Some(board), .. } => stack::of_board(&board),
         Command::Stack { elf, .. } => stack::show(&elf.unwrap_or_default()),

@@ -8,7 +8,7 @@ use actq::graph::ops::{Linear, Pointwise};
 use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
-use actq_bench::firmware::{harness, kernel_bytes};
+use actq_bench::firmware::{harness, harness_with, kernel_bytes};
 use actq_bench::networks::Builder;
 use actq_bench::qemu::{self, Counter};
 use actq_cli::report::table::table;
@@ -60,17 +60,20 @@ pub(crate) fn run(ours: bool, json: Option<&Path>) -> Result<()> {
     let counter = Counter::build()?;
     let mut rows = Vec::new();
     for (name, core, target) in CORES {
-        let elf = harness(target)?;
-        let code = kernel_bytes(&elf)?;
         for (function, kind) in [("relu", Function::Relu), ("elu", Function::Elu)] {
             for width in Width::ALL {
                 let bytes = repack(&mlp(kind, width)?, core)?;
                 let buffer = ImageBuffer::new(&bytes);
                 let scratch = 4 * buffer.image(Path::new("mlp"))?.scratch_words();
-                let slot = qemu::slot(&bytes)?;
-                let (_, regions) = counter.run(target, &elf, Some(slot.path()), &[])?;
+                let file = qemu::slot(&bytes)?;
+                // A board without a slot has the image built in.
+                let (elf, slot) = match target {
+                    Target::Riscv => (harness_with(target, file.path())?, None),
+                    _ => (harness(target)?, Some(file.path())),
+                };
+                let (_, regions) = counter.run(target, &elf, slot, &[])?;
                 let instructions = regions.first().context("the harness has run no step")?.instructions;
-                let stack = stack(target, &elf, slot.path())?;
+                let (code, stack) = (kernel_bytes(&elf)?, stack(target, &elf, slot)?);
                 let macs = LENGTHS.windows(2).map(|pair| pair[0] * pair[1]).sum();
                 rows.push(Row { core: name, function, bits: width.bits(), instructions, macs, scratch, stack, code });
             }
@@ -114,11 +117,11 @@ fn mlp(function: Function, width: Width) -> Result<Vec<u8>> {
 }
 
 /// Returns the bytes of stack that a step takes, which the harness prints; `None` on cores whose stack it cannot read.
-fn stack(target: Target, elf: &Path, slot: &Path) -> Result<Option<u64>> {
+fn stack(target: Target, elf: &Path, slot: Option<&Path>) -> Result<Option<u64>> {
     if target == Target::Riscv {
         return Ok(None);
     }
-    let output = qemu::run(qemu::command_on(target, elf, Some(slot), "stack")?, &[])?;
+    let output = qemu::run(qemu::command_on(target, elf, slot, "stack")?, &[])?;
     let text = String::from_utf8_lossy(&output.stdout);
     let bytes = text.lines().find_map(|line| line.strip_prefix("stack ")?.parse().ok());
     Ok(Some(bytes.with_context(|| format!("the harness has not measured its stack: {output:?}"))?))
