@@ -38,6 +38,7 @@ Put it on a robot:
   deploy     Turn a deploy bundle into an image and firmware, in one command that can be run again
   constants  Write an image's sizes, names and places as constants of Rust, or of C
   export-c   Write an image as source code of C, to be linked into a firmware
+  repack     Convert an image to the layouts of another core: the same weights, the same actions
   link       Talk to a motor controller: watch, arm, stream observations, send an image
   keygen     Generate a key that signs images
   sign       Sign an image and its version, for controllers that require signatures

@@ -1,4 +1,4 @@
-//! The documents: `docs/CLI.md` holds every help text, and what is shown in C, Python and TOML parses.
+//! What the documents show in C, Python and TOML parses.
 
 use std::fs;
 use std::process::Command;
@@ -9,54 +9,8 @@ use actq_deploy::Answers;
 use anyhow::{Context, Result, bail, ensure};
 use tempfile::TempDir;
 
-const GENERATED: &str = "<!-- Below, the help of every command. Do not edit; write it anew by\n     \
-                         ACTQ_BLESS=1 cargo test --profile checks -p actq-host-tests docs:: -->\n";
-
 fn read(path: &str) -> Result<String> {
     fs::read_to_string(root().join(path)).with_context(|| path.to_owned())
-}
-
-/// The line with breaks before column 110; further lines have its indent.
-fn wrap(line: &str) -> String {
-    let indent = &line[..line.len() - line.trim_start().len()];
-    let (mut text, mut column) = (indent.to_owned(), indent.len());
-    for (i, word) in line.trim_start().split(' ').enumerate() {
-        let is_first = i == 0;
-        if !is_first && column + 1 + word.len() > 110 {
-            text += &format!("\n{indent}{word}");
-            column = indent.len() + word.len();
-        } else {
-            text += &format!("{}{word}", if is_first { "" } else { " " });
-            column += word.len() + usize::from(!is_first);
-        }
-    }
-    text
-}
-
-/// Appends the help of a command as Markdown, then that of its subcommands.
-fn append_help(path: &[&str], to: &mut String) -> Result<()> {
-    let mut command = actq(path);
-    command.arg("--help").env_remove("ACTQ_POLICY");
-    let help = succeeded(&run(command, b"")?)?;
-    let lines: Vec<&str> = help.lines().map(str::trim_end).collect();
-    let wrapped: Vec<String> = lines.iter().map(|line| wrap(line)).collect();
-    *to += &format!("\n## {}\n\n```text\n{}\n```\n", [&["actq"], path].concat().join(" "), wrapped.join("\n"));
-    let listed = lines.iter().skip_while(|line| **line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    let names = listed.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
-    names.filter(|name| !["", "help"].contains(name)).try_for_each(|name| append_help(&[path, &[name]].concat(), to))
-}
-
-#[test]
-fn command_reference_is_the_help() -> Result<()> {
-    let text = read("docs/CLI.md")?;
-    let (by_hand, generated) = text.split_once(GENERATED).context("docs/CLI.md has no generated part")?;
-    let mut wanted = String::new();
-    append_help(&[], &mut wanted)?;
-    if std::env::var_os("ACTQ_BLESS").is_some() {
-        return Ok(fs::write(root().join("docs/CLI.md"), format!("{by_hand}{GENERATED}{wanted}"))?);
-    }
-    ensure!(generated == wanted, "docs/CLI.md differs from the help; run this test with ACTQ_BLESS=1");
-    Ok(())
 }
 
 /// Cargo packages the files in a crate's folder only.

@@ -101,6 +101,8 @@ def import_policy(
         except Exception as error:
             text = str(error).strip().split("\n")[0]
             raise _actq.Error(f"{path}: torch cannot read it as TorchScript: {text}; pass a module instead") from error
+    elif not any(callable(getattr(source, has, None)) for has in ("forward", "predict", "get_inference_policy")):
+        raise _actq.Error(f"the policy is of type {type(source).__name__}; pass a path, a torch.nn.Module or a trained model")
     if accept_profile or answers is not None or profile is not None:
         raise _actq.Error("only a deploy bundle takes accept_profile, answers and profile")
     _torch_module()

@@ -121,7 +121,11 @@ fn exports_replace_only_exported_files() -> Result<()> {
             }
             fs::write(at("out").join(name), foreign)?;
             let before = content(&at("out"))?;
-            failed(&export("walk", &[])?, 1, &[&format!("{name}: already exists, and actq did not write it"), "--force"])?;
+            failed(
+                &export("walk", &[])?,
+                1,
+                &[&format!("{name}: already exists, and actq did not write it"), "--force"],
+            )?;
             ensure!(content(&at("out"))? == before, "{name}: something was written");
         }
         succeeded(&export("walk", &["--force"])?)?;
