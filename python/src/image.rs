@@ -158,7 +158,7 @@ impl Image {
     #[pyo3(signature = (*, clock = CLOCK))]
     fn inspect<'py>(&self, py: Python<'py>, #[pyo3(from_py_with = given)] clock: f64) -> PyResult<Bound<'py, PyAny>> {
         let image = self.image()?;
-        let time = time::report(&StepTime::new(&image, positive("clock", clock)?));
+        let time = time::report(&image, &StepTime::new(&image, positive("clock", clock)?));
         py.import("actq._report")?.getattr("Report")?.call1((format!("{}\n{time}", inspect::report(&image)),))
     }
 

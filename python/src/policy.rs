@@ -20,7 +20,7 @@ use numpy::{
     AllowTypeChange, IntoPyArray as _, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _, PyUntypedArrayMethods as _,
 };
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict};
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::error::{OrRaise as _, error, given, raise_of_import};
 
@@ -104,7 +104,8 @@ impl Policy {
     }
 
     /// Returns the actions at observations [step, value], one after the other from the start of an episode, or at one
-    /// observation [value]; with scale, offset and limits, before step limits and smoothing.
+    /// observation [value]; with scale, offset and limits, before what acts on executed actions: step limits, smoothing,
+    /// two-state actions, playback. A chunk is one row; a head that denoises takes its noise after the observation.
     fn __call__<'py>(
         &self,
         py: Python<'py>,
@@ -120,8 +121,10 @@ impl Policy {
             [values] if values == len => vec![self.policy.chunk * self.policy.act_len],
             [steps, values] if values == len => vec![steps, self.policy.chunk * self.policy.act_len],
             _ => {
+                let noise = len - self.policy.graph.obs_len;
+                let of = if noise > 0 { format!(" ({noise} of them noise)") } else { String::new() };
                 return Err(error!(
-                    "the observations have the shape {given:?}; use [{len}] for one, or [steps, {len}]"
+                    "the observations have the shape {given:?}; use [{len}]{of} for one, or [steps, {len}]"
                 ));
             }
         };
@@ -140,15 +143,13 @@ impl Policy {
     }
 
     /// Returns how `pickle` makes the policy again: from the contents of its files.
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>, Bound<'py, PyBytes>))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let Some([json, weights]) = &self.files else {
             return Err(error!("a policy of a deploy bundle cannot be pickled; import it in each process"));
         };
         let make = py.import("actq._actq")?.getattr("policy_of_files")?;
-        Ok((make, (PyBytes::new(py, json), PyBytes::new(py, weights))))
+        let files = (PyBytes::new(py, json), PyBytes::new(py, weights));
+        (make, (files.0, files.1, self.policy.guards.clone(), self.policy.dir.clone())).into_pyobject(py)
     }
 
     fn __repr__(&self) -> String {
@@ -162,12 +163,12 @@ impl Policy {
     }
 }
 
-/// Reads a policy from the contents of its two files.
+/// Reads a policy from the contents of its two files; `dir` is the folder of its recordings.
 #[pyfunction]
-pub(crate) fn policy_of_files(json: Vec<u8>, weights: Vec<u8>) -> PyResult<Policy> {
+pub(crate) fn policy_of_files(json: Vec<u8>, weights: Vec<u8>, guards: Vec<String>, dir: PathBuf) -> PyResult<Policy> {
     let name = Path::new("a pickled policy");
-    let policy = actq::policy::Policy::of_files(Path::new(""), [name, name], &json, &weights).or_raise()?;
-    Ok(Policy::new(policy, Some([json, weights])))
+    let policy = actq::policy::Policy::of_files(&dir, [name, name], &json, &weights).or_raise()?;
+    Ok(Policy::new(actq::policy::Policy { guards, ..policy }, Some([json, weights])))
 }
 
 /// Reads a policy folder, an ONNX file, or a deploy bundle.

@@ -103,6 +103,35 @@ def test_agents_of_cleanrl_give_their_mean():
             np.testing.assert_allclose(policy(observations), expected.numpy(), rtol=1e-5, atol=1e-5)
 
 
+def test_agents_with_more_than_an_actor_are_refused():
+    class Trunk(Agent):
+        def __init__(self):
+            super().__init__()
+            self.network = torch.nn.Linear(3, 3)
+
+        def get_action_and_value(self, x):
+            return super().get_action_and_value(self.network(x))
+
+    with pytest.raises(actq.Error, match="Trunk: the agent computes before its actor; pass a module that returns the mean action"):
+        actq.import_policy(Trunk())
+
+    class Whole(Agent):
+        def forward(self, x):
+            return 2 * self.actor_mean(x)
+
+    agent, observations = Whole(), np.ones((2, 3), np.float32)
+    expected = 2 * agent.actor_mean(torch.ones(2, 3)).detach().numpy()
+    np.testing.assert_allclose(actq.import_policy(agent, torch.zeros(1, 3))(observations), expected, rtol=1e-5)
+
+
+def test_agents_stay_as_they_are():
+    agent = Agent()
+    agent.actor_mean.append(torch.nn.BatchNorm1d(2))
+    before = {key: value.clone() for key, value in agent.state_dict().items()}
+    actq.import_policy(agent)
+    assert agent.training and all(torch.equal(value, before[key]) for key, value in agent.state_dict().items())
+
+
 def test_runners_of_rsl_rl_give_their_policy(tmp_path):
     runners = pytest.importorskip("rsl_rl.runners", reason="rsl-rl-lib is not installed")
     tensordict = pytest.importorskip("tensordict")
@@ -139,6 +168,8 @@ def test_runners_of_rsl_rl_give_their_policy(tmp_path):
 
     for kind in ("MLPModel", "lstm", "gru"):
         made = runner(kind)
+        # As after training.
+        made.alg.get_policy()(Env().get_observations(), stochastic_output=True)
         policy = actq.import_policy(made)
         assert (policy.obs_len, policy.act_len) == (7, 2)
         own = made.get_inference_policy(device="cpu")

@@ -42,6 +42,10 @@ def test_a_new_model_has_the_limits_of_its_action_space():
     narrow = actq.import_policy(sb3.PPO("MlpPolicy", Env(WIDE), seed=0, device="cpu").policy, torch.zeros(1, 17), high=[1, 2, 3])
     random = 1e3 * np.random.default_rng(0).normal(size=(200, 17)).astype(np.float32)
     assert (narrow(random) <= [1, 1, 3]).all() and (narrow(random) >= WIDE.low).all()
+    with pytest.raises(actq.Error, match="PPO: no value of action 0 is within your limits and those of the action space, -2.0 to 2.0"):
+        actq.import_policy(sb3.PPO("MlpPolicy", Env(WIDE), seed=0, device="cpu"), low=3)
+    with pytest.raises(actq.Error, match="PPO: the actions are scores, of which the largest is chosen; they take no low"):
+        actq.import_policy(sb3.PPO("MlpPolicy", Env(spaces.Discrete(3)), seed=0, device="cpu"), low=-1)
     with pytest.raises(actq.Error, match="PPO: 2 limits for 3 actions; give one for each, or one for all"):
         actq.import_policy(sb3.PPO("MlpPolicy", Env(WIDE), seed=0, device="cpu"), low=[0, 1])
 
@@ -81,7 +85,7 @@ def test_other_objects_are_refused_with_the_right_one(tmp_path):
     with pytest.raises(actq.Error, match=r"output_0 \(64 values\), output_1 \(64 values\); choose one"):
         actq.import_policy(made.policy.mlp_extractor, torch.zeros(1, 17))
     made.save(tmp_path / "model.zip")
-    with pytest.raises(actq.Error, match="load it with Stable-Baselines3, and pass model.policy"):
+    with pytest.raises(actq.Error, match="load it with Stable-Baselines3 and its environment.*and pass the model"):
         actq.import_policy(tmp_path / "model.zip", torch.zeros(1, 17))
     with pytest.raises(actq.Error, match="pass a module of the policy's actor that returns its scores"):
         actq.import_policy(model("PPO", spaces.MultiDiscrete([2, 3])).policy, torch.zeros(1, 17))
@@ -142,6 +146,23 @@ def test_a_model_has_its_normalization(algorithm, stacked, is_outside):
     np.testing.assert_allclose(policy(frames), expected, rtol=1e-4, atol=1e-4)
     assert policy.name == "walker" and np.ptp(expected) > 0.1
     assert (policy(100 * frames) <= WIDE.high).all()
+
+
+def test_a_model_without_its_environment_says_so(caplog, tmp_path):
+    model("PPO", WIDE).save(tmp_path / "walker.zip")
+    actq.import_policy(sb3.PPO.load(tmp_path / "walker.zip", device="cpu"))
+    assert "the model has no environment; if it was trained with VecNormalize, load it with env=VecNormalize.load" in caplog.text
+
+
+def test_choices_are_normalized_too():
+    env = vectorized(Env(spaces.Discrete(4)), True, False)
+    made = moved(sb3.PPO("MlpPolicy", env, seed=0, device="cpu"))
+    statistics, random = made.get_vec_normalize_env().obs_rms, np.random.default_rng(3)
+    statistics.mean, statistics.var = random.normal(size=17), 0.1 + random.random(17)
+    policy, frames = actq.import_policy(made), (1 + 2 * random.normal(size=(200, 51))).astype(np.float32)
+    normalized = made.get_vec_normalize_env().normalize_obs(frames.reshape(600, 17)).reshape(200, 51)
+    expected, _ = made.predict(normalized, deterministic=True)
+    assert (policy(frames).argmax(axis=1) == expected).all() and len(set(expected)) > 1
 
 
 def test_parts_of_an_observation_follow_the_keys_of_the_space():

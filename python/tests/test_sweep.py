@@ -14,7 +14,7 @@ def parts(observations):
     return observations[:400], observations[400:]
 
 
-def test_a_sweep_has_the_images_of_quantize(mlp, parts):
+def test_a_sweep_has_the_images_of_quantize(mlp, parts, caplog):
     policy = actq.import_policy(mlp)
     learned, heldout = parts
     budgets = [2.0, {"bits": 3}, {"flash": "8K"}]
@@ -33,6 +33,10 @@ def test_a_sweep_has_the_images_of_quantize(mlp, parts):
     assert lines[0].split() == ["budget", "bytes", "bits", "per", "weight", "ms", "NMSE"] and len(lines) == 4
     assert found._repr_html_().count("<tr>") == 4
     assert any(work.startswith("bits=3: ") and 1 / 3 <= share <= 2 / 3 for work, share in seen)
+    some = actq.sweep(policy, learned, heldout=heldout, budgets=[{"flash": 300}, 4.0], steps=5, progress=False)
+    assert [row["budget"] for row in some.rows()] == ["bpw=4.0"] and "flash=300: " in caplog.text
+    with pytest.raises(actq.Error, match="300"):
+        actq.sweep(policy, learned, heldout=heldout, budgets=[{"flash": 300}], steps=5, progress=False)
     with pytest.raises(actq.Error, match="budgets is empty"):
         actq.sweep(policy, learned, heldout=heldout, budgets=[])
 

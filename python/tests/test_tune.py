@@ -130,7 +130,7 @@ def test_infos_may_be_nested_or_of_all_robots(mode):
         assert all(e.info["reconfigure"] is False and e.info["log"]["loss"] == 1.5 and len(e.info["weights"]) == 7 for e in driven.episodes)
 
 
-def test_arguments_of_rollouts_are_named():
+def test_arguments_of_rollouts_are_named(mlp):
     env = envs(AutoresetMode.NEXT_STEP)
     act = lambda x, reset: x[:, :4]  # noqa: E731
     for arguments, text in [
@@ -140,6 +140,7 @@ def test_arguments_of_rollouts_are_named():
         ({"every": 0}, "every is 0"),
         ({"policy": 3}, "the policy is of type int; pass actq.Head"),
         ({"env": Reach()}, "env is one environment; pass a vector environment"),
+        ({"policy": actq.import_policy(mlp)}, "the policy is of type Policy; pass actq.Head"),
         ({"policy": lambda x, reset: x[:, :3]}, r"the policy's actions are \(3, 3\); the environment takes \(3, 4\)"),
         ({"policy": lambda x, reset: np.zeros((6, 2))}, r"the policy's actions are \(6, 2\)"),
     ]:

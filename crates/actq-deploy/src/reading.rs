@@ -46,12 +46,22 @@ impl Reading {
             "a bundle's targets have no largest step; its firmware takes LOW:HIGH:RATE"
         );
         let known: Vec<Vec<[f64; 2]>> = Plan::new(&self.description, bundle).context(DESCRIPTION)?.target_limits();
+        let kinds = self.description.targets.iter().map(|target| target.kind);
+        ensure!(
+            stated.low.len().max(stated.high.len()) > 1 || kinds.clone().all(|kind| Some(kind) == kinds.clone().next()),
+            "the bundle has targets of several kinds; state limits for each of their values"
+        );
         let mut limits = stated.within(&known.concat(), "the bundle")?.into_iter();
         for (target, known) in self.description.targets.iter_mut().zip(known) {
             let own: Vec<[f64; 2]> = limits.by_ref().take(known.len()).collect();
             let side = |side: usize| own.iter().map(|limits| limits[side]).collect::<Vec<f64>>();
             let [low, high] = [side(0), side(1)];
-            if own != known && low.iter().chain(&high).all(|limit| limit.is_finite()) {
+            if own != known {
+                ensure!(
+                    low.iter().chain(&high).all(|limit| limit.is_finite()),
+                    "target {:?}: a limit is missing or infinite; state the lowest and the highest value",
+                    target.value
+                );
                 target.limits = Some([low, high].map(Numbers::Each));
                 self.sources.insert("limits".to_owned(), "the option for limits".to_owned());
             }

@@ -374,9 +374,20 @@ fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), Ima
     let matrix = matrix.as_ref().map_err(|e| *e)?;
     let mut seen = [0u32; h::MAX_ROWS / 32];
     let mut first_row = 0;
+    // An input is prepared once for all blocks of a width, so they have one layout.
+    #[cfg(feature = "scalar")]
+    let mut lanes = [None; 16];
     for record in matrix.records.as_chunks().0 {
         let rows = row_block(matrix, record, first_row);
         let rows = rows.as_ref().map_err(|e| *e)?;
+        #[cfg(feature = "scalar")]
+        {
+            let shape = rows.block.shape();
+            let known = lanes.get_mut(shape.width.bits() as usize).ok_or(ImageError::Width)?;
+            if *known.get_or_insert(shape.lanes) != shape.lanes {
+                return Err(ImageError::Lanes);
+            }
+        }
         // Weights, scales and output steps follow each other.
         let [_, weights, scales, steps] = record.map(|word| u32::from_le(word) as usize);
         let to_scales = rows.block.words().len();

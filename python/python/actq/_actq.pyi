@@ -53,7 +53,8 @@ class Policy:
         """SHA-256 of the policy's files, as `Image.source` has it."""
     def __call__(self, observations: npt.ArrayLike) -> _Floats:
         """Returns the actions in f32 at observations [steps, obs_len] of one episode, from its start, or at one observation
-        [obs_len]: the network's outputs with scale, offset and limits, before step limits and smoothing."""
+        [obs_len]: the network's outputs with scale, offset and limits, before step limits, smoothing, two-state actions and
+        playback. A chunk is one row; a head that denoises takes its noise after the observation."""
 
 class Cost(TypedDict):
     """The predicted cost of a step that evaluates the network, and the memory that it needs."""
@@ -268,7 +269,7 @@ def import_onnx(
     limits: Tuple[List[float], List[float], List[float]],
     rate_hz: Optional[float],
 ) -> Tuple[Policy, Dict[str, Any]]: ...
-def policy_of_files(json: bytes, weights: bytes) -> Policy: ...
+def policy_of_files(json: bytes, weights: bytes, guards: List[str], dir: _Path) -> Policy: ...
 def bytes_of(text: str) -> int: ...
 def quantize(
     policy: Policy, recordings: Any, heldout: Any, request: Dict[str, Any], progress: _Report

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, List, Mapping, Optional, Sequence, Tuple, Union
 
@@ -45,7 +46,7 @@ def import_policy(
     """Reads a policy.
 
     source: the path of an ONNX file, of a policy folder (docs/POLICY.md), of a deploy bundle (docs/DEPLOY.md) or of a
-        TorchScript file; or a torch.nn.Module. Or a trained model: an algorithm or policy of Stable-Baselines3, whose
+        TorchScript file; or a torch.nn.Module. Or a trained model: an algorithm of Stable-Baselines3, whose
         `predict(deterministic=True)` is read, with its VecNormalize; a runner of rsl_rl 5; an agent of CleanRL, whose
         mean action is read. A Dict of observations is one vector, in the order of the space's keys.
     example: of a module or TorchScript file, its input: a tensor [1, n_obs], or a tuple of the observation and the
@@ -76,14 +77,17 @@ def import_policy(
         raise _actq.Error(f"observe is the text {observe!r}; pass a list of inputs")
     pairs = list((states or {}).items())
     limits = (_numbers("low", low), _numbers("high", high), _numbers("max_step", max_step))
-    if rate_hz is not None and not (isinstance(rate_hz, (int, float)) and 0 < rate_hz < float("inf")):
+    if rate_hz is not None and (isinstance(rate_hz, bool) or not isinstance(rate_hz, Real) or not 0 < rate_hz < float("inf")):
         raise _actq.Error(f"rate_hz is {rate_hz!r}; pass a number above 0")
     if isinstance(source, (str, os.PathLike)):
         if not os.fspath(source):
             raise _actq.Error("the path of the policy is empty")
         path = Path(source)
         if path.suffix == ".zip":
-            raise _actq.Error(f"{path}: is an archive; load it with Stable-Baselines3, and pass model.policy")
+            raise _actq.Error(
+                f"{path}: is an archive; load it with Stable-Baselines3 and its environment, which has the VecNormalize if there "
+                "is one, and pass the model"
+            )
         if path.suffix not in TORCHSCRIPT:
             given = {"example": example, "input_names": input_names, "output_names": output_names, "name": name}
             for key, value in given.items():
@@ -123,7 +127,7 @@ def import_policy(
         output_names=output_names, limits=limits, rate_hz=rate_hz,
     )  # fmt: skip
     if model is not None:
-        model.refuse_other_actions(policy, name, limits)
+        model.compare(policy, name, limits)
     return policy
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import logging
 from typing import Any, Callable, List, NamedTuple, Optional, Tuple
 
@@ -11,14 +10,13 @@ import torch
 
 from . import _sb3
 from ._actq import Error, Policy
+from ._torch import TOLERANCE, copied
 from ._typing import Array, Limits
 
 log = logging.getLogger("actq")
 
 #: Observations that a policy is compared with its model on.
 FRAMES = 100
-#: Largest error of a correct policy, as a share of the largest action.
-TOLERANCE = 1e-5
 
 #: Mean, deviation and limit that observations of a key are normalized by.
 Normalizer = Tuple[Array, Array, float]
@@ -37,7 +35,7 @@ class Model(NamedTuple):
     observations: Array
     predict: Callable[[Array], Array]
 
-    def refuse_other_actions(self, policy: Policy, name: str, limits: Limits) -> None:
+    def compare(self, policy: Policy, name: str, limits: Limits) -> None:
         """Refuses a policy that gives other actions than the model within these limits."""
         low, high, _ = limits
         expected = np.clip(self.predict(self.observations), low or -np.inf, high or np.inf)
@@ -48,14 +46,14 @@ class Model(NamedTuple):
 
 
 def of(source: Any, name: str) -> Optional[Model]:
-    """Returns a trained model as a module: a policy or algorithm of Stable-Baselines3, a runner of rsl_rl, or an agent as
+    """Returns a trained model as a module: an algorithm of Stable-Baselines3, a runner of rsl_rl, or an agent as
     CleanRL writes it. `None` for other objects."""
     with torch.no_grad():
         if _is_of(source, "BaseAlgorithm", "stable_baselines3."):
             return _of_sb3(source, name)
         if _is_of(source, "OnPolicyRunner", "rsl_rl.runners") or _is_of(source, "DistillationRunner", "rsl_rl.runners"):
             return _of_rsl_rl(source, name)
-        return _of_clean_rl(source) if isinstance(source, torch.nn.Module) else None
+        return _of_clean_rl(source, name) if isinstance(source, torch.nn.Module) else None
 
 
 def _is_of(source: Any, name: str, package: str) -> bool:
@@ -69,12 +67,12 @@ def drawn(length: int) -> Array:
 class Normalized(torch.nn.Module):
     """A module behind the normalization of parts of its observation."""
 
-    def __init__(self, module: Any, lengths: List[int], normalizers: List[Optional[Normalizer]]) -> None:
+    def __init__(self, module: Any, lengths: List[int], normalizers: List[Optional[Normalizer]], device: Any) -> None:
         super().__init__()
-        self.module, self.lengths, self.clips = module, lengths, [of and of[2] for of in normalizers]
-        for i, of in enumerate(normalizers):
-            for key, values in zip(("mean", "deviation"), of[:2] if of else ()):
-                self.register_buffer(f"{key}_{i}", torch.from_numpy(values.astype(np.float32)))
+        self.module, self.lengths, self.clips = module, lengths, [by and by[2] for by in normalizers]
+        for i, by in enumerate(normalizers):
+            for key, values in zip(("mean", "deviation"), by[:2] if by else ()):
+                self.register_buffer(f"{key}_{i}", torch.from_numpy(values.astype(np.float32)).to(device))
 
     def forward(self, obs: torch.Tensor) -> Any:
         parts, at = [], 0
@@ -89,18 +87,22 @@ class Normalized(torch.nn.Module):
 
 def _of_sb3(model: Any, name: str) -> Model:
     """The deterministic action of an algorithm, with what its VecNormalize does to observations."""
-    policy = model.policy
+    policy = copied(model.policy, name)
     step = _sb3.Deterministic(policy, name)
     is_dict = isinstance(step.parts, list)
     keys: List[Tuple[str, Tuple[int, ...]]] = step.parts if isinstance(step.parts, list) else [("", step.parts)]
     lengths = [int(np.prod(shape)) for _, shape in keys]
+    if model.get_env() is None:
+        log.warning(
+            "%s: the model has no environment; if it was trained with VecNormalize, load it with env=VecNormalize.load(..)", name
+        )
     vec = model.get_vec_normalize_env()
     vec = vec if vec is not None and vec.norm_obs else None
     stacked = _stacked_frames(model.get_env())
     # Frames that are normalized one by one, before they are stacked.
     times = stacked if vec is not None and vec.observation_space.shape != model.observation_space.shape else 1
-    if vec is not None and is_dict and stacked > 1:
-        raise Error(f"{name}: stacked frames of a Dict with VecNormalize cannot be imported; pass model.policy")
+    if vec is not None and stacked > 1 and (is_dict or len(step.parts) > 1):
+        raise Error(f"{name}: only stacked frames of one axis are imported with VecNormalize; pass a module that normalizes them")
     normalizers: List[Optional[Normalizer]] = [None] * len(keys)
     for i, (key, _) in enumerate(keys):
         if vec is not None and (not is_dict or key in vec.norm_obs_keys):
@@ -119,18 +121,20 @@ def _of_sb3(model: Any, name: str) -> Model:
     if stacked > 1:
         log.warning("%s: an observation is the last %d frames, the oldest first; the application keeps them", name, stacked)
 
-    module: Any = Normalized(step, lengths, normalizers) if any(normalizers) else step
+    module: Any = Normalized(step, lengths, normalizers, policy.device) if any(normalizers) else step
 
     def predict(rows: Array) -> Array:
-        if step.kind != "Box":
-            # Of a choice, predict gives only the largest score's index; the import compares it.
-            return np.asarray(module(torch.from_numpy(rows).to(policy.device)).detach().cpu().numpy())
         given = step.observation(rows)
         if vec is not None:
             # By the environment itself.
             frames = given if times == 1 else rows.reshape(len(rows) * times, -1)
             given = vec.normalize_obs(frames)
             given = given if times == 1 else given.reshape(rows.shape)
+        if step.kind != "Box":
+            # Of a choice, predict gives only the index of the largest score; the import compares it.
+            parts = list(given.values()) if isinstance(given, dict) else [given]
+            flat = np.concatenate([part.reshape(len(rows), -1) for part in parts], axis=1)
+            return np.asarray(step(torch.from_numpy(flat).to(policy.device)).detach().cpu().numpy())
         return np.asarray(model.predict(given, deterministic=True)[0], np.float32).reshape(len(rows), -1)
 
     return Model(module, (torch.zeros(1, sum(lengths)),), None, None, observations, predict)
@@ -160,7 +164,7 @@ def _of_rsl_rl(runner: Any, name: str) -> Model:
 
     def predict(rows: Array) -> Array:
         # Groups of observations are joined in their order: the first one has all values here.
-        own = copy.deepcopy(policy).cpu().eval()
+        own = copied(policy, name).cpu()
         own.reset()
         first, *others = own.obs_groups
         steps = [{first: row, **{other: row[:, :0] for other in others}} for row in torch.from_numpy(rows)[:, None]]
@@ -180,19 +184,38 @@ class _SacAction(torch.nn.Module):
         return self.actor.get_action(obs)[2]
 
 
-def _of_clean_rl(agent: Any) -> Optional[Model]:
+def _of_clean_rl(agent: Any, name: str) -> Optional[Model]:
     """The mean action, or the scores, of an agent or a SAC actor of CleanRL's files."""
+    # A module with a forward of its own says itself what it computes.
+    if type(agent).forward is not torch.nn.Module.forward and not hasattr(agent, "action_scale"):
+        return None
+    agent = copied(agent, name)
+    layers = [layer for layer in agent.modules() if isinstance(layer, torch.nn.Linear)]
+    if not layers:
+        return None
+    device = layers[0].weight.device
     if hasattr(agent, "get_action_and_value"):
         module = getattr(agent, "actor_mean", None) or getattr(agent, "actor", None)
+        if not isinstance(module, torch.nn.Module):
+            return None
+    elif hasattr(agent, "get_action") and hasattr(agent, "action_scale"):
+        module = _SacAction(agent)
     else:
-        module = _SacAction(agent) if hasattr(agent, "get_action") and hasattr(agent, "action_scale") else None
-    layers = [layer for layer in agent.modules() if isinstance(layer, torch.nn.Linear)]
-    if not isinstance(module, torch.nn.Module) or not layers:
         return None
-    observed = next((layer.in_features for layer in module.modules() if isinstance(layer, torch.nn.Linear)))
-    device = layers[0].weight.device
+    first = next((layer for layer in module.modules() if isinstance(layer, torch.nn.Linear)), layers[0])
 
     def predict(rows: Array) -> Array:
-        return np.asarray(module(torch.from_numpy(rows).to(device)).detach().cpu().numpy())
+        obs = torch.from_numpy(rows).to(device)
+        if isinstance(module, _SacAction):
+            return np.asarray(module(obs).detach().cpu().numpy())
+        seen: List[Tuple[Any, Any]] = []
+        hook = module.register_forward_hook(lambda _, given, found: seen.append((given[0], found)))
+        with torch.random.fork_rng([]):
+            agent.get_action_and_value(obs)
+        hook.remove()
+        if len(seen) != 1 or seen[0][0].shape != obs.shape or not torch.equal(seen[0][0], obs):
+            raise Error(f"{name}: the agent computes before its actor; pass a module that returns the mean action")
+        return np.asarray(seen[0][1].detach().cpu().numpy())
 
-    return Model(module, (torch.zeros(1, observed),), None, None, drawn(observed), predict)
+    example = torch.zeros(1, first.in_features, device=device)
+    return Model(module, (example,), None, None, drawn(first.in_features), predict)

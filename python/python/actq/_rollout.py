@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, 
 
 import numpy as np
 
-from ._actq import Error
+from ._actq import Error, Policy
 from ._progress import Progress, reporter
 from ._quantize import _whole
 from ._typing import Array, Floats
@@ -100,7 +100,8 @@ def rollout(
     for name, number in (("frames", 1 if frames is None else frames), ("episodes", episodes or 1), ("every", every)):
         if _whole(name, number) < 1:
             raise Error(f"{name} is {number}; use a whole number from 1 on")
-    if not callable(policy):
+    # A policy's call takes the steps of one robot.
+    if not callable(policy) or isinstance(policy, Policy):
         raise Error(f"the policy is of type {type(policy).__name__}; pass actq.Head(image), or a function")
     if not hasattr(env, "num_envs"):
         raise Error("env is one environment; pass a vector environment, as gymnasium.make_vec(..., num_envs=1)")

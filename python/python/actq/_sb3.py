@@ -37,8 +37,9 @@ class Deterministic(torch.nn.Module):
         if self.kind not in ("Box", "Discrete") or self.kind == "Discrete" and not has_scores:
             raise Error(f"{name}: the actions are {space}; pass a module of the policy's actor that returns its scores")
         if self.kind == "Box":
-            self.register_buffer("low", torch.from_numpy(space.low.astype(np.float32)), persistent=False)
-            self.register_buffer("high", torch.from_numpy(space.high.astype(np.float32)), persistent=False)
+            for side in ("low", "high"):
+                values = torch.from_numpy(getattr(space, side).astype(np.float32)).to(policy.device)
+                self.register_buffer(side, values, persistent=False)
 
     def forward(self, given: torch.Tensor) -> Any:
         policy, obs = self.policy, self.observation(given)
@@ -90,14 +91,19 @@ def parts(space: Any, name: str) -> Parts:
 def limited(module: Any, limits: Limits, name: str) -> Limits:
     """Returns limits of a caller with those of the action space, of two the stricter."""
     for part in module.modules():
+        if isinstance(part, Deterministic) and part.kind == "Discrete" and any(limits):
+            raise Error(f"{name}: the actions are scores, of which the largest is chosen; they take no low, high and max_step")
         if isinstance(part, Deterministic) and part.limits()[0].size:
             low, high = part.limits()
             stated = [(limits[0], low, np.maximum), (limits[1], high, np.minimum)]
             for given, own, _ in stated:
                 if len(given) > 1 and len(given) != own.size:
                     raise Error(f"{name}: {len(given)} limits for {own.size} actions; give one for each, or one for all")
-            low, high = (stricter(given, own) if given else own for given, own, stricter in stated)
-            return low.astype(float).tolist(), high.astype(float).tolist(), limits[2]
+            lowest, highest = (stricter(given, own) if given else own for given, own, stricter in stated)
+            if (lowest > highest).any():
+                i = int((lowest > highest).argmax())
+                raise Error(f"{name}: no value of action {i} is within your limits and those of the action space, {low[i]} to {high[i]}")
+            return lowest.astype(float).tolist(), highest.astype(float).tolist(), limits[2]
     return limits
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, 
 from ._actq import Error, Image, Policy
 from ._evaluate import evaluate
 from ._progress import Progress, reporter
-from ._quantize import CLOCK, quantize
+from ._quantize import CLOCK, log, quantize
 from ._rollout import Rollout
 from ._typing import Recordings
 
@@ -130,17 +130,18 @@ def sweep(
 
     policy, recordings: as for `quantize`.
     budgets: bits per weight, or budgets of `quantize`, as {"flash": "24K"} or {"ms": 0.6}.
-    heldout: recordings that nothing learns from.
+    heldout: recordings that nothing learns from; {"max_nmse": X} chooses the size by them.
     drive: drives an image, as `lambda image: actq.rollout(actq.Head(image, env.num_envs), env, episodes=100)`.
     clock: clock in Hz of the predicted milliseconds.
     options: other options of `quantize`, for all budgets.
 
-    The result prints as a table, `rows()` are its rows, and `plot()` draws it. Raises what `quantize` and `drive` raise.
+    The result prints as a table, `rows()` are its rows, and `plot()` draws it. A budget that cannot be kept is left out, with
+    a warning in the log `actq`. Raises what `drive` raises, and `actq.Error` if no budget can be kept.
     """
     each = [dict(budget) if isinstance(budget, Mapping) else {"bpw": budget} for budget in budgets]
     if not each:
         raise Error("budgets is empty; pass bits per weight, or budgets such as {'flash': '24K'}")
-    points = []
+    points, failure = [], None
     with reporter(progress) as report:
         for i, budget in enumerate(each):
             name = " ".join(f"{key}={value}" for key, value in budget.items())
@@ -149,8 +150,16 @@ def sweep(
                 if report is not None:
                     report(f"{name}: {work}", (i + share) / len(each))  # noqa: B023
 
-            image = quantize(policy, recordings, heldout=heldout, clock=clock, progress=show, **budget, **options)
+            try:
+                image = quantize(policy, recordings, heldout=heldout, clock=clock, progress=show, **budget, **options)
+                nmse = evaluate(image, heldout, policy).nmse
+            except Error as error:
+                log.warning("%s: %s", name, error)
+                failure = error
+                continue
             driven = drive(image) if drive is not None else None
             milliseconds = image.cost(clock=clock)["milliseconds"]
-            points.append(Point(budget, image, evaluate(image, heldout, policy).nmse, milliseconds, driven))
+            points.append(Point(budget, image, nmse, milliseconds, driven))
+    if failure is not None and not points:
+        raise failure
     return Sweep(points)

@@ -97,10 +97,10 @@ class Source:
         rate_hz: Optional[float],
     ) -> None:
         self.module, self.inputs, self.name, self.rate_hz = module, inputs, name, rate_hz
-        copied = self.copied()
-        self.limits = limits if isinstance(copied, torch.jit.ScriptModule) else _sb3.limited(copied, limits, name)
+        step = self.copied()
+        self.limits = limits if isinstance(step, torch.jit.ScriptModule) else _sb3.limited(step, limits, name)
         try:
-            outputs = copied(*inputs)
+            outputs = step(*inputs)
         except Exception as error:
             raise Error(f"{name}: {self._expected() or f'the module fails on the example: {reason(error)}'}") from error
         found = dict(tensors(outputs, "output", name))
@@ -112,11 +112,7 @@ class Source:
 
     def copied(self) -> Any:
         """Returns a copy in evaluation mode; of a policy of Stable-Baselines3, its deterministic action."""
-        try:
-            with mock.patch.object(torch.Tensor, "__deepcopy__", copied_tensor):
-                module = copy.deepcopy(self.module).eval()
-        except Exception as error:
-            raise Error(f"{self.name}: copy.deepcopy cannot copy the module: {reason(error)}") from error
+        module = copied(self.module, self.name)
         return _sb3.Deterministic(module, self.name) if _sb3.is_policy(module) else module
 
     def _expected(self) -> Optional[str]:
@@ -329,6 +325,15 @@ def silenced() -> Iterator[None]:
 
 
 COPIED_LEAF: Any = torch.Tensor.__deepcopy__
+
+
+def copied(module: Any, name: str) -> Any:
+    """Returns a copy of a module in evaluation mode."""
+    try:
+        with mock.patch.object(torch.Tensor, "__deepcopy__", copied_tensor):
+            return copy.deepcopy(module).eval()
+    except Exception as error:
+        raise Error(f"{name}: copy.deepcopy cannot copy the module: {reason(error)}") from error
 
 
 def copied_tensor(tensor: torch.Tensor, memo: Dict[int, Any]) -> Any:

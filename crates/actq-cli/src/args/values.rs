@@ -46,16 +46,21 @@ impl LimitList {
     ///
     /// If they have a largest change in a second, and the rate is not known.
     pub(crate) fn at(&self, rate_hz: Option<f64>) -> actq::error::Result<StatedLimits> {
-        let of = |value: fn(&Limits) -> f32| self.0.iter().map(value).map(f64::from).collect();
+        let of = |value: fn(&Limits) -> f32| self.0.iter().map(value).map(decimal).collect();
         let has_rate = self.0.iter().any(|limits| limits.rate.is_some());
         ensure!(!has_rate || rate_hz.is_some(), "--limits has a largest change in a second; pass --rate-hz HZ, too");
         let step = |limits: &Limits| match (limits.rate, rate_hz) {
-            (Some(rate), Some(rate_hz)) => f64::from(rate) / rate_hz,
+            (Some(rate), Some(rate_hz)) => decimal(rate) / rate_hz,
             _ => f64::INFINITY,
         };
         let max_step = if has_rate { self.0.iter().map(step).collect() } else { Vec::new() };
         Ok(StatedLimits { low: of(|limits| limits.low), high: of(|limits| limits.high), max_step })
     }
+}
+
+/// Returns the number that a user wrote.
+fn decimal(value: f32) -> f64 {
+    format!("{value:?}").parse().unwrap_or(f64::from(value))
 }
 
 /// Parses limits for all actions, or reads a file with a line for each.

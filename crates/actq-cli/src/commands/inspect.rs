@@ -19,7 +19,7 @@ pub(crate) fn run(args: &InspectArgs) -> Result<()> {
         let step = StepTime::new(&image, args.clock);
         return print(&match args.json {
             true => serde_json::to_string(&step)? + "\n",
-            false => format!("{}\n{}", inspect::report(&image), time::report(&step)),
+            false => format!("{}\n{}", inspect::report(&image), time::report(&image, &step)),
         });
     }
     let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;

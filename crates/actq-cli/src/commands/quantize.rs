@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use actq::budget::Budget;
 use actq::data::{Recording, Recordings, Share, Sizes, driven_by, files_of};
-use actq::emit::repack;
+use actq::emit::{Core, repack};
 use actq::measure::size::{Beside, file_bits_per_weight};
 use actq::measure::time::{CLOCK, StepTime};
 use actq::measure::{check, own, recorded};
@@ -15,7 +15,7 @@ use actq::pipeline::{HeldOut, QuantizedPolicy, Quantizer, check_budget, minutes_
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_kernels::Width;
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
 
 use crate::args::{ActivationArg, QuantizeArgs};
 use crate::importers::{self, learned as learned_from, load, policy_files};
@@ -45,6 +45,11 @@ pub fn run(
     let mut options = options(args, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }));
     options.check()?;
     options.check_length()?;
+    let is_timed = matches!(options.budget, Budget::Time(_));
+    ensure!(
+        !is_timed || args.core.is_none_or(Core::has_dsp),
+        "--ms with --core: no time is predicted for cores without the DSP extension; use --bpw or --flash"
+    );
     check_budget(&source, &options)?;
     let (calib, shares) = learned_from(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
     let shares = shares.unwrap_or_default();
@@ -69,14 +74,22 @@ pub fn run(
     // The error is that of the network, on its own inputs.
     let network = found.buffer();
     found.image = found.whole_image()?;
-    if let Some(core) = args.core {
-        found.image = repack(&found.image, core)?;
+    let packed = args.core.map(|core| repack(&found.image, core)).transpose();
+    if let Ok(Some(packed)) = &packed {
+        let limit = if let Budget::ImageBytes(bytes) = options.budget { bytes } else { usize::MAX };
+        let (now, before) = (packed.len(), found.image.len());
+        if now > limit {
+            note([format!("the layouts of this core take {now} bytes, above the budget: {before} without --core")]);
+        }
+        found.image.clone_from(packed);
     }
     let mut contents = vec![found.image.clone()];
     if args.save_stats.is_some() {
         contents.push(Stats::new(&quantizer, &options, &found)?.json()?.into_bytes());
     }
     outputs.write(&contents)?;
+    // Hours of learning are not lost.
+    packed.with_context(|| format!("--core: {} has the default layouts", args.out.display()))?;
     progress.begin("measuring the error");
     print(&learned(&shares))?;
     print(&describe(&quantizer, &found))?;
@@ -112,6 +125,7 @@ fn report(
         quantizer.method().imagined().filter(|_| found.steps() > 0).map_or(String::new(), quantized::imagined);
     let learned = sampled + &imagined + &found.learning.as_ref().map_or(String::new(), quantized::learning);
     let time = match &found.time {
+        _ if !time::is_modelled(&image) => time::NOT_MODELLED.to_owned(),
         Some(step) => time::sentence(step),
         None => time::sentence(&StepTime::new(&image, CLOCK)),
     };

@@ -92,8 +92,8 @@ fn targets_without_limits(around: &Around) -> Option<String> {
     let without: Vec<usize> = (0..around.action_len()).filter(|i| !is_limited(*i)).collect();
     (!without.is_empty()).then(|| {
         format!(
-            "no finite limits for targets {}: a motor controller refuses to arm without limits; add limits = [LOW, HIGH] to [[target]] \
-             in deploy.toml, or build the firmware by cargo xtask firmware --limits LOW:HIGH",
+            "no finite limits for targets {}: a motor controller refuses to arm without limits; pass --limits LOW:HIGH to actq import, add \
+             limits = [LOW, HIGH] to [[target]] in deploy.toml, or build the firmware by cargo xtask firmware --limits LOW:HIGH",
             runs(&without)
         )
     })

@@ -1,11 +1,15 @@
 //! The predicted time of a step.
 
 use actq::measure::time::StepTime;
+use actq_kernels::Image;
 
 use super::table::table;
 
-/// Formats the table that `actq inspect` prints.
-pub fn report(step: &StepTime) -> String {
+/// Formats the table that `actq inspect` prints, if the model has the image's layouts.
+pub fn report(image: &Image<'_>, step: &StepTime) -> String {
+    if !is_modelled(image) {
+        return NOT_MODELLED.to_owned();
+    }
     let mut rows = table(&["op", "output", "runs", "MACs", "instructions", "per MAC", "cycles", "per MAC", "us"]);
     let mut row = |op: &str, output: String, runs: String, macs: usize, instructions: u64, cycles: u64, us: f64| {
         let per_mac = |n: u64| if macs == 0 { "-".to_owned() } else { format!("{:.3}", n as f64 / macs as f64) };
@@ -27,6 +31,15 @@ pub fn report(step: &StepTime) -> String {
     }
     row("all", String::new(), String::new(), step.macs, step.instructions, step.cycles, 1e3 * step.milliseconds);
     format!("{rows}\n\n{}The least slice budget of a poll is {} instructions.\n", sentence(step), step.least_budget)
+}
+
+/// Says why there is no time.
+pub const NOT_MODELLED: &str =
+    "No time is predicted: the weights are in the layouts of a core without the DSP extension.\n";
+
+/// Returns `true` if the model of the Cortex-M4 has the image's layouts.
+pub fn is_modelled(image: &Image<'_>) -> bool {
+    image.features().all(|feature| feature != "scalar")
 }
 
 /// Formats the time of the step as a sentence.

@@ -76,6 +76,13 @@ pub fn repack(bytes: &[u8], core: Core) -> Result<Vec<u8>> {
     let buffer = ImageBuffer::new(bytes);
     let image = Image::new_checked(buffer.bytes()).context("the image to repack")?;
     let old: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+    let is_packed = image.matrices().all(|matrix| {
+        let fits = |shape: BlockShape| shape.lanes == core.lanes(shape.width, matrix.x_max, matrix.group);
+        matrix.blocks().all(|block| fits(block.block.shape()))
+    });
+    if is_packed {
+        return Ok(bytes.to_vec());
+    }
     let matrices = Repacked::of(&image, core)?;
     let packed = sealed(&matrices.image(&image, &old)?)?;
     let buffer = ImageBuffer::new(&packed);

@@ -24,7 +24,7 @@ type TwoColumns = [i32; TWO_COLUMNS];
 pub(super) fn gemv(mut product: Product<'_>) {
     let memory = core::mem::take(&mut product.tables).words();
     match bytemuck::must_cast_slice_mut::<u32, i32>(memory).as_chunks_mut().0 {
-        tile if tile.len() >= LEAST_PAIRS => tiles(product, tile),
+        tile if tile.len() >= LEAST_PAIRS.min(product.block.shape().units()) => tiles(product, tile),
         _ => on_stack(product),
     }
 }
