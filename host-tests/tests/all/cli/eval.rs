@@ -85,7 +85,7 @@ fn eval_labels_a_named_recording_by_its_policy() -> Result<()> {
         1,
         &["actq eval needs recorded observations: put heldout.npz, heldout.npy or heldout.safetensors", "--heldout"],
     )?;
-    failed(&eval(&[])?, 2, &["--policy"])?;
+    failed(&eval(&[])?, 2, &["<POLICY_DIR>"])?;
     // Observations only: the image's own policy computes the actions; another one is refused.
     write_recording(&heldout, &draw_observations(6, OBS), None, [STEPS as i64, 7, STEPS as i64])?;
     assert_eq!(succeeded(&eval(&["--policy", &policy])?)?, expected);
