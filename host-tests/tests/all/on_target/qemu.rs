@@ -62,9 +62,10 @@ fn portable_kernels_give_the_golden_sums_without_assembler() -> Result<()> {
     let cases = golden::cases(1);
     // The cases that fit the memory of the small target.
     let fits = |c: &&golden::Case| c.shape.cols <= 256 && c.words().len() + c.prepared().len() < 1500;
-    let short: Vec<_> = cases.iter().filter(fits).cloned().collect();
-    ensure!(short.len() > cases.len() / 2, "too few cases are short");
-    [(Target::NoDsp, &cases), (Target::Small, &short), (Target::Riscv, &cases)]
+    let (all, short) =
+        (golden::dsp_cases(1), golden::dsp_cases(1).into_iter().filter(|c| fits(&c)).collect::<Vec<_>>());
+    ensure!(short.len() > all.len() / 2, "too few cases are short");
+    [(Target::NoDsp, &cases), (Target::Small, &short), (Target::V6m, &cases), (Target::Riscv, &cases)]
         .into_iter()
         .try_for_each(|(target, cases)| gives_the_sums(target, cases, "Portable"))
 }
