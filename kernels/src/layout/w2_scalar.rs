@@ -1,7 +1,7 @@
 //! 2-bit codes for cores without the DSP extension: one bit plane a word, exactly 2 bits a weight.
 //!
 //! A cell is 4 rows of 8 columns. Word `p` has bit `p` of every code, a byte for each row: an index into a table of the
-//! sums `±x0 ±x1 .. ±x7` ([`crate::arch::portable::planes`]). A strip of eight has two cells next to each other, so its
+//! sums `±x0 ±x1 .. ±x7` (`arch/portable/planes.rs`). A strip of eight has two cells next to each other, so its
 //! rows are eight bytes of plane 0, then eight of plane 1:
 //!
 //! ```text
