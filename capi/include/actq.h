@@ -58,7 +58,7 @@ enum actq_code {
   ACTQ_IMAGE_MATRIX = 17,
   /** weight width is not 2, 3, 4 or 8 bits */
   ACTQ_IMAGE_WIDTH = 18,
-  /** a block's layout is another core's (actq repack), or does not fit its matrix */
+  /** a block's layout is another core's (actq repack), or not its matrix's */
   ACTQ_IMAGE_LANES = 19,
   /** group size is not 0, 32, 64 or 128 */
   ACTQ_IMAGE_GROUP = 20,

@@ -86,7 +86,7 @@ image_errors! {
     /// A matrix block's width is not 2, 3, 4 or 8 bits.
     Width = 18, "weight width is not 2, 3, 4 or 8 bits";
     /// A block's lanes are not those of its matrix's activations and group size, or the build lacks another core's layouts.
-    Lanes = 19, "a block's layout is another core's (actq repack), or does not fit its matrix";
+    Lanes = 19, "a block's layout is another core's (actq repack), or not its matrix's";
     /// A group size is not 0, 32, 64 or 128.
     Group = 20, "group size is not 0, 32, 64 or 128";
     /// The output of a row is out of range or belongs to another row, too.
