@@ -282,7 +282,8 @@ pub(crate) fn import_onnx<'py>(
     #[pyo3(from_py_with = given)] rate_hz: Option<f64>,
 ) -> PyResult<(Policy, Bound<'py, PyDict>)> {
     let (imported, policy, probes, actions) = py.detach(|| {
-        let choice = Choice { output, states, observed: observe, ..Choice::default() };
+        let limits = stated(limits);
+        let choice = Choice { output, states, observed: observe, rate_hz, ..Choice::default() };
         let import = |choice: &Choice| {
             let imported = import_bytes(bytes.clone(), Path::new(""), &name, choice);
             let imported = imported.map_err(|error| raise_of_import(error.context(name.clone())))?;
@@ -292,9 +293,15 @@ pub(crate) fn import_onnx<'py>(
         let (imported, policy) = import(&choice)?;
         let probes = probes(&imported, &policy, &MAGNITUDES, FRAMES);
         let actions = actions(&policy, &probes);
-        let limited = Choice { limits: stated(limits), rate_hz, ..choice };
-        let (own, policy) = import(&limited)?;
-        PyResult::Ok((imported, Policy::new(policy, Some([own.json, own.weights])), probes, actions))
+        let (json, weights) = (imported.json.clone(), imported.weights.clone());
+        let (json, weights, policy) = match limits.is_empty() {
+            true => (json, weights, policy),
+            false => {
+                let (limited, policy) = import(&Choice { limits, ..choice })?;
+                (limited.json, limited.weights, policy)
+            }
+        };
+        PyResult::Ok((imported, Policy::new(policy, Some([json, weights])), probes, actions))
     })?;
     let plan = PyDict::new(py);
     plan.set_item("inputs", imported.inputs)?;

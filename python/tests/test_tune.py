@@ -51,17 +51,10 @@ def test_rollouts_record_what_the_policy_acted_on(mlp, mode):
     assert np.array_equal(observations[0], Reach().reset(seed=5)[0])
 
 
-class Long(Reach):
-    """Robots whose episodes take longer and longer."""
-
-    def __init__(self, length):
-        super().__init__(length)
-
-
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_every_robot_drives_as_many_whole_episodes(mlp, mode):
     image = actq.quantize(actq.import_policy(mlp), bits=8, method="rtn", progress=False)
-    env = SyncVectorEnv([lambda length=length: Long(length) for length in (5, 20, 40)], autoreset_mode=mode)
+    env = SyncVectorEnv([lambda length=length: Reach(length) for length in (5, 20, 40)], autoreset_mode=mode)
     shares = []
     driven = actq.rollout(actq.Head(image, 3), env, episodes=7, progress=lambda work, share: shares.append(share))
     assert sorted(episode.length for episode in driven.episodes) == [5, 5, 5, 20, 20, 40, 40]

@@ -46,9 +46,9 @@ impl Reading {
             "a bundle's targets have no largest step; its firmware takes LOW:HIGH:RATE"
         );
         let known: Vec<Vec<[f64; 2]>> = Plan::new(&self.description, bundle).context(DESCRIPTION)?.target_limits();
-        let kinds = self.description.targets.iter().map(|target| target.kind);
+        let has_one_kind = self.description.targets.windows(2).all(|pair| pair[0].kind == pair[1].kind);
         ensure!(
-            stated.low.len().max(stated.high.len()) > 1 || kinds.clone().all(|kind| Some(kind) == kinds.clone().next()),
+            stated.low.len().max(stated.high.len()) > 1 || has_one_kind,
             "the bundle has targets of several kinds; state limits for each of their values"
         );
         let mut limits = stated.within(&known.concat(), "the bundle")?.into_iter();

@@ -1,6 +1,7 @@
 //! The action contract from the end of a network: factors, offsets and limits after the last operation.
 
 use actq::import::contract::{Array, JsonContract};
+use actq::numbers::decimal;
 
 use crate::values::bounds::bounds;
 use crate::values::expr::{Expr, Exprs, Id};
@@ -74,7 +75,8 @@ pub(crate) fn bounded(
         }
     }
     if found > 0 {
-        [json.low, json.high] = [0, 1].map(|side| Some(limits.iter().map(|limits| decimal(limits[side])).collect()));
+        [json.low, json.high] =
+            [0, 1].map(|side| Some(limits.iter().map(|limits| Some(decimal(limits[side]))).collect()));
     }
     (Some(json).filter(|json| *json != JsonContract::default()), found)
 }
@@ -97,11 +99,6 @@ fn value(array: &Array, i: usize, none: f32) -> f32 {
     array.as_ref().and_then(|values| values[i]).map_or(none, |value| value as f32)
 }
 
-/// Returns the f64 of the f32's shortest decimal text.
-fn decimal(value: f32) -> Option<f64> {
-    format!("{value:?}").parse().ok()
-}
-
 impl ContractValues {
     /// Returns the contract, if it is the same for all actions of a chunk and finite in f32.
     fn json(&self, act_len: usize) -> Option<JsonContract> {
@@ -113,8 +110,8 @@ impl ContractValues {
             if first.iter().all(|v| *v == none) {
                 return Some(None);
             }
-            let one = |v: &f64| if *v == none { Some(unlimited) } else { decimal(*v as f32) };
-            let values: Vec<f64> = first.iter().map(one).collect::<Option<_>>()?;
+            let one = |v: &f64| if *v == none { unlimited } else { decimal(*v as f32) };
+            let values: Vec<f64> = first.iter().map(one).collect();
             values.iter().all(|v| (*v as f32).is_finite()).then(|| Some(values.into_iter().map(Some).collect()))
         };
         let most = f64::from(f32::MAX);

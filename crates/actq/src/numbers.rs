@@ -2,6 +2,11 @@
 
 use crate::error::{Result, ensure};
 
+/// Returns the f64 of an f32's shortest decimal text: the number that a user wrote.
+pub fn decimal(value: f32) -> f64 {
+    format!("{value:?}").parse().unwrap_or(f64::from(value))
+}
+
 /// Rounds a number to f32, and refuses values beyond its range.
 pub fn real(value: f64, name: &str) -> Result<f32> {
     let real = value as f32;

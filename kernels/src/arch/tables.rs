@@ -34,7 +34,7 @@ pub struct Tables<'w> {
 
 #[cfg(feature = "scalar")]
 impl<'w> Tables<'w> {
-    /// Splits a work area behind the `prepared` words of a vector.
+    /// Splits a work area after the `prepared` words of a vector.
     #[inline(always)]
     pub fn split(work: &'w mut [u32], prepared: usize) -> (&'w [u32], Self) {
         let (prepared, words) = work.split_at_mut(prepared.min(work.len()));
@@ -66,7 +66,7 @@ impl<'w> Tables<'w> {
 
 #[cfg(not(feature = "scalar"))]
 impl<'w> Tables<'w> {
-    /// Splits a work area behind the words of a vector.
+    /// Splits a work area after the words of a vector.
     #[inline(always)]
     pub fn split(work: &'w mut [u32], _: usize) -> (&'w [u32], Self) {
         (work, Self::default())

@@ -18,9 +18,6 @@ log = logging.getLogger("actq")
 #: Observations that a policy is compared with its model on.
 FRAMES = 100
 
-#: Mean, deviation and limit that observations of a key are normalized by.
-Normalizer = Tuple[Array, Array, float]
-
 
 class Model(NamedTuple):
     """A trained model as a module."""
@@ -49,15 +46,11 @@ def of(source: Any, name: str) -> Optional[Model]:
     """Returns a trained model as a module: an algorithm of Stable-Baselines3, a runner of rsl_rl, or an agent as
     CleanRL writes it. `None` for other objects."""
     with torch.no_grad():
-        if _is_of(source, "BaseAlgorithm", "stable_baselines3."):
+        if _sb3.is_of(source, "BaseAlgorithm", "stable_baselines3."):
             return _of_sb3(source, name)
-        if _is_of(source, "OnPolicyRunner", "rsl_rl.runners") or _is_of(source, "DistillationRunner", "rsl_rl.runners"):
+        if _sb3.is_of(source, "OnPolicyRunner", "rsl_rl.runners") or _sb3.is_of(source, "DistillationRunner", "rsl_rl.runners"):
             return _of_rsl_rl(source, name)
         return _of_clean_rl(source, name) if isinstance(source, torch.nn.Module) else None
-
-
-def _is_of(source: Any, name: str, package: str) -> bool:
-    return any(base.__name__ == name and base.__module__.startswith(package) for base in type(source).__mro__)
 
 
 def drawn(length: int) -> Array:
@@ -65,21 +58,24 @@ def drawn(length: int) -> Array:
 
 
 class Normalized(torch.nn.Module):
-    """A module behind the normalization of parts of its observation."""
+    """A module after the normalization of parts of its observation."""
 
-    def __init__(self, module: Any, lengths: List[int], normalizers: List[Optional[Normalizer]], device: Any) -> None:
+    mean: torch.Tensor
+    deviation: torch.Tensor
+
+    def __init__(self, module: Any, lengths: List[int], mean: Array, deviation: Array, clips: List[Optional[float]]) -> None:
         super().__init__()
-        self.module, self.lengths, self.clips = module, lengths, [by and by[2] for by in normalizers]
-        for i, by in enumerate(normalizers):
-            for key, values in zip(("mean", "deviation"), by[:2] if by else ()):
-                self.register_buffer(f"{key}_{i}", torch.from_numpy(values.astype(np.float32)).to(device))
+        self.module, self.lengths, self.clips = module, lengths, clips
+        for name, values in (("mean", mean), ("deviation", deviation)):
+            self.register_buffer(name, torch.from_numpy(values.astype(np.float32)).to(module.policy.device))
 
     def forward(self, obs: torch.Tensor) -> Any:
         parts, at = [], 0
-        for i, (length, clip) in enumerate(zip(self.lengths, self.clips)):
-            part = obs[:, at : at + length]
+        for length, clip in zip(self.lengths, self.clips):
+            own = slice(at, at + length)
+            part = obs[:, own]
             if clip is not None:
-                part = torch.clamp((part - getattr(self, f"mean_{i}")) / getattr(self, f"deviation_{i}"), -clip, clip)
+                part = torch.clamp((part - self.mean[own]) / self.deviation[own], -clip, clip)
             parts.append(part)
             at += length
         return self.module(torch.cat(parts, dim=1) if len(parts) > 1 else parts[0])
@@ -89,9 +85,6 @@ def _of_sb3(model: Any, name: str) -> Model:
     """The deterministic action of an algorithm, with what its VecNormalize does to observations."""
     policy = copied(model.policy, name)
     step = _sb3.Deterministic(policy, name)
-    is_dict = isinstance(step.parts, list)
-    keys: List[Tuple[str, Tuple[int, ...]]] = step.parts if isinstance(step.parts, list) else [("", step.parts)]
-    lengths = [int(np.prod(shape)) for _, shape in keys]
     if model.get_env() is None:
         log.warning(
             "%s: the model has no environment; if it was trained with VecNormalize, load it with env=VecNormalize.load(..)", name
@@ -101,27 +94,28 @@ def _of_sb3(model: Any, name: str) -> Model:
     stacked = _stacked_frames(model.get_env())
     # Frames that are normalized one by one, before they are stacked.
     times = stacked if vec is not None and vec.observation_space.shape != model.observation_space.shape else 1
-    if vec is not None and stacked > 1 and (is_dict or len(step.parts) > 1):
+    if vec is not None and stacked > 1 and (step.is_dict or len(step.parts[""]) > 1):
         raise Error(f"{name}: only stacked frames of one axis are imported with VecNormalize; pass a module that normalizes them")
-    normalizers: List[Optional[Normalizer]] = [None] * len(keys)
-    for i, (key, _) in enumerate(keys):
-        if vec is not None and (not is_dict or key in vec.norm_obs_keys):
-            statistics = vec.obs_rms[key] if is_dict else vec.obs_rms
-            deviation = np.sqrt(statistics.var + vec.epsilon)
-            mean, deviation = (np.tile(of.reshape(-1), times) for of in (statistics.mean, deviation))
-            if mean.size != lengths[i]:
-                raise Error(f"{name}: VecNormalize has {statistics.mean.size} values for the observation's {lengths[i]}")
-            normalizers[i] = (mean, deviation, float(vec.clip_obs))
-    observations, at = drawn(sum(lengths)), 0
-    for length, normalizer in zip(lengths, normalizers):
-        if normalizer is not None:
-            part = observations[:, at : at + length]
-            part[:] = normalizer[0] + normalizer[1] * part
-        at += length
+    means: List[Array] = []
+    deviations: List[Array] = []
+    clips: List[Optional[float]] = []
+    for key, length in zip(step.parts, step.lengths):
+        mean, deviation, clip = np.zeros(length), np.ones(length), None
+        if vec is not None and (not step.is_dict or key in vec.norm_obs_keys):
+            statistics, clip = vec.obs_rms[key] if step.is_dict else vec.obs_rms, float(vec.clip_obs)
+            both = (statistics.mean, np.sqrt(statistics.var + vec.epsilon))
+            mean, deviation = (np.tile(values.reshape(-1), times) for values in both)
+            if mean.size != length:
+                raise Error(f"{name}: VecNormalize has {statistics.mean.size} values for the observation's {length}")
+        means.append(mean)
+        deviations.append(deviation)
+        clips.append(clip)
+    mean, deviation = np.concatenate(means), np.concatenate(deviations)
+    observations = (mean + deviation * drawn(mean.size)).astype(np.float32)
     if stacked > 1:
         log.warning("%s: an observation is the last %d frames, the oldest first; the application keeps them", name, stacked)
 
-    module: Any = Normalized(step, lengths, normalizers, policy.device) if any(normalizers) else step
+    module: Any = step if vec is None else Normalized(step, step.lengths, mean, deviation, clips)
 
     def predict(rows: Array) -> Array:
         given = step.observation(rows)
@@ -137,7 +131,7 @@ def _of_sb3(model: Any, name: str) -> Model:
             return np.asarray(step(torch.from_numpy(flat).to(policy.device)).detach().cpu().numpy())
         return np.asarray(model.predict(given, deterministic=True)[0], np.float32).reshape(len(rows), -1)
 
-    return Model(module, (torch.zeros(1, sum(lengths)),), None, None, observations, predict)
+    return Model(module, (torch.zeros(1, mean.size),), None, None, observations, predict)
 
 
 def _stacked_frames(env: Any) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, Tuple, Union
+from typing import Any, Dict, Tuple
 
 import numpy as np
 import torch
@@ -13,8 +13,12 @@ from ._typing import Array, Limits
 
 def is_policy(module: Any) -> bool:
     """Returns `True` for policies and actors, also those of projects on top of Stable-Baselines3."""
-    classes = type(module).__mro__
-    return any(base.__name__ == "BasePolicy" and base.__module__.startswith("stable_baselines3.") for base in classes)
+    return is_of(module, "BasePolicy", "stable_baselines3.")
+
+
+def is_of(source: Any, name: str, package: str) -> bool:
+    """Returns `True` for objects of a class of this name of a package, or of one that is based on it."""
+    return any(base.__name__ == name and base.__module__.startswith(package) for base in type(source).__mro__)
 
 
 class Deterministic(torch.nn.Module):
@@ -28,6 +32,8 @@ class Deterministic(torch.nn.Module):
         super().__init__()
         self.policy = policy
         self.parts = parts(policy.observation_space, name)
+        self.lengths = [int(np.prod(shape)) for shape in self.parts.values()]
+        self.is_dict = hasattr(policy.observation_space, "spaces")
         space = policy.action_space
         self.kind = type(space).__name__
         has_actor = all(hasattr(policy, part) for part in ("mlp_extractor", "action_net", "pi_features_extractor"))
@@ -36,7 +42,7 @@ class Deterministic(torch.nn.Module):
             raise Error(f"{name}: the policy is recurrent; pass a module of its actor that takes and returns its states")
         if self.kind not in ("Box", "Discrete") or self.kind == "Discrete" and not has_scores:
             raise Error(f"{name}: the actions are {space}; pass a module of the policy's actor that returns its scores")
-        if self.kind == "Box":
+        if self.kind == "Box" and policy.squash_output:
             for side in ("low", "high"):
                 values = torch.from_numpy(getattr(space, side).astype(np.float32)).to(policy.device)
                 self.register_buffer(side, values, persistent=False)
@@ -64,28 +70,22 @@ class Deterministic(torch.nn.Module):
 
     def observation(self, given: Any) -> Any:
         """Returns what the policy takes of flat values, an array or a tensor: of a Dict, those of each key."""
-        if not isinstance(self.parts, list):
-            return given.reshape(-1, *self.parts)
-        lengths = [int(np.prod(shape)) for _, shape in self.parts]
-        ends = np.cumsum(lengths).tolist()
-        return {
+        ends = np.cumsum(self.lengths).tolist()
+        parts = {
             key: given[:, end - length : end].reshape(-1, *shape)
-            for (key, shape), length, end in zip(self.parts, lengths, ends)
+            for (key, shape), length, end in zip(self.parts.items(), self.lengths, ends)
         }
+        return parts if self.is_dict else parts[""]
 
 
-#: The shape of an observation; of a Dict the keys with their shapes, in the order of the space.
-Parts = Union[Tuple[int, ...], List[Tuple[str, Tuple[int, ...]]]]
-
-
-def parts(space: Any, name: str) -> Parts:
-    """Returns the parts of an observation. Only numbers can be observed."""
+def parts(space: Any, name: str) -> Dict[str, Tuple[int, ...]]:
+    """Returns the shapes of an observation's parts by key, in the order of the space; without a Dict, the key is empty. Only
+    numbers can be observed."""
     spaces: Dict[str, Any] = getattr(space, "spaces", {"": space})
     for key, part in spaces.items():
         if type(part).__name__ != "Box":
             raise Error(f"{name}: the observation {key} is {part}; only numbers of a Box, or a Dict of them, can be observed")
-    shapes = {key: tuple(int(n) for n in part.shape) for key, part in spaces.items()}
-    return list(shapes.items()) if hasattr(space, "spaces") else shapes[""]
+    return {key: tuple(int(n) for n in part.shape) for key, part in spaces.items()}
 
 
 def limited(module: Any, limits: Limits, name: str) -> Limits:
@@ -95,11 +95,10 @@ def limited(module: Any, limits: Limits, name: str) -> Limits:
             raise Error(f"{name}: the actions are scores, of which the largest is chosen; they take no low, high and max_step")
         if isinstance(part, Deterministic) and part.limits()[0].size:
             low, high = part.limits()
-            stated = [(limits[0], low, np.maximum), (limits[1], high, np.minimum)]
-            for given, own, _ in stated:
-                if len(given) > 1 and len(given) != own.size:
-                    raise Error(f"{name}: {len(given)} limits for {own.size} actions; give one for each, or one for all")
-            lowest, highest = (stricter(given, own) if given else own for given, own, stricter in stated)
+            for given in limits[:2]:
+                if len(given) > 1 and len(given) != low.size:
+                    raise Error(f"{name}: {len(given)} limits for {low.size} actions; give one for each, or one for all")
+            lowest, highest = np.maximum(low, limits[0] or -np.inf), np.minimum(high, limits[1] or np.inf)
             if (lowest > highest).any():
                 i = int((lowest > highest).argmax())
                 raise Error(f"{name}: no value of action {i} is within your limits and those of the action space, {low[i]} to {high[i]}")

@@ -8,6 +8,7 @@ use actq::emit::Core;
 use actq::error::ensure;
 use actq::import::contract::StatedLimits;
 use actq::methods::{Effort, MAX_MINUTES};
+use actq::numbers::decimal;
 use actq::units;
 use actq_controller::Limits;
 use actq_kernels::Width;
@@ -56,11 +57,6 @@ impl LimitList {
         let max_step = if has_rate { self.0.iter().map(step).collect() } else { Vec::new() };
         Ok(StatedLimits { low: of(|limits| limits.low), high: of(|limits| limits.high), max_step })
     }
-}
-
-/// Returns the number that a user wrote.
-fn decimal(value: f32) -> f64 {
-    format!("{value:?}").parse().unwrap_or(f64::from(value))
 }
 
 /// Parses limits for all actions, or reads a file with a line for each.

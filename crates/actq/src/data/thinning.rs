@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn rare_frames_are_kept() {
-        // A robot that stands still, and stumbles once in the second file.
+        // A robot that does not move, and stumbles once in the second file.
         let standing: Vec<f32> = (0..1000).map(|i| 1e-3 * (i % 7) as f32).collect();
         let mut stumbles = standing.clone();
         stumbles[700] = 4.0;

@@ -144,7 +144,7 @@ impl Repacked {
     fn image(self, image: &Image<'_>, old: &[u32]) -> Result<Vec<u32>> {
         let old_records = old[h::W_MATRICES] as usize;
         let after = old_records + h::MATRIX_WORDS * image.matrices().count();
-        // What follows the matrices moves by this much.
+        // The sections after the matrices move by this much.
         let moved = (self.words.len() as u32).wrapping_sub(after as u32);
         let mut words = self.words;
         words[..h::WORDS].copy_from_slice(&old[..h::WORDS]);

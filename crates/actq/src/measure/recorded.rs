@@ -40,7 +40,7 @@ pub struct Difference {
     pub recording: String,
     /// Mean over the actions of (mean squared difference / variance of the policy's actions).
     pub nmse: f64,
-    /// What the recorded actions are, human-readable; empty if nothing explains them.
+    /// Explanations of the recorded actions, human-readable; empty if there is none.
     pub causes: Vec<String>,
     /// Part that remains unexplained, as a share of the recorded variance.
     pub rest: f64,

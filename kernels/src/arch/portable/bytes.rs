@@ -83,7 +83,7 @@ fn two_columns(pair: u32) -> TwoColumns {
     [even, odd, start, start.wrapping_add(start << 8)]
 }
 
-/// Separates the sums of pairs of rows, of so many pairs of columns.
+/// Separates the sums of pairs of rows over `pairs` pairs of columns.
 fn separate(rows: &mut [i32], pairs: usize) {
     let biases = (pairs as i32).wrapping_mul(0x8000);
     for [even, odd] in rows.as_chunks_mut().0 {

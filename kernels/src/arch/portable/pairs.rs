@@ -98,7 +98,7 @@ impl Row<'_> {
     }
 }
 
-/// What is in the sums of all rows.
+/// Terms that the sums of all rows contain.
 #[derive(Clone, Copy, Default)]
 struct Fixed {
     /// Biases of the low halves.

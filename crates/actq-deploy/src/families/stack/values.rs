@@ -14,7 +14,7 @@ pub(super) struct Values<'a> {
     pub(super) facts: &'a mut Facts,
 }
 
-/// What keys must be.
+/// Texts that say which values a key may have.
 pub(super) const ONE: &str = "a finite number";
 pub(super) const SEVERAL: &str = "finite numbers";
 
@@ -106,7 +106,7 @@ impl Values<'_> {
         })
     }
 
-    /// Refuses a missing key that no rule stands for; the error names `what` it must be.
+    /// Refuses a missing key without a rule; the error says by `what` which value it must have.
     pub(super) fn require(&self, source: &Source, term: &str, what: &str) -> Result<()> {
         if let Source::Key(key) | Source::Of(Given { key: Some(key), rule: None }) = source {
             let path = self.path(key, term)?;
