@@ -171,6 +171,16 @@ fn lanes(cell: &str) -> Lanes {
     }
 }
 
+/// The entries of a diagram's line, from bit 31 down: `-` is none, `7..0` a falling run, `3*8` eight times 3.
+fn entries(line: &str) -> Vec<Option<usize>> {
+    let several = |entry: &str| match (entry.split_once(".."), entry.split_once('*')) {
+        (Some((first, last)), _) => (number(last)..=number(first)).rev().map(Some).collect(),
+        (_, Some((value, times))) => vec![Some(number(value)); number(times)],
+        _ => vec![(entry != "-").then(|| number(entry))],
+    };
+    line.split_whitespace().flat_map(several).collect()
+}
+
 /// The position of a code's bit in a cell: a bit of a word, possibly the exclusive or with another one, possibly
 /// inverted.
 struct Place {
@@ -207,10 +217,9 @@ impl Documented {
         let (width, lanes) = (width(row[1]), lanes(row[0]));
         let mark = if lanes == Lanes::Single { "" } else { row[0] };
         let lines = fenced(document, &format!("bits{}{mark}", width.bits()));
-        // The entries of a line, from bit 31 down; lines of one label follow each other word by word.
+        // Lines of one label follow each other word by word.
         let entries = |label: &str| -> Vec<Vec<Option<usize>>> {
-            let entry = |e: &str| (e != "-").then(|| number(e));
-            lines.iter().filter_map(|l| Some(l.strip_prefix(label)?.split_whitespace().map(entry).collect())).collect()
+            lines.iter().filter_map(|l| l.strip_prefix(label).map(entries)).collect()
         };
         let of = |lines: &Vec<Vec<Option<usize>>>, word: usize, i: usize| lines.get(word).and_then(|l| l[i]);
         let [bits, rows, columns, code_bits, inverted, xor_words, xor_bits] =
@@ -218,9 +227,9 @@ impl Documented {
         let [strip, cell_rows, cell_cols, cell_words, pad, group_pad] = [2, 3, 4, 5, 6, 7].map(|i| number(row[i]));
         let code = || (0..width.bits()).map(|_| None).collect::<Vec<_>>();
         let mut places: Vec<Vec<_>> = (0..cell_rows).map(|_| (0..cell_cols).map(|_| code()).collect()).collect();
+        assert_eq!(bits, [(0..32).rev().map(Some).collect::<Vec<_>>()]);
         assert_eq!((columns.len(), code_bits.len()), (cell_words, cell_words));
         for word in 0..cell_words {
-            assert_eq!(bits[word], (0..32).rev().map(Some).collect::<Vec<_>>());
             assert_eq!((columns[word].len(), code_bits[word].len()), (32, 32));
             for i in 0..32 {
                 let xor = of(&xor_words, word, i).zip(of(&xor_bits, word, i));
