@@ -1,6 +1,6 @@
 //! The commands for users and CI: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`,
 //! `cargo xtask fit`, `cargo xtask peers`, `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`,
-//! `cargo xtask capi`, `cargo xtask python`, `cargo xtask doctor`.
+//! `cargo xtask capi`, `cargo xtask python`, `cargo xtask wasm`, `cargo xtask doctor`.
 //!
 //! This crate has few dependencies, so that it builds fast and prints soon. The binaries of `actq-bench` and
 //! `actq-research` measure.
@@ -11,6 +11,7 @@ mod limits;
 mod python;
 mod setup;
 mod verify;
+mod wasm;
 
 use std::process::ExitCode;
 
@@ -50,6 +51,8 @@ enum Command {
     /// Runs its tests and checks its types. Needs Python 3.9 or later with venv: python3, or the interpreter that ACTQ_PYTHON
     /// names.
     Python(python::Options),
+    /// Compile the kernels to the WebAssembly module of the report and of the npm package
+    Wasm(wasm::Options),
     /// Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show cost and success
     #[command(disable_help_flag = true)]
     Demo(Words),
@@ -92,9 +95,10 @@ struct Words {
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Verify { all } => verify::run(all),
-        Command::Doctor => setup::ensure(&Target::ALL).map(|()| println!("nothing is missing")),
+        Command::Doctor => setup::doctor(),
         Command::Firmware(options) => options.run(),
         Command::Python(options) => python::test(options),
+        Command::Wasm(options) => wasm::run(&options),
         Command::Compare(options) => measuring("actq-research", "compare", options),
         Command::Capi(options) => measure_for(Target::ALL.iter().copied(), "capi", options),
         Command::Stack(options) => measure_for(firmware::boards().map(|(target, _)| target), "stack", options),

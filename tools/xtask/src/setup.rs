@@ -28,6 +28,35 @@ pub(crate) fn ensure(targets: &[Target]) -> Result<()> {
     Ok(())
 }
 
+/// Installs the requirements of all commands, and names those that only some tests need.
+pub(crate) fn doctor() -> Result<()> {
+    ensure(&Target::ALL)?;
+    rust_target(crate::wasm::TARGET)?;
+    let optional = [node().map_err(|why| format!("tests of the npm package: {why}")), browser().map(drop)];
+    let missing: Vec<String> = optional.into_iter().filter_map(Result::err).collect();
+    missing.iter().for_each(|why| println!("missing: {why}"));
+    if missing.is_empty() {
+        println!("nothing is missing");
+    }
+    Ok(())
+}
+
+/// Checks for a Node that runs the npm package; an error names what to install.
+pub(crate) fn node() -> Result<(), String> {
+    let missing = || "Node 20 or later is missing; install nodejs".to_owned();
+    let version = output("node", &["--version"]).map_err(|_| missing())?;
+    let major = version.trim().trim_start_matches('v').split('.').next().and_then(|major| major.parse::<u32>().ok());
+    if major.is_some_and(|major| major >= 20) { Ok(()) } else { Err(missing()) }
+}
+
+/// Returns the driver of a Chromium; an error names what to install.
+pub(crate) fn browser() -> Result<&'static str, String> {
+    let found = output("chromedriver", &["--version"]).and_then(|_| output("chromium", &["--version"]));
+    found.map(|_| "chromedriver").map_err(|_| {
+        "tests in a browser: Chromium is missing; on Debian, install chromium and chromium-driver".to_owned()
+    })
+}
+
 /// Installs cargo's tools that a toolchain may lack.
 pub(crate) fn components() -> Result<()> {
     for (component, subcommand) in [("rustfmt", "fmt"), ("clippy", "clippy")] {

@@ -181,7 +181,8 @@ mod tests {
     fn the_short_run_is_part_of_all() {
         let names = |steps: Vec<Step>| steps.into_iter().map(|step| step.name).collect::<Vec<_>>();
         let short = names(steps::short());
-        let all = names(steps::all(Installed { oldest: Ok(()), narrow: Err("not here".to_owned()), python: Ok(()) }));
+        let narrow = Err("not here".to_owned());
+        let all = names(steps::all(Installed { oldest: Ok(()), narrow, python: Ok(()), wasm: Ok(()) }));
         assert!(short.iter().all(|name| all.contains(name)), "{short:?}");
         assert!(all.len() > short.len());
     }

@@ -5,7 +5,7 @@ use std::process::Command;
 use actq_boards::{Target, root};
 
 use crate::setup::cargo;
-use crate::{PROFILE, firmware, python, setup};
+use crate::{PROFILE, firmware, python, setup, wasm};
 
 /// The oldest supported compiler.
 const OLDEST: &str = concat!(env!("CARGO_PKG_RUST_VERSION"), ".0");
@@ -46,6 +46,8 @@ pub(super) struct Installed {
     pub(super) narrow: Result<(), String>,
     /// Python, for its package.
     pub(super) python: Result<(), String>,
+    /// The target of browsers and Node.
+    pub(super) wasm: Result<(), String>,
 }
 
 impl Installed {
@@ -55,7 +57,8 @@ impl Installed {
             true => setup::rust_target(TARGET_32_BIT).map_err(|error| format!("{error:#}")),
             false => Err(format!("this machine does not run {TARGET_32_BIT}")),
         };
-        Self { oldest: setup::toolchain(OLDEST), narrow, python: python::interpreter().map(drop) }
+        let wasm = setup::rust_target(wasm::TARGET).map_err(|error| format!("{error:#}"));
+        Self { oldest: setup::toolchain(OLDEST), narrow, python: python::interpreter().map(drop), wasm }
     }
 }
 
@@ -84,6 +87,10 @@ pub(super) fn all(installed: Installed) -> Vec<Step> {
     steps.add("crates to publish", &publish);
     let python = ["run", "--profile", PROFILE, "--package", "xtask", "--", "python"];
     steps.add_if(installed.python, "Python package", cargo(), &python);
+    let wasm = ["clippy", "--package", "actq-wasm", "--target", wasm::TARGET, "--profile", "wasm"];
+    steps.add_if(installed.wasm.clone(), "lints of the WebAssembly module", cargo(), &[&wasm[..], &DENY].concat());
+    let wasm = ["run", "--profile", PROFILE, "--package", "xtask", "--", "wasm", "--check"];
+    steps.add_if(installed.wasm, "WebAssembly module", cargo(), &wasm);
     let kernels =
         ["test", "--profile", PROFILE, "--package", "actq-kernels", "--features", "writer", "--target", TARGET_32_BIT];
     steps.add_if(installed.narrow, "kernels' tests with words of 32 bits", cargo(), &kernels);
