@@ -173,10 +173,11 @@ fn lanes(cell: &str) -> Lanes {
 
 /// The entries of a diagram's line, from bit 31 down: `-` is none, `7..0` a falling run, `3*8` eight times 3.
 fn entries(line: &str) -> Vec<Option<usize>> {
+    let one = |entry: &str| (entry != "-").then(|| number(entry));
     let several = |entry: &str| match (entry.split_once(".."), entry.split_once('*')) {
         (Some((first, last)), _) => (number(last)..=number(first)).rev().map(Some).collect(),
-        (_, Some((value, times))) => vec![Some(number(value)); number(times)],
-        _ => vec![(entry != "-").then(|| number(entry))],
+        (_, Some((entry, times))) => vec![one(entry); number(times)],
+        _ => vec![one(entry)],
     };
     line.split_whitespace().flat_map(several).collect()
 }
