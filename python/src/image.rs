@@ -6,7 +6,7 @@ use actq::measure::size::{bits_per_weight, hex};
 use actq::measure::time::{CLOCK, StepTime};
 use actq::runtime::ImageBuffer;
 use actq_boards::Target;
-use actq_cli::commands::export_c;
+use actq_cli::commands::{export_c, report};
 use actq_cli::outputs::files::{refuse_foreign, write};
 use actq_cli::report::{inspect, time};
 use actq_kernels::PortKind;
@@ -19,6 +19,7 @@ use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 
 use crate::error::{OrRaise as _, error, given};
+use crate::policy::Policy;
 
 /// A port: kind, name, names of its values, and their number.
 type Port = (&'static str, String, Vec<String>, usize);
@@ -160,6 +161,20 @@ impl Image {
         let image = self.image()?;
         let time = time::report(&image, &StepTime::new(&image, positive("clock", clock)?));
         py.import("actq._report")?.getattr("Report")?.call1((format!("{}\n{time}", inspect::report(&image)),))
+    }
+
+    /// Makes the page of `actq report`. `policy` is the one that the image was made from; `recordings` are files.
+    #[pyo3(signature = (policy = None, *, recordings = Vec::new()))]
+    fn report<'py>(
+        &self,
+        py: Python<'py>,
+        policy: Option<Bound<'py, Policy>>,
+        #[pyo3(from_py_with = given)] recordings: Vec<PathBuf>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let policy = policy.map(|policy| policy.get().policy.clone());
+        let page =
+            py.detach(|| report::of_image(&self.buffer, &self.name, policy.as_deref(), &recordings)).or_raise()?;
+        py.import("actq._report")?.getattr("Page")?.call1((page,))
     }
 
     /// Predicts the cost of a step on a board, as a dict.

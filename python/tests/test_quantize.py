@@ -103,6 +103,13 @@ def test_an_image_survives_its_file(image, tmp_path):
     assert image.bits_per_weight < 3.01 and image.rate_hz == 50.0
 
 
+def test_a_report_is_a_page_with_the_image(image, tmp_path):
+    page = image.report()
+    assert page.startswith("<!doctype html>") and "<h2" not in page and 'srcdoc="&lt;!doctype' in page._repr_html_()
+    page.save(tmp_path / "i.html")
+    assert (tmp_path / "i.html").read_text(encoding="utf-8") == page
+
+
 def test_reports_are_those_of_the_command(command, image, tmp_path):
     image.save(tmp_path / "i.actq")
     assert image.inspect() == command("inspect", tmp_path / "i.actq").decode()

@@ -11,7 +11,7 @@ mod values;
 use clap::{Parser, Subcommand};
 
 pub(crate) use deploy::{CheckArgs, DeployArgs, ImportArgs, ReadingArgs};
-pub(crate) use image::{ConstantsArgs, EvalArgs, ExportCArgs, InspectArgs, RepackArgs, ServeArgs};
+pub(crate) use image::{ConstantsArgs, EvalArgs, ExportCArgs, InspectArgs, RepackArgs, ReportArgs, ServeArgs};
 use jobs::{JobArgs, MergeArgs, PlanArgs};
 use link::{KeygenArgs, LinkArgs, SignArgs};
 pub use quantize::QuantizeArgs;
@@ -31,6 +31,7 @@ Make an image:
 Check it:
   inspect    Show an image: operations, matrices, bits, memory, predicted time, action contract
   eval       Compare an image's actions with the f32 policy's on held-out observations
+  report     Write an image's report as a web page, in which the image runs
   check      Compare an image of a deploy bundle with a run of the deploy code
   serve      Run an image as a policy over standard input and output
 
@@ -110,6 +111,14 @@ pub(crate) enum Command {
     ///
     /// Example: actq inspect ur3.actq --widths --stats ur3.json --svg ur3.svg
     Inspect(InspectArgs),
+    /// Write an image's report as a web page, in which the image runs
+    ///
+    /// The file needs no network: pictures of the network and of the flash, errors by layer and by action, and the image
+    /// itself, compiled to WebAssembly, with a slider for each value of the observation. --policy adds the f32 policy beside
+    /// it. For an image of a deploy bundle, --recordings are files with an array [tick, value] for each raw input.
+    ///
+    /// Example: actq report ur3.actq --policy policies/ur3 --stats ur3.json --out ur3.html
+    Report(ReportArgs),
     /// Convert an image to the layouts of another core: the same weights, the same actions
     ///
     /// Cores with the DSP extension (m4, m4f, m7, m33, m55) and without it (m0, m3, rv32imac, rv32zb) have layouts of

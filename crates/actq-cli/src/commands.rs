@@ -14,6 +14,7 @@ pub mod jobs;
 pub(crate) mod link;
 pub mod quantize;
 pub(crate) mod repack;
+pub mod report;
 pub(crate) mod serve;
 pub(crate) mod sign;
 pub mod sweep;

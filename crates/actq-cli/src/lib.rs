@@ -71,6 +71,7 @@ fn run_command(command: &Command) -> Result<()> {
             quantize::run(args, method.map(MethodArg::method).transpose()?, |_, _| String::new())
         }
         Command::Inspect(args) => inspect::run(args),
+        Command::Report(args) => commands::report::run(args),
         Command::Repack(args) => commands::repack::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Check(args) => commands::check::run(args),

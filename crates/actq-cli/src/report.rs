@@ -10,6 +10,7 @@ pub mod learned;
 pub mod memory;
 pub mod merged;
 pub mod notes;
+pub mod page;
 pub mod plot;
 pub mod progress;
 pub mod quantized;

@@ -175,6 +175,22 @@ impl Store {
         Results { store: self, whole, damaged }
     }
 
+    /// Reads all results, without the files beside them, in the order of their addresses.
+    ///
+    /// # Errors
+    ///
+    /// If the folder cannot be read, or a result is damaged.
+    pub fn all(&self) -> Result<Vec<Outcome>, JobError> {
+        let name = self.folder.display();
+        let entries = fs::read_dir(&self.folder)
+            .map_err(|error| JobError::again(error).context(format!("{name}: cannot read the folder")))?;
+        let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+        let addresses = names.filter_map(|name| name.strip_suffix(".json").map(str::to_owned));
+        let mut addresses: Vec<String> = addresses.filter(|address| is_digest(address)).collect();
+        addresses.sort();
+        addresses.iter().map(|address| self.read(address)).collect()
+    }
+
     /// Reads the result of a job, and checks the file beside it.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import final
 
-from ._report import Report
+from ._report import Page, Report
 
 _Path = Union[str, os.PathLike[str]]
 _Report = Optional[Callable[[str, float], object]]
@@ -90,6 +90,12 @@ class Image:
         """
     def inspect(self, *, clock: float = 168e6) -> Report:
         """Returns the report of `actq inspect`: operations, bits, memory, contract, time at `clock` in Hz."""
+    def report(self, policy: Optional[Policy] = None, *, recordings: Sequence[_Path] = ()) -> Page:
+        """Returns the page of `actq report`, in which the image runs; a notebook shows it.
+
+        With the `policy` that the image was made from, it compares both on `recordings`, files of observations, or on the
+        recording in the policy's folder. Raises `actq.Error` if one of them does not match the image.
+        """
     def cost(self, board: str = "stm32f405", *, clock: float = 168e6) -> Cost:
         """Predicts the cost of a step on a board at `clock` in Hz.
 

@@ -65,6 +65,37 @@ pub(crate) struct EvalArgs {
 }
 
 #[derive(clap::Args)]
+pub(crate) struct ReportArgs {
+    /// The image
+    pub(crate) image: PathBuf,
+    /// The policy that the image was made from: a folder, or an ONNX file
+    #[arg(long, value_name = "POLICY_DIR")]
+    pub(crate) policy: Option<PathBuf>,
+    /// Recordings of observations, or a folder of them [default: the held-out recording in POLICY_DIR, or else its calibration
+    /// recording]
+    #[arg(long, value_name = "FILE|DIR", num_args = 1..)]
+    pub(crate) recordings: Vec<PathBuf>,
+    /// A recording of this image's own rollout, by actq serve --record, or a folder of them; may be repeated
+    #[arg(long, value_name = "FILE|DIR")]
+    pub(crate) driven: Vec<PathBuf>,
+    /// The statistics that --save-stats wrote with this image: adds removed rows, names, and how the image was made
+    #[arg(long, value_name = "FILE")]
+    pub(crate) stats: Option<PathBuf>,
+    /// The results of a sweep of the policy: adds its frontier, and the image's success
+    #[arg(long, value_name = "DIR")]
+    pub(crate) store: Option<PathBuf>,
+    /// The processor's clock, in Hz or as 168M
+    #[arg(long, value_name = "HZ", default_value = "168M", value_parser = clock)]
+    pub(crate) clock: f64,
+    /// The file to write
+    #[arg(long, value_name = "FILE.html")]
+    pub(crate) out: PathBuf,
+    /// Show no progress
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(clap::Args)]
 pub(crate) struct ServeArgs {
     /// The image
     pub(crate) image: PathBuf,

@@ -13,6 +13,10 @@ use actq_kernels::{Image, PortKind};
 use super::memory::{Peak, peak};
 use super::table::{group_name, table};
 
+/// Names of the action contract's arrays, in the image's order.
+pub(super) const CONTRACT: [&str; 10] =
+    ["scale", "offset", "low", "high", "max step", "smoothing", "on from", "off to", "on is", "off is"];
+
 /// Formats the widths of a matrix's rows: `3`, or `2x200 4x56` if they differ.
 pub fn widths(matrix: &Matrix<'_>) -> String {
     let blocks: Vec<_> = matrix.blocks().map(|rows| rows.block.shape()).collect();
@@ -23,11 +27,9 @@ pub fn widths(matrix: &Matrix<'_>) -> String {
     }
 }
 
-/// Formats the report that `actq inspect` prints.
-pub fn report(image: &Image<'_>) -> String {
-    let mut text = String::new();
-    let digest = hex(&image.digest());
-    let kind = match image.kind() {
+/// Formats the meaning of the network's output.
+pub(super) fn kind(image: &Image<'_>) -> String {
+    match image.kind() {
         Kind::Step => "step".to_owned(),
         Kind::Chunk => format!("chunk of {}, {} executed", image.chunk(), image.execute()),
         Kind::Flow | Kind::Diffusion => {
@@ -36,7 +38,14 @@ pub fn report(image: &Image<'_>) -> String {
             format!("{kind} in {}, chunk of {chunk}, {execute} executed", count(steps, "step"))
         }
         kind => format!("{kind:?}"),
-    };
+    }
+}
+
+/// Formats the report that `actq inspect` prints.
+pub fn report(image: &Image<'_>) -> String {
+    let mut text = String::new();
+    let digest = hex(&image.digest());
+    let kind = kind(image);
     let (obs, act) = (count(image.obs_len(), "observation"), count(image.act_len(), "action"));
     // An image does not say whether its policy stated the rate.
     let is_default = image.rate_hz() == DEFAULT_RATE_HZ;
@@ -89,8 +98,7 @@ pub fn report(image: &Image<'_>) -> String {
     let contract = image.contract_arrays();
     // Columns after the first five appear only if the contract has them.
     const ALWAYS: usize = 5;
-    let names = ["scale", "offset", "low", "high", "max step", "smoothing", "on from", "off to", "on is", "off is"];
-    let columns: Vec<_> = names
+    let columns: Vec<_> = CONTRACT
         .into_iter()
         .zip(contract)
         .enumerate()
@@ -108,7 +116,7 @@ pub fn report(image: &Image<'_>) -> String {
 }
 
 /// Lists the settings of chunk playback that the image has.
-fn playback(image: &Image<'_>) -> Vec<String> {
+pub(super) fn playback(image: &Image<'_>) -> Vec<String> {
     let mut settings = Vec::new();
     if image.horizon() > 0 {
         settings.push(format!("average of {}", count(image.horizon(), "chunk")));
@@ -122,7 +130,8 @@ fn playback(image: &Image<'_>) -> Vec<String> {
     settings
 }
 
-fn row(op: &Op<'_>) -> Vec<String> {
+/// Formats the cells of an operation: name, output, input, detail, and those of its matrix.
+pub(super) fn row(op: &Op<'_>) -> Vec<String> {
     let region = |r: Region| if r.len > 0 { format!("{}+{}", r.offset, r.len) } else { String::new() };
     let matrix = op.matrix();
     let detail = match (op.kind, &matrix) {

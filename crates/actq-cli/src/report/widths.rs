@@ -114,6 +114,16 @@ impl Widths {
         Ok(Self { policy: printable(image.name()).into_owned(), layers, trained: stats.is_some() })
     }
 
+    /// Returns name and shape of a matrix, the bits of its rows, a digit each, and with statistics its share of the
+    /// predicted error of all.
+    pub(super) fn layer(&self, i: usize) -> (String, [usize; 2], String, Option<f64>) {
+        let expected = |layer: &Layer| -> f64 { layer.rows.iter().filter_map(|r| r.reasons).map(|r| r.expected).sum() };
+        let all: f64 = self.layers.iter().map(expected).sum();
+        let Layer { name, shape, rows, .. } = &self.layers[i];
+        let digits = rows.iter().filter_map(|row| char::from_digit(bits(row.width), 10)).collect();
+        (name.clone(), [shape.0, shape.1], digits, (all > 0.0).then(|| expected(&self.layers[i]) / all))
+    }
+
     /// Formats the table and the strips.
     pub fn report(&self) -> String {
         let mut text = format!("{}\n\n", self.table());

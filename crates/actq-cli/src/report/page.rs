@@ -1,0 +1,161 @@
+//! The report as a page: one HTML file without a network, in which the image runs.
+//!
+//! The data is one JSON object ([`Page`]) in the file; `page/page.js` draws it.
+
+pub mod facts;
+pub mod parts;
+pub mod runs;
+
+use std::io::Write as _;
+
+use actq_jobs::merged::MergedPolicy;
+use anyhow::Result;
+use base64ct::{Base64, Encoding as _};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use serde::Serialize;
+
+use facts::Facts;
+use parts::Part;
+use runs::{HeadData, Runs};
+
+/// The data of a page.
+#[derive(Debug, Serialize)]
+pub struct Page {
+    /// The image's properties.
+    pub facts: Facts,
+    /// Error on the image's own path (NMSE), and its observations.
+    pub own_path: Option<(f64, usize)>,
+    /// The sweep that the image is of.
+    pub sweep: Option<Sweep>,
+    /// Actions of the image and of the f32 policy on recordings.
+    pub runs: Option<Runs>,
+    /// The image, to run in the page.
+    pub head: HeadData,
+    /// Parts that the reader chooses from.
+    pub parts: &'static [Part],
+}
+
+/// Images of the policy at several budgets.
+#[derive(Debug, Serialize)]
+pub struct Sweep {
+    /// Clock of the predicted times in Hz.
+    pub clock_hz: f64,
+    /// All images.
+    pub images: Vec<SweptImage>,
+}
+
+/// An image of a sweep.
+#[derive(Debug, Serialize)]
+pub struct SweptImage {
+    /// Name of its curve: method, seed, round.
+    pub curve: String,
+    /// Bytes.
+    pub bytes: usize,
+    /// Predicted milliseconds of a step.
+    pub milliseconds: f64,
+    /// Error on the held-out recording (NMSE).
+    pub nmse: f64,
+    /// Share of successful episodes, their number, and the 95% interval of the share.
+    pub success: Option<(f64, u64, [f64; 2])>,
+    /// `true` if no other image has fewer bytes and a smaller error.
+    pub is_frontier: bool,
+    /// `true` for the image of the page.
+    pub is_own: bool,
+}
+
+impl Sweep {
+    /// Takes the images of a policy; `sha256` is the digest of the page's image.
+    pub fn new(policy: &MergedPolicy, clock_hz: f64, sha256: &str) -> Self {
+        let image = |(i, image): (usize, &actq_jobs::merged::MergedImage)| {
+            let made = image.made.as_ref()?;
+            let episodes = made.driven.as_ref().map(|driven| driven.episodes);
+            let success = made.success().zip(episodes).zip(made.interval);
+            Some(SweptImage {
+                curve: policy.curve(image),
+                bytes: made.image.bytes,
+                milliseconds: made.milliseconds(clock_hz),
+                nmse: made.nmse,
+                success: success.map(|((share, episodes), interval)| (share, episodes, interval)),
+                is_frontier: policy.frontier.contains(&i),
+                is_own: made.image.image == sha256,
+            })
+        };
+        Self { clock_hz, images: policy.images.iter().enumerate().filter_map(image).collect() }
+    }
+}
+
+const HTML: &str = include_str!("page/page.html");
+const CSS: &str = include_str!("page/page.css");
+const SCRIPT: &str = include_str!("page/page.js");
+
+/// Formats the file.
+///
+/// # Errors
+///
+/// If a number cannot be formatted.
+pub fn html(page: &Page) -> Result<String> {
+    let data = script_safe(&serde_json::to_string(page)?);
+    let parts = [
+        ("TITLE", escaped(&page.facts.name)),
+        ("CSS", CSS.to_owned()),
+        ("DATA", data),
+        ("MODULE", Base64::encode_string(actq_wasm::MODULE)),
+        ("FACE", actq_wasm::FACE.to_owned()),
+        ("SCRIPT", SCRIPT.to_owned()),
+    ];
+    Ok(filled(HTML, &parts))
+}
+
+/// Replaces each `{{NAME}}` of a template, once: values are not searched.
+pub fn filled(template: &str, parts: &[(&str, String)]) -> String {
+    let mut text = String::new();
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once("{{") {
+        text += before;
+        let (name, after) = after.split_once("}}").unwrap_or((after, ""));
+        text += parts.iter().find(|(part, _)| *part == name).map_or("", |(_, value)| value);
+        rest = after;
+    }
+    text + rest
+}
+
+/// Escapes text for HTML.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// Escapes JSON for a script element, which `</script` would end.
+fn script_safe(json: &str) -> String {
+    json.replace('<', "\\u003c")
+}
+
+/// Encodes bytes for the page.
+fn encoded(bytes: &[u8]) -> String {
+    Base64::encode_string(bytes)
+}
+
+/// Compresses bytes, and encodes them for the page.
+fn packed(bytes: &[u8]) -> Result<String> {
+    let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
+    gzip.write_all(bytes)?;
+    Ok(encoded(&gzip.finish()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_of_a_template_are_not_searched() {
+        let parts = [("A", "{{B}}".to_owned()), ("B", "b".to_owned())];
+        assert_eq!(filled("<{{A}}|{{B}}|{{C}}>", &parts), "<{{B}}|b|>");
+    }
+
+    #[test]
+    fn markup_does_not_leave_its_element() {
+        let name = "</script><img src=x onerror=alert(1)>";
+        assert!(!script_safe(&serde_json::to_string(name).expect("JSON")).contains('<'));
+        assert_eq!(escaped("<a href=\"x\">&"), "&lt;a href=&quot;x&quot;&gt;&amp;");
+    }
+}

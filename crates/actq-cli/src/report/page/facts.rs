@@ -1,0 +1,229 @@
+//! An image's properties.
+
+use actq::measure::size::{Beside, bits_per_weight, file_bits_per_weight, hex};
+use actq::measure::time::StepTime;
+use actq::pipeline::stats::Stats;
+use actq::text::printable;
+use actq_kernels::{Image, Port, PortKind};
+use anyhow::Result;
+use serde::Serialize;
+use sha2::{Digest as _, Sha256};
+
+use super::parts::RUNTIME;
+use crate::report::inspect::{CONTRACT, kind, playback, row};
+use crate::report::time::is_modelled;
+use crate::report::widths::Widths;
+
+/// Properties of an image.
+#[derive(Debug, Serialize)]
+pub struct Facts {
+    /// The policy's name.
+    pub name: String,
+    /// The version of this program.
+    pub actq: &'static str,
+    /// SHA-256 of the image.
+    pub sha256: String,
+    /// SHA-256 of the source policy.
+    pub source: String,
+    /// CRC-32 in the image's header.
+    pub crc32: String,
+    /// Meaning of the output, lengths and rate.
+    pub kind: String,
+    /// Values of an observation.
+    pub observation: usize,
+    /// Values of an action.
+    pub action: usize,
+    /// Control rate in Hz.
+    pub rate_hz: f32,
+    /// Bytes of the image.
+    pub bytes: usize,
+    /// Bytes of its parts beside the weights: biases, self-test, tables.
+    pub beside: [usize; 3],
+    /// Bits per weight, with scales and padding.
+    pub bits_per_weight: f64,
+    /// Bits per weight of the whole file.
+    pub file_bits_per_weight: f64,
+    /// Bytes of code that runs any image.
+    pub runtime: usize,
+    /// Bytes of scratch memory.
+    pub scratch: usize,
+    /// Predicted cycles and clock in Hz; `None` for layouts without a model.
+    pub time: Option<(u64, f64)>,
+    /// Features that a build of the kernels needs.
+    pub features: Vec<&'static str>,
+    /// Settings of chunk playback.
+    pub playback: Vec<String>,
+    /// Steps of the self-test.
+    pub self_test: usize,
+    /// Raw inputs and targets; empty without operations around the network.
+    pub ports: Vec<PortFacts>,
+    /// Operations in order.
+    pub ops: Vec<OpFacts>,
+    /// Distinct matrices.
+    pub matrices: Vec<MatrixFacts>,
+    /// `true` if rows are those of the trained matrices, removed ones too.
+    pub is_trained: bool,
+    /// Names of the action contract's arrays, and their values for each action.
+    pub contract: Vec<(&'static str, Vec<f32>)>,
+    /// How the image was made, if its statistics are given: names and values.
+    pub made: Vec<(&'static str, String)>,
+}
+
+/// A raw input, or targets.
+#[derive(Debug, Serialize)]
+pub struct PortFacts {
+    /// `input`, `positions`, `velocities`, `torques`.
+    pub kind: &'static str,
+    /// Its name.
+    pub name: String,
+    /// Names of its values, if they have some.
+    pub names: Vec<String>,
+    /// Number of values.
+    pub len: usize,
+    /// Lowest and highest value, if limited.
+    pub range: [Option<f32>; 2],
+}
+
+/// An operation.
+#[derive(Debug, Serialize)]
+pub struct OpFacts {
+    /// Name.
+    pub name: String,
+    /// Function, shape, sizes.
+    pub detail: String,
+    /// Values that it writes.
+    pub output: usize,
+    /// Predicted cycles in a step.
+    pub cycles: u64,
+    /// Index of its matrix.
+    pub matrix: Option<usize>,
+}
+
+/// A matrix.
+#[derive(Debug, Serialize)]
+pub struct MatrixFacts {
+    /// Name of the trained tensor, or its number.
+    pub name: String,
+    /// Rows and columns.
+    pub shape: [usize; 2],
+    /// Bits of each row, a digit each; `0` for a row without bits.
+    pub widths: String,
+    /// Bytes of codes, scales and block records.
+    pub bytes: usize,
+    /// Columns of a group scale; 0 for row scales only.
+    pub group: usize,
+    /// Largest quantized activation.
+    pub x_max: u16,
+    /// Smallest and largest row scale.
+    pub scales: [f32; 2],
+    /// Share of the predicted error of all rows, with statistics.
+    pub error_share: Option<f64>,
+}
+
+impl Facts {
+    /// Collects the properties of the image of `bytes`; the cycles are at `clock_hz`.
+    ///
+    /// # Errors
+    ///
+    /// If the statistics are of another image.
+    pub fn new(image: &Image<'_>, bytes: &[u8], stats: Option<&Stats>, clock_hz: f64) -> Result<Self> {
+        let step = StepTime::new(image, clock_hz);
+        let widths = Widths::new(image, stats)?;
+        let distinct = actq::measure::size::distinct(image);
+        let places: Vec<_> =
+            distinct.iter().map(|matrix| matrix.blocks().next().map(|rows| rows.scales.as_ptr())).collect();
+        let place = |op: &actq_kernels::image::Op<'_>| {
+            let own = op.matrix()?.blocks().next().map(|rows| rows.scales.as_ptr());
+            places.iter().position(|place| *place == own)
+        };
+        let is_timed = is_modelled(image);
+        let ops = image.ops().zip(&step.ops).map(|(op, time)| OpFacts {
+            name: op.kind.name().to_owned(),
+            detail: row(&op).swap_remove(3),
+            output: op.dst().len,
+            cycles: if is_timed { time.cycles } else { 0 },
+            matrix: place(&op),
+        });
+        let Beside { biases, self_test, tables } = Beside::of(image);
+        let contract = CONTRACT.into_iter().zip(image.contract_arrays());
+        let values = |array: &[u32]| array.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect();
+        Ok(Self {
+            name: printable(image.name()).into_owned(),
+            actq: env!("CARGO_PKG_VERSION"),
+            sha256: hex(&Sha256::digest(bytes)),
+            source: hex(&image.digest()),
+            crc32: format!("{:08x}", image.crc()),
+            kind: kind(image),
+            observation: image.obs_len(),
+            action: image.act_len(),
+            rate_hz: image.rate_hz(),
+            bytes: image.bytes(),
+            beside: [biases, self_test, tables],
+            bits_per_weight: bits_per_weight(image),
+            file_bits_per_weight: file_bits_per_weight(image),
+            runtime: RUNTIME,
+            scratch: 4 * image.scratch_words(),
+            time: is_timed.then_some((step.cycles, clock_hz)),
+            features: image.features().collect(),
+            playback: playback(image),
+            self_test: image.self_test_steps(),
+            ports: image.ports().map(|port| PortFacts::new(&port)).collect(),
+            ops: ops.collect(),
+            matrices: distinct.iter().enumerate().map(|(i, matrix)| MatrixFacts::new(matrix, &widths, i)).collect(),
+            is_trained: stats.is_some(),
+            contract: contract
+                .filter(|(_, array)| !array.is_empty())
+                .map(|(name, array)| (name, values(array)))
+                .collect(),
+            made: stats.map(made).unwrap_or_default(),
+        })
+    }
+}
+
+impl PortFacts {
+    fn new(port: &Port<'_>) -> Self {
+        let kind = match port.kind {
+            PortKind::Input => "input",
+            PortKind::Position => "positions",
+            PortKind::Velocity => "velocities",
+            PortKind::Torque => "torques",
+            _ => "output",
+        };
+        Self {
+            kind,
+            name: printable(port.name).into_owned(),
+            names: port.names.lines().map(|name| printable(name).into_owned()).collect(),
+            len: port.len,
+            range: port.range.map(|limit| limit.is_finite().then_some(limit)),
+        }
+    }
+}
+
+impl MatrixFacts {
+    fn new(matrix: &actq_kernels::image::Matrix<'_>, widths: &Widths, i: usize) -> Self {
+        let scales = || matrix.blocks().flat_map(|rows| (0..rows.block.shape().rows).map(move |i| rows.scale(i)));
+        let (low, high) = scales().fold((f32::INFINITY, 0.0f32), |(low, high), s| (low.min(s), high.max(s)));
+        let (name, [rows, cols], widths, error_share) = widths.layer(i);
+        Self {
+            name,
+            shape: [rows, cols],
+            widths,
+            bytes: matrix.weight_bytes(),
+            group: matrix.group,
+            x_max: matrix.x_max,
+            scales: if low.is_finite() { [low, high] } else { [0.0, 0.0] },
+            error_share,
+        }
+    }
+}
+
+/// Lists how an image was made.
+fn made(stats: &Stats) -> Vec<(&'static str, String)> {
+    vec![
+        ("method", printable(&stats.method).into_owned()),
+        ("budget", stats.budget.to_string()),
+        ("seed", stats.seed.to_string()),
+        ("steps of distillation", stats.steps.to_string()),
+        ("made by actq", printable(&stats.actq).into_owned()),
+    ]
+}
