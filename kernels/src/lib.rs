@@ -105,6 +105,8 @@ pub use arch::{BACKEND, Backend};
 pub use cost::Cost;
 pub use error::{Error, HeadError, ImageError, SavedError, StepError};
 pub use head::Head;
+#[cfg(feature = "writer")]
+pub use head::Parked;
 pub use image::{Image, ImageInfo, Kind, Port, PortKind};
 #[cfg(feature = "writer")]
 pub use layout::{Block, BlockShape, Width};

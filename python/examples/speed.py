@@ -1,100 +1,139 @@
-"""Steps a second of a policy at 2 bits, beside the same policy in f32 by onnxruntime and torch, in one run on all cores.
+"""Steps of a policy per second of processor time: actq at 2, 3 and 8 bits, onnxruntime in f32 and int8, torch in f32, in turn.
 
-    pip install onnxruntime torch
-    python speed.py --robots 4096 --seconds 5
+    pip install onnx onnxruntime torch
+    python speed.py --robots 4096 --threads 1 --seconds 2
+
+A package that is not installed is left out, by name.
 """
 
 from __future__ import annotations
 
 import argparse
-import io
+import importlib
 import os
 import statistics
+import tempfile
 import time
-from typing import Callable, Dict, List
+from typing import Any, Callable, Dict, List, Tuple
 
 import numpy as np
-import onnxruntime
-import torch
-from torch import nn
-
-import actq
+import numpy.typing as npt
 
 #: Lengths of the layers, from the observation to the action: 190 thousand weights.
 LAYERS = [48, 512, 256, 128, 12]
-#: Each is measured this many times, in turn; the median counts.
+#: Each engine is measured this many times, in turn.
 ROUNDS = 5
 
-
-def network() -> nn.Module:
-    torch.manual_seed(0)
-    layers: List[nn.Module] = []
-    for cols, rows in zip(LAYERS, LAYERS[1:]):
-        layers += [nn.Linear(cols, rows), nn.ELU()]
-    return nn.Sequential(*layers[:-1]).eval()
+Floats = npt.NDArray[np.float32]
+Step = Callable[[], object]
 
 
-def session(module: nn.Module, cores: int) -> onnxruntime.InferenceSession:
-    """Returns a session for any batch."""
-    file, example = io.BytesIO(), torch.zeros(2, LAYERS[0])
-    torch.onnx.export(
-        module,
-        (example,),
-        file,  # type: ignore[arg-type]
-        input_names=["obs"],
-        output_names=["action"],
-        dynamic_axes={"obs": {0: "batch"}},
-        dynamo=False,
-    )
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = cores
-    return onnxruntime.InferenceSession(file.getvalue(), options, providers=["CPUExecutionProvider"])
+def weights() -> List[Tuple[Floats, Floats]]:
+    """Returns each layer's weights, of outputs by inputs, and biases."""
+    random = np.random.default_rng(0)
+    shapes = zip(LAYERS[1:], LAYERS)
+    draw = [(random.uniform(-1, 1, shape) * (3 / shape[1]) ** 0.5, random.uniform(-1, 1, shape[0])) for shape in shapes]
+    return [(matrix.astype(np.float32), bias.astype(np.float32)) for matrix, bias in draw]
 
 
-def engines(robots: int, cores: int) -> Dict[str, Callable[[], object]]:
-    """Returns a step of all robots by each engine."""
-    module = network()
-    observations = np.random.default_rng(0).normal(size=(robots, LAYERS[0])).astype(np.float32)
-    policy = actq.import_policy(module, torch.zeros(1, LAYERS[0]), name="speed")
-    head = actq.Head(actq.quantize(policy, bits=2, method="rtn", activations=8, progress=False), robots)
-    onnx, tensor = session(module, cores), torch.from_numpy(observations)
-    torch.set_num_threads(cores)
+def write_onnx(path: str) -> None:
+    """Writes the policy for any batch."""
+    onnx: Any = importlib.import_module("onnx")
+    helper, numbers = onnx.helper, onnx.numpy_helper
+    nodes: List[Any] = []
+    constants: List[Any] = []
+    last = "obs"
+    for i, (matrix, bias) in enumerate(weights()):
+        constants += [numbers.from_array(matrix.T.copy(), f"w{i}"), numbers.from_array(bias, f"b{i}")]
+        to = "action" if i + 2 == len(LAYERS) else f"y{i}"
+        nodes.append(helper.make_node("Gemm", [last, f"w{i}", f"b{i}"], [to]))
+        if to != "action":
+            nodes.append(helper.make_node("Elu", [to], [f"x{i}"]))
+        last = f"x{i}"
+    value = [helper.make_tensor_value_info(name, 1, ["n", n]) for name, n in (("obs", LAYERS[0]), ("action", LAYERS[-1]))]
+    graph = helper.make_graph(nodes, "speed", value[:1], value[1:], constants)
+    onnx.save(helper.make_model(graph, ir_version=8, opset_imports=[helper.make_opsetid("", 17)]), path)
 
-    def by_torch() -> object:
+
+def by_actq(path: str, robots: int, observations: Floats, threads: int) -> Dict[str, Step]:
+    os.environ["RAYON_NUM_THREADS"] = str(threads)
+    actq: Any = importlib.import_module("actq")
+    policy = actq.import_policy(path)
+
+    def step(bits: int) -> Step:
+        head = actq.Head(actq.quantize(policy, bits=bits, method="rtn", activations=8, progress=False), robots)
+        return lambda: head(observations)
+
+    return {f"actq, {bits} bits": step(bits) for bits in (2, 3, 8)}
+
+
+def by_onnxruntime(path: str, robots: int, observations: Floats, threads: int) -> Dict[str, Step]:
+    runtime: Any = importlib.import_module("onnxruntime")
+    quantization: Any = importlib.import_module("onnxruntime.quantization")
+    quantization.quantize_dynamic(path, path.replace(".onnx", "-int8.onnx"), weight_type=quantization.QuantType.QInt8)
+    options = runtime.SessionOptions()
+    options.intra_op_num_threads = threads
+    # A thread that waits would count as one that works.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+
+    def step(path: str) -> Step:
+        session = runtime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+        return lambda: session.run(None, {"obs": observations})
+
+    return {"onnxruntime, f32": step(path), "onnxruntime, int8": step(path.replace(".onnx", "-int8.onnx"))}
+
+
+def by_torch(path: str, robots: int, observations: Floats, threads: int) -> Dict[str, Step]:
+    torch: Any = importlib.import_module("torch")
+    torch.set_num_threads(threads)
+    layers: List[Any] = []
+    for matrix, bias in weights():
+        layer = torch.nn.Linear(matrix.shape[1], matrix.shape[0])
+        layer.load_state_dict({"weight": torch.from_numpy(matrix), "bias": torch.from_numpy(bias)})
+        layers += [layer, torch.nn.ELU()]
+    module, tensor = torch.nn.Sequential(*layers[:-1]).eval(), torch.from_numpy(observations)
+
+    def step() -> object:
         with torch.inference_mode():
             return module(tensor)
 
-    return {
-        "actq, 2 bits": lambda: head(observations),
-        "onnxruntime, f32": lambda: onnx.run(None, {"obs": observations}),
-        "torch, f32": by_torch,
-    }
+    return {"torch, f32": step}
 
 
-def rate(step: Callable[[], object], robots: int, seconds: float) -> float:
-    """Returns the steps of robots in a second."""
+def rate(step: Step, robots: int, seconds: float) -> List[float]:
+    """Returns the steps of robots per second of processor time, of each call."""
     step()
-    begun, steps = time.perf_counter(), 0
-    while time.perf_counter() - begun < seconds:
+    rates: List[float] = []
+    end = time.process_time() + seconds
+    while (begun := time.process_time()) < end:
         step()
-        steps += robots
-    return steps / (time.perf_counter() - begun)
+        rates.append(robots / max(time.process_time() - begun, 1e-9))
+    return rates
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robots", type=int, default=4096)
-    parser.add_argument("--seconds", type=float, default=5.0, help="of each measurement")
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--seconds", type=float, default=2.0, help="of each measurement")
     args = parser.parse_args()
-    cores = len(os.sched_getaffinity(0))
-    measured: Dict[str, List[float]] = {}
-    all_engines = engines(args.robots, cores)
+    observations = np.random.default_rng(0).normal(size=(args.robots, LAYERS[0])).astype(np.float32)
+    engines: Dict[str, Step] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "speed.onnx")
+        write_onnx(path)
+        for engine in (by_actq, by_onnxruntime, by_torch):
+            try:
+                engines.update(engine(path, args.robots, observations, args.threads))
+            except ImportError as error:
+                print(f"left out: {error}")
+    rates: Dict[str, List[float]] = {name: [] for name in engines}
     for _ in range(ROUNDS):
-        for name, step in all_engines.items():
-            measured.setdefault(name, []).append(rate(step, args.robots, args.seconds))
-    print(f"{args.robots} robots, {cores} cores, steps a second: median, least and most of {ROUNDS}")
-    for name, rates in measured.items():
-        print(f"{name:17} {statistics.median(rates):10.0f} {min(rates):10.0f} {max(rates):10.0f}")
+        for name, step in engines.items():
+            rates[name] += rate(step, args.robots, args.seconds)
+    print(f"{args.robots} robots, {args.threads} threads: steps per second of processor time, median and most")
+    for name, all_rates in rates.items():
+        print(f"{name:17} {statistics.median(all_rates):10.0f} {max(all_rates):10.0f}")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 //! A step that its caller runs operation by operation. Many heads of one image can then run each operation together,
 //! and the caller can compute an operation itself.
 
+use super::playback::Playback;
 use super::step::to_next_op;
 use super::{Head, Phase};
-use crate::error::StepError;
+use crate::error::{HeadError, StepError};
+use crate::image::Image;
 use crate::meter::Unlimited;
 
 impl Head<'_, '_> {
@@ -63,5 +65,65 @@ impl Head<'_, '_> {
     /// Returns the arena, which holds the regions that operations name.
     pub fn arena(&self) -> &[u32] {
         self.arena
+    }
+
+    /// Ends the head and keeps what its next steps depend on: the rest of a [`Parked`] is written to `words`, which has
+    /// [`Parked::words`]. A step that has begun is dropped, as by [`Self::begin`].
+    pub fn park(mut self, words: &mut [u32]) -> Parked {
+        self.drop_step();
+        let mut rest = words;
+        for region in self.saved_regions() {
+            let from = self.arena.get(region.range()).unwrap_or_default();
+            let Some((to, after)) = core::mem::take(&mut rest).split_at_mut_checked(from.len()) else { break };
+            to.copy_from_slice(from);
+            rest = after;
+        }
+        let Self { phase, playback, started, seed, draws, .. } = self;
+        Parked { is_ready: matches!(phase, Phase::Ready), playback, started, seed, draws }
+    }
+}
+
+/// A head between two steps, without the memory that a step works in.
+#[derive(Clone, Copy, Debug)]
+pub struct Parked {
+    is_ready: bool,
+    playback: Playback,
+    started: bool,
+    seed: u32,
+    draws: u32,
+}
+
+impl Parked {
+    /// Returns the words of a parked head of this image.
+    pub fn words(image: &Image<'_>) -> usize {
+        Head::regions_to_save(image).iter().map(|region| region.len).sum()
+    }
+
+    /// Continues a head of this image, which [`Head::park`] wrote to `words`, in any memory.
+    ///
+    /// # Errors
+    ///
+    /// [`HeadError::ScratchTooSmall`] if `scratch` has fewer words than [`Image::scratch_words`].
+    pub fn resume<'a, 's>(
+        self,
+        image: Image<'a>,
+        words: &[u32],
+        scratch: &'s mut [u32],
+    ) -> Result<Head<'a, 's>, HeadError> {
+        let (needed, given) = (image.scratch_words(), scratch.len());
+        if given < needed {
+            return Err(HeadError::ScratchTooSmall { needed, given });
+        }
+        let Self { is_ready, playback, started, seed, draws } = self;
+        let phase = if is_ready { Phase::Ready } else { Phase::Idle };
+        let mut head = Head { image, arena: scratch, least_budget: 0, phase, playback, started, seed, draws };
+        let mut rest = words;
+        for region in head.saved_regions() {
+            let to = head.words_mut(region);
+            let Some((from, after)) = rest.split_at_checked(to.len()) else { break };
+            to.copy_from_slice(from);
+            rest = after;
+        }
+        Ok(head)
     }
 }

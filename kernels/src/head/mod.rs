@@ -11,6 +11,8 @@ mod step;
 
 use core::fmt;
 
+#[cfg(feature = "writer")]
+pub use self::lockstep::Parked;
 use self::playback::Playback;
 use crate::arena::part;
 use crate::cursor::Cursor;

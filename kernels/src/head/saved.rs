@@ -8,7 +8,7 @@
 use super::playback::Playback;
 use super::{Head, Phase};
 use crate::error::SavedError;
-use crate::image::{Region, checksum};
+use crate::image::{Image, Region, checksum};
 
 const MAGIC: u32 = u32::from_le_bytes(*b"ACTS");
 /// Version of the saved state.
@@ -87,9 +87,14 @@ impl Head<'_, '_> {
     }
 
     /// Regions of the arena that are saved.
-    fn saved_regions(&self) -> [Region; 3] {
-        let action = self.image.action().offset;
-        let len = self.image.work().offset.saturating_sub(action);
-        [self.image.state(), self.image.output(), Region { offset: action, len }]
+    pub(super) fn saved_regions(&self) -> [Region; 3] {
+        Self::regions_to_save(&self.image)
+    }
+
+    /// Regions of an image's arena that are saved.
+    pub(super) fn regions_to_save(image: &Image<'_>) -> [Region; 3] {
+        let action = image.action().offset;
+        let len = image.work().offset.saturating_sub(action);
+        [image.state(), image.output(), Region { offset: action, len }]
     }
 }

@@ -157,7 +157,7 @@ impl Head<'_, '_> {
     }
 
     /// Drops a step that has begun: see [`Self::begin`].
-    fn drop_step(&mut self) {
+    pub(super) fn drop_step(&mut self) {
         if let Phase::Begun(cursor) = self.phase
             && cursor.has_progressed(self.fresh())
         {

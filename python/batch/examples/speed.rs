@@ -1,6 +1,8 @@
-//! Measures the steps a second of a network with 190 thousand weights at 2 bits, in batches of 4096:
+//! Measures the steps per second of a network with 190 thousand weights at 2, 3, 4 and 8 bits, in turn:
 //!
-//!     cargo run --release --package actq-batch --example speed -- [HEADS] [SECONDS]
+//!     RAYON_NUM_THREADS=1 cargo run --release --package actq-batch --example speed -- [HEADS] [SECONDS]
+//!
+//! Beside other programs, the fastest step says most.
 
 use std::time::Instant;
 
@@ -15,34 +17,54 @@ use anyhow::Result;
 
 /// Lengths of the network's layers, from observation to action.
 const LAYERS: [usize; 5] = [48, 512, 256, 128, 12];
+/// Each width is measured this many times.
+const ROUNDS: usize = 5;
 
-fn main() -> Result<()> {
-    let mut arguments = std::env::args().skip(1);
-    let heads = arguments.next().map_or(Ok(4096), |text| text.parse())?;
-    let seconds = arguments.next().map_or(Ok(3.0), |text| text.parse())?;
+fn image(width: Width) -> Result<Vec<u8>> {
     let mut builder = Builder::new(LAYERS[0]);
     let mut last = 0;
     for (i, size) in LAYERS.windows(2).enumerate() {
         let (cols, rows) = (size[0], size[1]);
-        let matrix = builder.matrix(rows, cols, Activations::Int8, &vec![Some(Width::W2); rows], 32)?;
+        let matrix = builder.matrix(rows, cols, Activations::Int8, &vec![Some(width); rows], 32)?;
         let bias = builder.values(rows);
         last = builder.node(Linear { matrix, bias }, &[last])?;
         if i + 2 < LAYERS.len() {
             last = builder.node(Pointwise(Function::Elu), &[last])?;
         }
     }
-    let weights: usize = LAYERS.windows(2).map(|size| size[0] * size[1]).sum();
-    let mut batch = Batch::new(&builder.image("speed")?, heads)?;
-    let mut random = Random::new(1);
-    let observations: Vec<f32> = (0..heads * batch.obs_len()).map(|_| random.normal()).collect();
-    let mut actions = vec![0.0; heads * batch.act_len()];
-    batch.step(&observations, None, &mut actions)?;
-    let (start, mut steps) = (Instant::now(), 0);
-    while start.elapsed().as_secs_f64() < seconds {
-        batch.step(&observations, None, &mut actions)?;
-        steps += heads;
+    builder.image("speed")
+}
+
+/// Steps a batch for this long; adds the seconds of each step.
+fn measure(batch: &mut Batch, observations: &[f32], seconds: f64, times: &mut Vec<f64>) -> Result<()> {
+    let mut actions = vec![0.0; batch.heads() * batch.act_len()];
+    let begun = Instant::now();
+    while begun.elapsed().as_secs_f64() < seconds {
+        let begun = Instant::now();
+        batch.step(observations, None, &mut actions)?;
+        times.push(begun.elapsed().as_secs_f64());
     }
-    let rate = steps as f64 / start.elapsed().as_secs_f64();
-    println!("{weights} weights, {heads} heads: {rate:.0} steps/s, {:.1} GMAC/s", rate * weights as f64 / 1e9);
+    Ok(())
+}
+
+fn main() -> Result<()> {
+    let mut arguments = std::env::args().skip(1);
+    let heads = arguments.next().map_or(Ok(4096), |text| text.parse())?;
+    let seconds = arguments.next().map_or(Ok(1.0), |text| text.parse())?;
+    let mut random = Random::new(1);
+    let observations: Vec<f32> = (0..heads * LAYERS[0]).map(|_| random.normal()).collect();
+    let new = |width| Ok((width, Batch::new(&image(width)?, heads)?, Vec::new()));
+    let mut batches = Width::ALL.into_iter().map(new).collect::<Result<Vec<_>>>()?;
+    for _ in 0..ROUNDS {
+        for (_, batch, times) in &mut batches {
+            measure(batch, &observations, seconds, times)?;
+        }
+    }
+    println!("{heads} heads, steps per second: median, most");
+    for (width, _, mut times) in batches {
+        times.sort_by(f64::total_cmp);
+        let [median, most] = [times.len() / 2, 0].map(|i| heads as f64 / times[i]);
+        println!("{} bits: {median:.0}, {most:.0}", width.bits());
+    }
     Ok(())
 }

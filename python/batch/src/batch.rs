@@ -1,40 +1,33 @@
 //! A batch of heads.
 
-use actq_kernels::{Head, Image, ImageError, PortKind, StepError};
+use actq_kernels::{Head, Image, ImageError, Parked, PortKind, StepError};
 use fearless_simd::Level;
 use rayon::prelude::*;
-use self_cell::{MutBorrow, self_cell};
+use self_cell::self_cell;
 
 use crate::error::Error;
 use crate::program::{Operation, operations};
 use crate::tile::{self, Tile, Work};
 
-/// The words of the image, and the scratch memory of all heads.
-struct Memory {
-    image: Vec<u32>,
-    scratch: MutBorrow<Vec<u32>>,
-}
-
-/// The image and the heads in their memory.
-struct Heads<'m> {
-    image: Image<'m>,
-    heads: Vec<Head<'m, 'm>>,
-}
-
 self_cell! {
-    struct OwnedHeads {
-        owner: Memory,
+    /// An image and its words.
+    struct OwnedImage {
+        owner: Vec<u32>,
         #[covariant]
-        dependent: Heads,
+        dependent: Image,
     }
 }
 
-/// The number of a tile, its heads, and the room for their actions.
-type Part<'p, 'm> = (usize, (&'p mut [Head<'m, 'm>], &'p mut [f32]));
+/// The number of a tile, its heads with their words, and the room for their actions.
+type Part<'p> = (usize, ((&'p mut [Parked], &'p mut [u32]), &'p mut [f32]));
 
 /// Independent heads of one image.
 pub struct Batch {
-    heads: OwnedHeads,
+    image: OwnedImage,
+    heads: Vec<Parked>,
+    /// The words of each parked head, one head after the other. The memory that a step works in is a thread's, so that the
+    /// heads of a large batch stay in the machine's caches.
+    words: Vec<u32>,
     program: Vec<Operation>,
     /// Lowest and highest value that a step accepts, for each value of an observation; empty without limits.
     ranges: Vec<[f32; 2]>,
@@ -69,33 +62,32 @@ impl Batch {
         if !rest.is_empty() {
             return Err(ImageError::Length.into());
         }
-        let image: Vec<u32> = words.iter().map(|word| u32::from_ne_bytes(*word)).collect();
-        let per_head = checked(&image)?.scratch_words();
-        let memory = Memory { image, scratch: MutBorrow::new(zeros(heads, per_head).ok_or(Error::Memory { heads })?) };
-        let heads = OwnedHeads::try_new(memory, |memory| -> Result<Heads<'_>, Error> {
-            let image = checked(&memory.image)?;
-            let scratch = memory.scratch.borrow_mut().chunks_exact_mut(per_head);
-            let mut all = Vec::new();
-            all.try_reserve_exact(heads).map_err(|_| Error::Memory { heads })?;
-            // A chunk has the words that a head needs.
-            all.extend(scratch.filter_map(|scratch| Head::new(image, scratch).ok()));
-            Ok(Heads { image, heads: all })
-        })?;
-        let image = &heads.borrow_dependent().image;
+        let words = words.iter().map(|word| u32::from_ne_bytes(*word)).collect();
+        let owned = OwnedImage::try_new(words, |words| checked(words))?;
+        let image = owned.borrow_dependent();
+        let mut first = vec![0; Parked::words(image)];
+        let mut scratch = vec![0; image.scratch_words()];
+        let Ok(head) = Head::new(*image, &mut scratch) else { return Err(Error::Memory { heads }) };
+        let parked = head.park(&mut first);
+        let mut all = Vec::new();
+        all.try_reserve_exact(heads).map_err(|_| Error::Memory { heads })?;
+        all.resize(heads, parked);
+        let mut words = zeros(heads, first.len()).ok_or(Error::Memory { heads })?;
+        words.chunks_exact_mut(first.len()).for_each(|words| words.copy_from_slice(&first));
         let inputs = image.ports().filter(|port| port.kind == PortKind::Input);
         let ranges = inputs.flat_map(|port| std::iter::repeat_n(port.range, port.len)).collect();
-        let program = operations(image);
-        Ok(Self { heads, program, ranges, level })
+        let program = operations(level, image);
+        Ok(Self { image: owned, heads: all, words, program, ranges, level })
     }
 
     /// Returns the image.
     pub fn image(&self) -> &Image<'_> {
-        &self.heads.borrow_dependent().image
+        self.image.borrow_dependent()
     }
 
     /// Returns the number of heads.
     pub fn heads(&self) -> usize {
-        self.heads.borrow_dependent().heads.len()
+        self.heads.len()
     }
 
     /// Returns the number of values of an observation.
@@ -128,9 +120,15 @@ impl Batch {
     }
 
     fn each(&mut self, work: impl Fn(usize, &mut Head<'_, '_>)) {
-        self.heads.with_dependent_mut(|_, Heads { heads, .. }| {
-            heads.iter_mut().enumerate().for_each(|(i, head)| work(i, head));
-        });
+        let image = *self.image.borrow_dependent();
+        let mut scratch = vec![0; image.scratch_words()];
+        let words = self.words.chunks_exact_mut(Parked::words(&image));
+        for (i, (parked, words)) in self.heads.iter_mut().zip(words).enumerate() {
+            // The memory has the words that a head needs.
+            let Ok(mut head) = parked.resume(image, words, &mut scratch) else { return };
+            work(i, &mut head);
+            *parked = head.park(words);
+        }
     }
 
     /// Computes the next action of each head, as [`Head::step`] does. `observations` has a row of [`Self::obs_len`]
@@ -167,21 +165,23 @@ impl Batch {
         }
         let (level, program) = (self.level, &self.program[..]);
         let size = heads.div_ceil(rayon::current_num_threads()).next_multiple_of(tile::LEAST).min(tile::MOST);
-        let step = |work: &mut Work, (i, (heads, actions)): Part<'_, '_>| {
+        let (image, words) = (*self.image.borrow_dependent(), Parked::words(self.image.borrow_dependent()));
+        let step = |work: &mut Work, (i, ((heads, words), actions)): Part<'_>| {
             let from = i * size;
             let observations = &observations[from * obs_len..][..heads.len() * obs_len];
             let reset = reset.map(|reset| &reset[from..][..heads.len()]);
-            let (head, error) = Tile { heads, observations, reset, actions }.step(level, program, work)?;
+            let tile = Tile { image, heads, words, observations, reset, actions };
+            let (head, error) = tile.step(level, program, work)?;
             Some(Error::Head { head: from + head, error })
         };
-        let failed = self.heads.with_dependent_mut(|_, Heads { heads, .. }| {
-            if heads.len() <= size {
-                return step(&mut Work::default(), (0, (heads, actions)));
-            }
-            let tiles = heads.par_chunks_mut(size).zip(actions.par_chunks_mut(size * act_len)).enumerate();
+        let failed = if heads <= size {
+            step(&mut Work::default(), (0, ((&mut self.heads, &mut self.words), actions)))
+        } else {
+            let tiles = self.heads.par_chunks_mut(size).zip(self.words.par_chunks_mut(size * words));
+            let tiles = tiles.zip(actions.par_chunks_mut(size * act_len)).enumerate();
             // The first of all, whichever thread is done first.
             tiles.map_init(Work::default, step).collect::<Vec<_>>().into_iter().flatten().next()
-        });
+        };
         failed.map_or(Ok(()), Err)
     }
 

@@ -16,13 +16,15 @@
 //!
 //! The sums of a product are integers modulo 2^32, and so do not depend on their order: here one load of a weight
 //! serves several heads, by the widest vector instructions of the machine (SSE2, SSE4.2, AVX2, AVX-512 or NEON, chosen
-//! at run time). All other arithmetic is that of `actq-kernels`, operation for operation in f32. Products and
-//! elementwise functions run for many heads together; all other operations run by the executor itself, head by head.
+//! at run time). With AVX2, weights of at most 4 bits are multiplied as bytes, twice as many by an instruction. All
+//! other arithmetic is that of `actq-kernels`, operation for operation in f32. Products and elementwise functions run by
+//! vectors; all other operations run by the executor itself, head by head.
 #![forbid(unsafe_code)]
 
 mod batch;
 mod error;
 mod linear;
+mod narrow;
 mod product;
 mod program;
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use actq_kernels::Image;
 use actq_kernels::image::{Op, OpKind, Region};
 use actq_kernels::math::Function;
+use fearless_simd::Level;
 
 use crate::linear::Linear;
 
@@ -10,21 +11,21 @@ use crate::linear::Linear;
 #[derive(Debug)]
 pub(crate) enum Operation {
     /// A product, for many heads together.
-    Linear(Linear),
+    Linear(Box<Linear>),
     /// A function of each value of a region, with the machine's vector instructions.
     Function(Function, Region),
     /// Any other: the executor runs it for each head.
     Other,
 }
 
-/// Returns the operations of an image.
-pub(crate) fn operations(image: &Image<'_>) -> Vec<Operation> {
-    image.ops().map(|op| operation(&op)).collect()
+/// Returns the operations of an image, for a level.
+pub(crate) fn operations(level: Level, image: &Image<'_>) -> Vec<Operation> {
+    image.ops().map(|op| operation(level, &op)).collect()
 }
 
-fn operation(op: &Op<'_>) -> Operation {
+fn operation(level: Level, op: &Op<'_>) -> Operation {
     match op.kind {
         OpKind::Function(function) => Operation::Function(function, op.dst()),
-        _ => Linear::new(op).map_or(Operation::Other, Operation::Linear),
+        _ => Linear::new(level, op).map_or(Operation::Other, |linear| Operation::Linear(linear.into())),
     }
 }
