@@ -1,7 +1,9 @@
 //! Images: their files, reports and sizes.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use actq::emit::{Trained, retrained};
 use actq::measure::size::{bits_per_weight, hex};
 use actq::measure::time::{CLOCK, StepTime};
 use actq::runtime::ImageBuffer;
@@ -10,7 +12,7 @@ use actq_cli::commands::{export_c, report};
 use actq_cli::outputs::files::{refuse_foreign, write};
 use actq_cli::report::{inspect, time};
 use actq_kernels::PortKind;
-use actq_onnx::export::{self, Attribute, Data, Tensor};
+use actq_onnx::export::{self, Attribute, Data, Grid, Tensor};
 use anyhow::Context as _;
 use numpy::{IntoPyArray as _, PyArrayMethods as _};
 use pyo3::IntoPyObjectExt as _;
@@ -250,8 +252,9 @@ impl Image {
         .or_raise()
     }
 
-    /// Returns the same network for `actq.FakeQuant`: inputs, outputs, constants, and nodes as (operator, inputs,
-    /// output, attributes, magnitude to which the first input is rounded).
+    /// Returns the same network for `actq.FakeQuant`: inputs, outputs, constants, grids of weights as (steps [row,
+    /// group], columns of a group, bits of each row), and nodes as (operator, inputs, output, attributes, magnitude to
+    /// which the first input is rounded).
     fn network<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let network = export::network(&self.image()?).or_raise()?;
         let dict = PyDict::new(py);
@@ -266,6 +269,12 @@ impl Image {
             tensors.set_item(name, array)?;
         }
         dict.set_item("tensors", tensors)?;
+        let grids = PyDict::new(py);
+        for Grid { weights, steps, group, bits } in network.grids {
+            let shape = [bits.len(), steps.len() / bits.len()];
+            grids.set_item(weights, (steps.into_pyarray(py).reshape(shape)?, group, bits.into_pyarray(py)))?;
+        }
+        dict.set_item("grids", grids)?;
         let nodes = PyList::empty(py);
         for node in network.nodes {
             let attributes = PyDict::new(py);
@@ -280,6 +289,19 @@ impl Image {
         }
         dict.set_item("nodes", nodes)?;
         Ok(dict)
+    }
+
+    /// Returns the image with trained values for `actq.FakeQuant`: levels of weights, and other values, by the names that
+    /// [`Self::network`] gives.
+    fn retrained(
+        &self,
+        py: Python<'_>,
+        levels: BTreeMap<String, Vec<i16>>,
+        floats: BTreeMap<String, Vec<f32>>,
+    ) -> PyResult<Self> {
+        let trained = trained(levels, floats).ok_or_else(|| error!("a value is none of the image's"))?;
+        let bytes = py.detach(|| retrained(self.buffer.bytes(), &trained)).or_raise()?;
+        Self::of(ImageBuffer::new(&bytes), &self.name)
     }
 
     fn __len__(&self) -> usize {
@@ -315,6 +337,25 @@ impl Image {
         let class = py.get_type::<Self>().into_bound_py_any(py)?;
         (class, (self.bytes(py),)).into_pyobject(py)
     }
+}
+
+/// Sorts values by the names of [`export::network`], as "weight_3" and "table_5_0".
+fn trained(levels: BTreeMap<String, Vec<i16>>, floats: BTreeMap<String, Vec<f32>>) -> Option<Trained> {
+    let mut trained = Trained::default();
+    for (name, values) in levels {
+        trained.levels.insert(name.strip_prefix("weight_")?.parse().ok()?, values);
+    }
+    for (name, values) in floats {
+        let (kind, number) = name.rsplit_once('_')?;
+        let number = number.parse().ok()?;
+        match kind {
+            "bias" => drop(trained.biases.insert(number, values)),
+            "norm_weight" => drop(trained.arrays.insert((number, 0), values)),
+            "norm_bias" => drop(trained.arrays.insert((number, 1), values)),
+            table => drop(trained.arrays.insert((table.strip_prefix("table_")?.parse().ok()?, number), values)),
+        }
+    }
+    Some(trained)
 }
 
 /// Refuses a number that is not above 0.

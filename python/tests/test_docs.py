@@ -37,6 +37,9 @@ def test_every_listing_runs(cart_pole, tmp_path, monkeypatch):
     assert names["driven"].mean_return > 0.9 * names["trained"].mean_return
     assert names["tuned"].rounds[-1].rollout.mean_return > 100
     assert (tmp_path / "firmware/policy.h").exists() and (tmp_path / "cart-pole.actq").exists()
+    if "after" in names:
+        # One epoch of training gains.
+        assert names["after"].mean_return > names["before"].mean_return
     if skipped:
         pytest.skip(f"{len(skipped)} of its listings: torch is not installed (requirements-optional.txt)")
 

@@ -6,6 +6,6 @@ mod operations;
 #[cfg(test)]
 mod tests;
 
-pub use builder::{Attribute, Data, Network, Node, Tensor};
+pub use builder::{Attribute, Data, Grid, Network, Node, Tensor};
 pub use file::file;
 pub use operations::network;

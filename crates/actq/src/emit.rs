@@ -3,9 +3,11 @@
 mod lower;
 mod raw_values;
 mod repack;
+mod retrained;
 mod writer;
 
 pub use lower::{Program, lower};
 pub use raw_values::raw_values;
 pub use repack::{Core, repack};
+pub use retrained::{Trained, retrained};
 pub use writer::{bytes_beside_blocks, image, image_around};

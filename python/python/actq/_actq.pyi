@@ -127,6 +127,7 @@ class Image:
         Raises `actq.Error` for an image with a description (docs/DEPLOY.md), and if the file cannot be written.
         """
     def network(self) -> Dict[str, Any]: ...
+    def retrained(self, levels: Dict[str, List[int]], floats: Dict[str, List[float]]) -> Image: ...
     @property
     def bytes(self) -> builtins.bytes:
         """The bytes of the image's file."""
@@ -163,7 +164,8 @@ class Image:
 
 @final
 class Head:
-    """The executor of an image, with n independent states: the bits of the microcontroller, on all cores.
+    """The executor of an image, with n independent states: the bits of the microcontroller, on all cores. Copies and pickles
+    have the states.
 
     image: the image.
     n: number of states; without it, the first observations decide.
@@ -185,6 +187,19 @@ class Head:
         """
     def reset(self) -> None:
         """Resets every state: recurrent values, chunks, and the last action."""
+    def state(self) -> npt.NDArray[np.uint8]:
+        """Returns the states of all robots [n, bytes]: a row has everything besides the image that the robot's next actions
+        depend on, as recurrent values, chunk, last action and the seed of noise.
+
+        Raises `actq.Error` before the first observations, unless n was given.
+        """
+    def restore(self, states: npt.ArrayLike) -> None:
+        """Restores rows [n, bytes] that `state` of a head of the same image returned, in any order and number: the robots go
+        on with the same bits. They also decide how many states a head without n has.
+
+        Raises `actq.Error` for another number of states, and for rows that are damaged or of another image: then nothing has
+        changed.
+        """
     @property
     def image(self) -> Image:
         """The image."""
@@ -276,6 +291,7 @@ def import_onnx(
     rate_hz: Optional[float],
 ) -> Tuple[Policy, Dict[str, Any]]: ...
 def policy_of_files(json: bytes, weights: bytes, guards: List[str], dir: _Path) -> Policy: ...
+def head_of_states(image: Image, seed: int, states: Optional[npt.NDArray[np.uint8]]) -> Head: ...
 def bytes_of(text: str) -> int: ...
 def quantize(
     policy: Policy, recordings: Any, heldout: Any, request: Dict[str, Any], progress: _Report

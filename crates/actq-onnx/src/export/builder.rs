@@ -12,6 +12,8 @@ pub struct Network {
     pub outputs: Vec<(String, Vec<usize>)>,
     /// Constants.
     pub tensors: Vec<Tensor>,
+    /// Grids of the weights among them; not part of ONNX.
+    pub grids: Vec<Grid>,
     /// Nodes in order.
     pub nodes: Vec<Node>,
 }
@@ -25,6 +27,19 @@ pub struct Tensor {
     pub shape: Vec<usize>,
     /// The elements, row-major.
     pub data: Data,
+}
+
+/// The grid of a matrix in the image: each weight is a level times the step of its row and group.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    /// Name of the tensor with the weights [row, column].
+    pub weights: String,
+    /// Steps [row, group]; 0 for rows that the image does not have.
+    pub steps: Vec<f32>,
+    /// Columns of a group; all of them without group scales.
+    pub group: usize,
+    /// Bits of each row's levels; 0 for rows that the image does not have.
+    pub bits: Vec<u32>,
 }
 
 /// Elements of a constant.

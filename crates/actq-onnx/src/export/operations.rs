@@ -3,11 +3,11 @@
 use actq::error::{Result, bail, ensure};
 use actq::measure::unrounded::dequantized;
 use actq_kernels::Image;
-use actq_kernels::image::{Op, OpKind, Region};
+use actq_kernels::image::{Matrix, Op, OpKind, Region};
 use actq_kernels::math::Function;
 use actq_kernels::ops::denoise::Coefficients;
 
-use super::builder::{Attribute, Builder, Data, Network, Value};
+use super::builder::{Attribute, Builder, Data, Grid, Network, Value};
 
 /// Returns the network of an image with scale, offset and limits of its actions. Denoising steps follow each other.
 /// Work of the contract from step to step (step limits, smoothing, switches, playback) is not part of it.
@@ -27,7 +27,7 @@ pub fn network(image: &Image<'_>) -> Result<Network> {
     for step in 0..image.denoising_steps() {
         let first = if step == 0 { 0 } else { image.first_denoising_op() };
         for (i, op) in ops.iter().enumerate().skip(first) {
-            add(&mut builder, i, op, step)?;
+            add(&mut builder, first_with_matrix(&ops, i), i, op, step)?;
         }
     }
     let mut action = builder.read(image.output())?;
@@ -65,8 +65,15 @@ fn floats(array: &[u32]) -> Vec<f32> {
     array.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect()
 }
 
-/// Adds operation `i` in a denoising step.
-fn add(to: &mut Builder, i: usize, op: &Op<'_>, step: usize) -> Result<()> {
+/// Returns the first operation with the matrix of operation `i`, which names its weights: operations can share them.
+fn first_with_matrix(ops: &[Op<'_>], i: usize) -> usize {
+    let words = |op: &Op<'_>| op.matrix().and_then(|matrix| Some(matrix.blocks().next()?.block.words().as_ptr()));
+    let matrix = ops.get(i).and_then(words);
+    if matrix.is_none() { i } else { ops.iter().position(|op| words(op) == matrix).unwrap_or(i) }
+}
+
+/// Adds operation `i` in a denoising step; its weights have the name of operation `named`.
+fn add(to: &mut Builder, named: usize, i: usize, op: &Op<'_>, step: usize) -> Result<()> {
     let (dst, src, third) = (op.dst(), op.src(), op.third());
     let value = match op.kind {
         OpKind::Noise => {
@@ -83,7 +90,7 @@ fn add(to: &mut Builder, i: usize, op: &Op<'_>, step: usize) -> Result<()> {
             clip(to, &scaled, op.constant(1))
         }
         OpKind::Linear { accumulate } => {
-            let product = linear(to, i, op)?;
+            let product = linear(to, named, i, op)?;
             if accumulate {
                 let sum = to.read(dst)?;
                 to.apply("Add", &[&sum, &product])
@@ -160,18 +167,36 @@ fn add(to: &mut Builder, i: usize, op: &Op<'_>, step: usize) -> Result<()> {
     Ok(())
 }
 
-fn linear(to: &mut Builder, i: usize, op: &Op<'_>) -> Result<Value> {
+fn linear(to: &mut Builder, named: usize, i: usize, op: &Op<'_>) -> Result<Value> {
     let x = to.read(op.src())?;
     let Some(matrix) = op.matrix() else { bail!("operation {i} has no matrix") };
     let (rows, cols) = (matrix.rows, matrix.cols);
     let weights = Data::Floats(dequantized(&matrix).into_iter().collect());
-    let weights = to.tensor(format!("weight_{i}"), vec![rows, cols], weights);
+    let weights = to.tensor(format!("weight_{named}"), vec![rows, cols], weights);
+    if !to.network.grids.iter().any(|grid| grid.weights == weights) {
+        to.network.grids.push(grid(weights.clone(), &matrix));
+    }
     let bias = to.vector(format!("bias_{i}"), (0..rows).map(|row| matrix.bias(row)).collect());
     let product = to.node("Gemm", &[&x.name, &weights, &bias.name], vec![("transB", Attribute::Int(1))], rows);
     if let Some(node) = to.network.nodes.last_mut() {
         node.x_max = Some(matrix.x_max);
     }
     Ok(product)
+}
+
+fn grid(weights: String, matrix: &Matrix<'_>) -> Grid {
+    let group = if matrix.group == 0 { matrix.cols } else { matrix.group };
+    let groups = matrix.cols.div_ceil(group);
+    let (mut steps, mut bits) = (vec![0.0; matrix.rows * groups], vec![0; matrix.rows]);
+    for rows in matrix.blocks() {
+        for (i, output) in rows.outputs().enumerate() {
+            bits[output] = rows.block.shape().width.bits();
+            for (at, step) in steps[output * groups..][..groups].iter_mut().enumerate() {
+                *step = f32::from(rows.block.group_scale(i, at * group)) * rows.scale(i);
+            }
+        }
+    }
+    Grid { weights, steps, group, bits }
 }
 
 /// Limits values to both sides of zero, unless the limit is infinite.

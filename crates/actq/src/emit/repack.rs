@@ -1,7 +1,7 @@
 //! The same weights in the layouts of another core.
 
 use actq_kernels::activations::{Plan, max_prepared_words};
-use actq_kernels::image::{BlockRecord, Image, Matrix, MatrixRecord, Port, Records, header as h, op};
+use actq_kernels::image::{BlockRecord, Image, Matrix, MatrixRecord, Port, Records, RowBlock, header as h, op};
 use actq_kernels::layout::{BlockShape, Lanes, Width, pack};
 
 use super::writer::sealed;
@@ -110,15 +110,7 @@ impl Repacked {
                 let from = block.block.shape();
                 let lanes = core.lanes(from.width, matrix.x_max, matrix.group);
                 let shape = BlockShape { lanes, ..from };
-                let places = || (0..shape.rows).flat_map(|row| (0..shape.cols).map(move |col| (row, col)));
-                let codes: Vec<u8> = places().map(|(row, col)| block.block.code(row, col)).collect();
-                let scales: Vec<u8> = match shape.group {
-                    0 => Vec::new(),
-                    group => places()
-                        .filter(|(_, col)| col % group == 0)
-                        .map(|(row, col)| block.block.group_scale(row, col))
-                        .collect(),
-                };
+                let (codes, scales) = unpacked(&block);
                 let mut packed = vec![0; shape.words()];
                 pack(shape, &codes, &scales, &mut packed)?;
                 let weights = push(&mut words, packed.into_iter().map(u32::from_le));
@@ -185,6 +177,18 @@ impl Repacked {
         words[h::W_WORK_FLAGS] = words[h::W_WORK_FLAGS] & 0xffff_0000 | self.work as u32;
         Ok(words)
     }
+}
+
+/// Returns the codes and the group scales of a block, row-major.
+pub(super) fn unpacked(rows: &RowBlock<'_>) -> (Vec<u8>, Vec<u8>) {
+    let (block, shape) = (&rows.block, rows.block.shape());
+    let places = || (0..shape.rows).flat_map(|row| (0..shape.cols).map(move |col| (row, col)));
+    let codes = places().map(|(row, col)| block.code(row, col)).collect();
+    let scales = match shape.group {
+        0 => Vec::new(),
+        group => places().filter(|(_, col)| col % group == 0).map(|(row, col)| block.group_scale(row, col)).collect(),
+    };
+    (codes, scales)
 }
 
 /// Appends words and returns their offset.

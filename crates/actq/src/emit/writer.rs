@@ -58,7 +58,8 @@ fn emit(policy: &Policy, matrices: &[Outcome], around: Option<&Around>) -> Resul
     let mut writer = Writer::new();
     let records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
     let Draft { mut words, self_test, observations } = writer.finish(policy, group, &records, around)?;
-    let actions = self_test_actions(&sealed(&words)?, &observations)?;
+    let unfit = "no image can hold the result; recorded observations near the limits of f32 are a common cause";
+    let actions = self_test_actions(&sealed(&words)?, &observations, unfit)?;
     let obs_len = obs_len(policy, around);
     for (step, action) in actions.iter().enumerate() {
         let at = self_test + step * (obs_len + policy.act_len) + obs_len;
@@ -126,11 +127,10 @@ fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
     (0..steps).map(|_| (0..graph.obs_len).map(&mut value).collect()).collect()
 }
 
-fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
+/// Returns the actions of a new image from its start; if it is not valid, the error begins with `unfit`.
+pub(super) fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>], unfit: &'static str) -> Result<Vec<Vec<f32>>> {
     let buffer = ImageBuffer::new(bytes);
-    let image = buffer
-        .image(Path::new("the new image"))
-        .context("no image can hold the result; recorded observations near the limits of f32 are a common cause")?;
+    let image = buffer.image(Path::new("the new image")).context(unfit)?;
     with_head(image, |head| {
         observations.iter().map(|obs| Ok(head.step(obs).context("self-test of the new image")?.to_vec())).collect()
     })
@@ -269,18 +269,8 @@ impl Writer {
         self.push(values.iter().map(|v| v.to_bits()))
     }
 
-    /// Returns the offset of an operation's constants: of equal ones if present, else appends them.
     fn constants(&mut self, values: &[f32]) -> u32 {
-        let words: Vec<u32> = values.iter().map(|v| v.to_bits()).collect();
-        let same = |window: &[u32]| window == words;
-        if let Some(at) = self.words[self.shared_constants..].windows(words.len().max(1)).position(same) {
-            return (self.shared_constants + at) as u32;
-        }
-        let offset = self.push(words);
-        if values.iter().any(|v| !v.is_finite()) {
-            self.shared_constants = self.words.len();
-        }
-        offset
+        place_constants(&mut self.words, &mut self.shared_constants, values)
     }
 
     fn push_bytes(&mut self, bytes: &[u8]) -> u32 {
@@ -345,6 +335,21 @@ impl Writer {
         let (src, third) = (offset(step.src), offset(step.third));
         Ok(OpRecord { kind: step.kind, dst: step.dst, src, third, bias, data }.emit()?)
     }
+}
+
+/// Returns the offset of an operation's constants: of equal ones from `shared` on if present, else appends them to `to`.
+pub(super) fn place_constants(to: &mut Vec<u32>, shared: &mut usize, values: &[f32]) -> u32 {
+    let words: Vec<u32> = values.iter().map(|v| v.to_bits()).collect();
+    let same = |window: &[u32]| window == words;
+    if let Some(at) = to[*shared..].windows(words.len().max(1)).position(same) {
+        return (*shared + at) as u32;
+    }
+    let offset = to.len() as u32;
+    to.extend(words);
+    if values.iter().any(|v| !v.is_finite()) {
+        *shared = to.len();
+    }
+    offset
 }
 
 /// Returns the distances from each row's output to the next row's, and from output 0 to the first.
