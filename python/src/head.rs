@@ -6,6 +6,7 @@ use actq_batch::Batch;
 use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _};
 use numpy::{IntoPyArray as _, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 use crate::error::{error, given, of_python};
 use crate::image::Image;
@@ -30,6 +31,30 @@ impl Head {
         batch.seed(&seeds).map_err(raised)?;
         Ok(batch)
     }
+
+    /// Returns the states u8 [n, bytes], if there are any.
+    fn saved<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArrayDyn<u8>>>> {
+        let saved = py.detach(|| {
+            let kept = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
+            kept.as_ref().map(|batch| Ok((batch.heads(), batch.save()?))).transpose()
+        });
+        let Some((heads, bytes)) = saved.map_err(raised)? else { return Ok(None) };
+        let len = bytes.len() / heads;
+        Ok(Some(bytes.into_pyarray(py).reshape(vec![heads, len])?))
+    }
+}
+
+/// Makes the head that was copied or pickled.
+#[pyfunction]
+pub(crate) fn head_of_states(
+    py: Python<'_>,
+    image: Py<Image>,
+    seed: u32,
+    states: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Head> {
+    let head = Head::new(py, image, None, seed)?;
+    states.map_or(Ok(()), |states| head.restore(py, states))?;
+    Ok(head)
 }
 
 /// Reads a mask of the states to reset: bool [heads].
@@ -129,9 +154,51 @@ impl Head {
         });
     }
 
-    /// Refuses copies: `copy` and `pickle` call it.
-    fn __reduce__(&self) -> PyResult<()> {
-        Err(error!("a head cannot be copied or pickled; make another by actq.Head(head.image, n)"))
+    /// Returns the states of all robots: u8 [n, bytes]. A row has everything besides the image that the next actions of a
+    /// robot depend on.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
+        let Some(saved) = self.saved(py)? else {
+            return Err(error!("the head has no states yet; step it, or make it by actq.Head(image, n)"));
+        };
+        Ok(saved)
+    }
+
+    /// Restores states that `state` returned: the robots go on with the same bits.
+    fn restore(&self, py: Python<'_>, states: &Bound<'_, PyAny>) -> PyResult<()> {
+        let array = py.import("numpy")?.call_method1("asarray", (states,)).map_err(|error| of_python(py, error))?;
+        let Ok(rows) = array.cast::<PyArrayDyn<u8>>() else {
+            return Err(error!("the states are of type {}; pass the array of Head.state()", array.getattr("dtype")?));
+        };
+        let Some(heads) = Some(rows.shape()).filter(|shape| shape.len() == 2 && shape[0] > 0).map(|shape| shape[0])
+        else {
+            return Err(error!(
+                "the states have the shape {:?}; pass the array [n, bytes] of Head.state()",
+                rows.shape()
+            ));
+        };
+        let bytes: Vec<u8> = rows.readonly().as_array().iter().copied().collect();
+        py.detach(|| {
+            let mut kept = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
+            let restored = match &mut *kept {
+                Some(batch) if batch.heads() != heads => {
+                    return Err(error!("{heads} states for a head of {}; make another head", batch.heads()));
+                }
+                Some(batch) => batch.restore(&bytes),
+                none => {
+                    let mut batch = self.states(self.image.get(), heads)?;
+                    let restored = batch.restore(&bytes);
+                    *none = Some(batch).filter(|_| restored.is_ok());
+                    restored
+                }
+            };
+            restored.map_err(raised)
+        })
+    }
+
+    /// Returns how `copy` and `pickle` make the head again: with its states.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let make = py.import("actq._actq")?.getattr("head_of_states")?;
+        (make, (self.image.clone_ref(py), self.seed, self.saved(py)?)).into_pyobject(py)
     }
 
     /// The image.

@@ -19,7 +19,7 @@ mod _actq {
     #[pymodule_export]
     use crate::error::Error;
     #[pymodule_export]
-    use crate::head::Head;
+    use crate::head::{Head, head_of_states};
     #[pymodule_export]
     use crate::image::Image;
     #[pymodule_export]

@@ -23,6 +23,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::error::{OrRaise as _, error, given, raise_of_import};
+use crate::work;
 
 /// A policy in f32, as it was trained.
 ///
@@ -130,7 +131,9 @@ impl Policy {
         };
         let observations: Vec<f32> = observations.as_array().iter().copied().collect();
         let rows: Vec<Vec<f32>> = observations.chunks(len).map(<[f32]>::to_vec).collect();
-        py.detach(|| actions(&self.policy, &rows)).concat().into_pyarray(py).reshape(shape)
+        let policy = Arc::clone(&self.policy);
+        let actions = work::interruptible(py, None, move |_| Ok(actions(&policy, &rows).concat()))?;
+        actions.into_pyarray(py).reshape(shape)
     }
 
     /// Returns the policy itself, because it never changes.
@@ -187,7 +190,7 @@ pub(crate) fn import_path(
     #[pyo3(from_py_with = given)] answers: String,
     #[pyo3(from_py_with = given)] profile: Option<String>,
 ) -> PyResult<Policy> {
-    py.detach(|| {
+    let import = move || {
         let limits = stated(limits);
         let choice = Choice { output, states, observed: observe, limits, rate_hz, ..Choice::default() };
         let is_answered = accept_profile || !answers.is_empty() || profile.is_some();
@@ -222,7 +225,9 @@ pub(crate) fn import_path(
         let files = FILES.map(|name| fs::read(path.join(name)));
         let own = if let [Ok(json), Ok(weights)] = files { Some([json, weights]) } else { None };
         Ok(Policy::new(policy, own.filter(|_| !DeployFolder.accepts(&path))))
-    })
+    };
+    // The exception of a failed import is the result of the work.
+    work::interruptible(py, None, move |_| Ok(import()))?
 }
 
 /// Imports a bundle into a temporary folder, as `actq import` does into a lasting one.
@@ -281,7 +286,7 @@ pub(crate) fn import_onnx<'py>(
     #[pyo3(from_py_with = given)] limits: [Vec<f64>; 3],
     #[pyo3(from_py_with = given)] rate_hz: Option<f64>,
 ) -> PyResult<(Policy, Bound<'py, PyDict>)> {
-    let (imported, policy, probes, actions) = py.detach(|| {
+    let import = move || {
         let limits = stated(limits);
         let choice = Choice { output, states, observed: observe, rate_hz, ..Choice::default() };
         let import = |choice: &Choice| {
@@ -302,7 +307,8 @@ pub(crate) fn import_onnx<'py>(
             }
         };
         PyResult::Ok((imported, Policy::new(policy, Some([json, weights])), probes, actions))
-    })?;
+    };
+    let (imported, policy, probes, actions) = work::interruptible(py, None, move |_| Ok(import()))??;
     let plan = PyDict::new(py);
     plan.set_item("inputs", imported.inputs)?;
     plan.set_item("states", imported.states.into_iter().map(|(from, to, _)| (from, to)).collect::<Vec<_>>())?;

@@ -73,6 +73,15 @@ pub(crate) fn run<T: Send + 'static>(
     work: impl FnOnce(&Worker) -> anyhow::Result<T> + Send + 'static,
 ) -> PyResult<T> {
     refuse_forked()?;
+    interruptible(py, progress, work)
+}
+
+/// As [`run`], for work in one thread, which a forked process can do, too.
+pub(crate) fn interruptible<T: Send + 'static>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Worker) -> anyhow::Result<T> + Send + 'static,
+) -> PyResult<T> {
     let shared = Arc::new(Shared::default());
     let events = start(&shared, work)?;
     let result = wait(py, progress, &shared, &Mutex::new(events));

@@ -2,11 +2,11 @@
 
 import copy
 import os
-import pickle
 import re
 import signal
 import subprocess
 import sys
+import time
 import threading
 from types import SimpleNamespace
 
@@ -116,8 +116,7 @@ def test_wrong_types_are_errors_of_actq(mlp, observations):
         "port": lambda: actq.Link(3),
         "output": lambda: actq.import_policy(mlp, output=3),
         "states": lambda: actq.import_policy(mlp, states={"h": 3}),
-        "copy of a head": lambda: copy.deepcopy(head),
-        "pickle of a head": lambda: pickle.dumps(head),
+        "states of a head": lambda: head.restore(3),
     }
     for name, call in calls.items():
         with pytest.raises(Exception) as raised:
@@ -192,6 +191,29 @@ except KeyboardInterrupt:
     lines = process.communicate()[0].splitlines()
     assert "interrupted" in lines and lines[-1].startswith("goes on") and process.returncode == 0
     assert os.listdir(tmp_path) == []
+
+
+def test_ctrl_c_ends_a_policys_actions_within_a_second(mlp):
+    script = f"""
+import actq, numpy, signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
+policy = actq.import_policy({str(mlp)!r})
+rows = numpy.zeros((1_000_000, 12), numpy.float32)
+try:
+    print("begun", flush=True)
+    policy(rows)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "begun\n"
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    sent = time.monotonic()
+    assert process.stdout.readline() == "interrupted\n"
+    assert time.monotonic() - sent < 1
+    process.kill()
+    process.wait()
 
 
 def test_an_exception_of_a_callback_ends_the_work():

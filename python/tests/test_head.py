@@ -1,6 +1,8 @@
 """Actions are those of `actq serve`, bit for bit."""
 
+import copy
 import os
+import pickle
 import subprocess
 import sys
 import threading
@@ -10,6 +12,7 @@ import pytest
 
 import actq
 from conftest import UR3
+from test_export import quantized, recurrent
 
 
 def served(command, path, observations):
@@ -140,3 +143,66 @@ def test_other_threads_run_during_a_step(image):
     stop.set()
     thread.join()
     assert during > 1000
+
+
+@pytest.mark.parametrize("kind", ["mlp", "recurrent", "flow"])
+def test_restored_states_go_on_with_the_same_bits(kind, mlp, flow, tmp_path):
+    if kind == "recurrent":
+        (tmp_path / "policy").mkdir()
+    sources = {"mlp": lambda: quantized(mlp), "recurrent": lambda: quantized(recurrent(tmp_path / "policy")), "flow": lambda: flow}
+    image = sources[kind]()
+    rows = np.random.default_rng(3).normal(size=(12, 5, image.obs_len)).astype(np.float32)
+    head = actq.Head(image, seed=7)
+    for row in rows[:4]:
+        head(row)
+    states, copied, loaded = head.state(), copy.deepcopy(head), pickle.loads(pickle.dumps(head))
+    assert states.dtype == np.uint8 and states.shape[0] == 5
+    later = [head(row).tobytes() for row in rows[4:]]
+    head.reset()
+    head.restore(states)
+    restored = actq.Head(image)
+    restored.restore(states)
+    for other in (copied, loaded, head, restored):
+        assert other.n == 5 and other.image == image
+        assert [other(row).tobytes() for row in rows[4:]] == later
+    # A robot's state in another order, and several times.
+    many = actq.Head(image, 3)
+    many.restore(states[[2, 2, 0]])
+    first = many(rows[4][[2, 2, 0]])
+    assert first.tobytes() == np.frombuffer(later[0], np.float32).reshape(5, -1)[[2, 2, 0]].tobytes()
+
+
+def test_a_head_before_its_first_step_is_copied(image):
+    rows = np.random.default_rng(3).normal(size=(4, image.obs_len)).astype(np.float32)
+    head = actq.Head(image, seed=3)
+    loaded = pickle.loads(pickle.dumps(head))
+    assert loaded.n is None and loaded(rows).tobytes() == head(rows).tobytes()
+    with pytest.raises(actq.Error, match="the head has no states yet; step it, or make it by actq.Head"):
+        actq.Head(image).state()
+
+
+def test_states_that_do_not_fit_change_nothing(image, mlp):
+    rows = np.random.default_rng(3).normal(size=(4, image.obs_len)).astype(np.float32)
+    head, other = actq.Head(image), actq.Head(quantized(mlp, bits=2), 4)
+    head(rows)
+    states = head.state()
+    damaged = states.copy()
+    damaged[3, -1] ^= 1
+    for given, text in [
+        (damaged, "state 3: saved state is damaged"),
+        (states[:3], "3 states for a head of 4"),
+        (states[0], r"the states have the shape \[\d+\]; pass the array \[n, bytes\] of Head.state"),
+        (states[:0], r"the states have the shape \[0, \d+\]"),
+        (states.astype(float), "the states are of type float64"),
+        (states[:, :-1], "the states have .* bytes; the batch needs"),
+        ("x", "the states are of type <U1"),
+    ]:
+        with pytest.raises(actq.Error, match=text):
+            head.restore(given)
+        assert head.state().tobytes() == states.tobytes()
+    empty = actq.Head(image)
+    with pytest.raises(actq.Error, match="state 3: saved state is damaged"):
+        empty.restore(damaged)
+    assert empty.n is None
+    with pytest.raises(actq.Error, match="state 0: saved state belongs to another image"):
+        actq.Head(quantized(mlp, bits=3), 4).restore(other.state())

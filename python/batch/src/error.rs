@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use actq_kernels::{ImageError, StepError};
+use actq_kernels::{ImageError, SavedError, StepError};
 
 /// Why a batch was not made, or a call failed. [`Batch::step`](crate::Batch::step) says what an error leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +45,20 @@ pub enum Error {
         /// Seeds given.
         given: usize,
     },
+    /// The saved states of all heads have another number of bytes.
+    States {
+        /// Bytes expected.
+        expected: usize,
+        /// Bytes given.
+        given: usize,
+    },
+    /// The state of a head was not saved or restored; it is the first of those.
+    Saved {
+        /// Index of the head in the batch.
+        head: usize,
+        /// Its error.
+        error: SavedError,
+    },
     /// A head gave no action; it is the first of those that gave none.
     Head {
         /// Index of the head in the batch.
@@ -70,6 +84,8 @@ impl fmt::Display for Error {
                 write!(f, "the reset mask has {given} values; the batch has {expected} heads")
             }
             Self::Seeds { expected, given } => write!(f, "{given} seeds were given; the batch has {expected} heads"),
+            Self::States { expected, given } => write!(f, "the states have {given} bytes; the batch needs {expected}"),
+            Self::Saved { head, error } => write!(f, "state {head}: {error}"),
             Self::Head { head, error } => write!(f, "head {head}: {error}"),
         }
     }
@@ -79,6 +95,7 @@ impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Self::Image(error) => Some(error),
+            Self::Saved { error, .. } => Some(error),
             Self::Head { error, .. } => Some(error),
             _ => None,
         }

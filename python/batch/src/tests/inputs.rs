@@ -4,7 +4,7 @@ use std::error::Error as _;
 
 use actq::random::Random;
 use actq_bench::bits;
-use actq_kernels::{ImageError, StepError};
+use actq_kernels::{ImageError, SavedError, StepError};
 use anyhow::Result;
 
 use super::{images, with_heads};
@@ -138,4 +138,34 @@ fn a_batch_moves_between_threads() {
     fn check<T: Send + Sync>() {}
     check::<Batch>();
     check::<Error>();
+}
+
+#[test]
+fn restored_states_go_on_with_the_same_bits() -> Result<()> {
+    let (mut batch, observations, mut actions) = batch()?;
+    let heads = batch.heads();
+    batch.seed(&(0..heads as u32).collect::<Vec<_>>())?;
+    batch.step(&observations, None, &mut actions)?;
+    let saved = batch.save()?;
+    let mut next = actions.clone();
+    batch.step(&observations, None, &mut next)?;
+    let after = batch.save()?;
+    batch.reset();
+    // One damaged row restores nothing.
+    let before = batch.save()?;
+    let mut damaged = saved.clone();
+    *damaged.last_mut().expect("there are bytes") ^= 1;
+    let error = batch.restore(&damaged).expect_err("it is damaged");
+    assert_eq!(error, Error::Saved { head: heads - 1, error: SavedError::Damaged });
+    assert_eq!(batch.save()?, before);
+    let (expected, given) = (saved.len(), saved.len() - 1);
+    assert_eq!(batch.restore(&saved[1..]).expect_err("it is short"), Error::States { expected, given });
+    batch.restore(&saved)?;
+    batch.step(&observations, None, &mut actions)?;
+    assert_eq!(
+        actions.iter().map(|a| a.to_bits()).collect::<Vec<_>>(),
+        next.iter().map(|a| a.to_bits()).collect::<Vec<_>>()
+    );
+    assert_eq!(batch.save()?, after);
+    Ok(())
 }
