@@ -154,15 +154,21 @@ def _of_rsl_rl(runner: Any, name: str) -> Model:
         raise Error(f"{name}: only runners of rsl_rl 5 can be imported; export the policy, and pass the file")
     module: Any = policy.as_onnx(verbose=False).cpu().eval()
     example = tuple(tensor.cpu() for tensor in module.get_dummy_inputs())
-    observations = drawn(example[0].shape[-1])
+    # Groups that a CNN reads are inputs of their own.
+    images = dict(zip(getattr(policy, "obs_groups_2d", []), (tensor.shape[1:] for tensor in example[1:])))
+    lengths = [example[0].shape[-1], *(shape.numel() for shape in images.values())]
+    observations = drawn(sum(lengths))
 
     def predict(rows: Array) -> Array:
-        # Groups of observations are joined in their order: the first one has all values here.
+        # Other groups of observations are joined in their order: the first one has all their values here.
         own = copied(policy, name).cpu()
         own.reset()
-        first, *others = own.obs_groups
-        steps = [{first: row, **{other: row[:, :0] for other in others}} for row in torch.from_numpy(rows)[:, None]]
-        return np.concatenate([own(step).detach().numpy() for step in steps])
+        actions = []
+        for flat, *planes in (row.split(lengths) for row in torch.from_numpy(rows)):
+            step = {group: flat[None] if i == 0 else flat[None, :0] for i, group in enumerate(own.obs_groups)}
+            step.update({group: plane.reshape(1, *images[group]) for group, plane in zip(images, planes)})
+            actions.append(own(step).detach().numpy())
+        return np.concatenate(actions)
 
     return Model(module, example, list(module.input_names), list(module.output_names), observations, predict)
 
