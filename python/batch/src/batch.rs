@@ -119,22 +119,21 @@ impl Batch {
         Ok(())
     }
 
-    /// Returns the bytes of one head's saved state: see [`Head::saved_len`].
-    pub fn saved_len(&self) -> usize {
-        self.heads.borrow_dependent().heads.first().map_or(0, Head::saved_len)
-    }
-
-    /// Returns the state of each head as [`Head::save`] writes it, a row of [`Self::saved_len`] bytes for each.
+    /// Returns the state of each head as [`Head::save`] writes it, a row of [`Head::saved_len`] bytes for each.
     ///
     /// # Errors
     ///
     /// [`Error::Saved`] as [`Head::save`].
     pub fn save(&self) -> Result<Vec<u8>, Error> {
-        let len = self.saved_len();
-        let mut rows = vec![0; self.heads() * len];
-        let heads = self.heads.borrow_dependent().heads.iter().zip(rows.chunks_exact_mut(len)).enumerate();
-        for (head, (from, row)) in heads {
-            from.save(row).map_err(|error| Error::Saved { head, error })?;
+        let image = *self.image();
+        let (mut rows, mut scratch) = (Vec::new(), vec![0; image.scratch_words()]);
+        let words = self.words.chunks_exact(Parked::words(&image));
+        for (head, (parked, words)) in self.heads.iter().zip(words).enumerate() {
+            // The memory has the words that a head needs.
+            let Ok(from) = parked.resume(image, words, &mut scratch) else { break };
+            let at = rows.len();
+            rows.resize(at + from.saved_len(), 0);
+            from.save(&mut rows[at..]).map_err(|error| Error::Saved { head, error })?;
         }
         Ok(rows)
     }
@@ -147,29 +146,24 @@ impl Batch {
     /// [`Error::States`] if there is not one row for each head, and [`Error::Saved`] for a row that [`Head::restore`]
     /// refuses: then every head keeps its state.
     pub fn restore(&mut self, rows: &[u8]) -> Result<(), Error> {
-        let (expected, given) = (self.heads() * self.saved_len(), rows.len());
+        let before = self.save()?;
+        let (expected, given) = (before.len(), rows.len());
         if expected != given {
             return Err(Error::States { expected, given });
         }
-        let before = self.save()?;
-        let restored = self.restore_rows(rows);
-        if restored.is_err() {
-            self.restore_rows(&before)?;
-        }
-        restored
-    }
-
-    fn restore_rows(&mut self, rows: &[u8]) -> Result<(), Error> {
-        let len = self.saved_len();
-        self.heads.with_dependent_mut(|_, Heads { heads, .. }| {
-            for (head, (to, row)) in heads.iter_mut().zip(rows.chunks_exact(len)).enumerate() {
-                to.restore(row).map_err(|error| Error::Saved { head, error })?;
+        let len = expected / self.heads();
+        let mut failed = None;
+        self.each(|i, head| {
+            if let Err(error) = head.restore(&rows[i * len..][..len]) {
+                failed = failed.or(Some(Error::Saved { head: i, error }));
             }
-            Ok(())
-        })
+        });
+        let Some(error) = failed else { return Ok(()) };
+        self.restore(&before)?;
+        Err(error)
     }
 
-    fn each(&mut self, work: impl Fn(usize, &mut Head<'_, '_>)) {
+    fn each(&mut self, mut work: impl FnMut(usize, &mut Head<'_, '_>)) {
         let image = *self.image.borrow_dependent();
         let mut scratch = vec![0; image.scratch_words()];
         let words = self.words.chunks_exact_mut(Parked::words(&image));
