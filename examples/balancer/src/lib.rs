@@ -13,6 +13,10 @@
 #![forbid(unsafe_code)]
 
 pub mod expert;
+/// The generator of `actq`, without the rest of that crate, which browsers have no use for.
+#[allow(dead_code, unreachable_pub, reason = "shared with actq, which uses all of it")]
+#[path = "../../../crates/actq/src/random.rs"]
+mod random;
 mod robot;
 mod task;
 

@@ -1,6 +1,6 @@
 //! Dynamics of the robot: a body on two wheels that leans in the plane of motion, and turns about the vertical.
 
-use actq::random::Random;
+use crate::random::Random;
 
 /// Largest torque of a motor, N m.
 pub const TORQUE_LIMIT: f64 = 0.6;

@@ -1,8 +1,8 @@
 //! The task: to drive at commanded speeds and turn rates, in spite of pushes, noise and an unknown load.
 
-use actq::random::Random;
 use anyhow::Result;
 
+use crate::random::Random;
 use crate::robot::{Robot, State, TRACK, WHEEL_RADIUS};
 
 /// Values of all sensors and of the command, one after the other: angular velocity (3), orientation (4: w, x, y, z),
@@ -86,6 +86,16 @@ impl Task {
     /// Returns the true state and the command, for the expert.
     pub fn truth(&self) -> (&State, [f64; 2]) {
         (&self.robot.state, self.command)
+    }
+
+    /// Pushes the robot at its centre of mass with `force` N, from now on for as long as the task's own pushes last.
+    pub fn push(&mut self, force: f64) {
+        (self.push, self.push_at) = (force, self.step);
+    }
+
+    /// Replaces the command of speed (m/s) and turn rate (rad/s), until the task's next one.
+    pub fn command(&mut self, command: [f64; 2]) {
+        self.command = command;
     }
 
     /// Returns what the sensors show, and the command ([`RAW_LEN`]). It differs in each call, by noise.

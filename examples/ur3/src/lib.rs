@@ -14,10 +14,13 @@
 
 pub mod expert;
 pub mod kinematics;
+#[cfg(not(target_family = "wasm"))]
 pub mod pipe;
+#[cfg(not(target_family = "wasm"))]
 pub mod policy_f32;
 pub mod random;
 pub mod servo;
+#[cfg(not(target_family = "wasm"))]
 pub mod summary;
 pub mod task;
 

@@ -1,7 +1,7 @@
 //! The reach-and-hold task: two goals in turn, a push on the way to each, noisy observations.
 
 use crate::expert::{self, HOME};
-use crate::kinematics::{Goal, Joints, PoseError, norm, pose_error, subtract, tool};
+use crate::kinematics::{Goal, Joints, PoseError, Vector, norm, pose_error, subtract, tool};
 use crate::random::Random;
 use crate::servo::Servo;
 use crate::{ACT_DIM, OBS_DIM};
@@ -102,6 +102,32 @@ impl Task {
     /// (3, m), rotation vector from tool axis to goal axis (3, rad), all with noise, vectors in the base frame.
     pub fn observe(&self) -> [f32; OBS_DIM] {
         self.observation
+    }
+
+    /// Returns the joint angles, without noise.
+    pub fn joints(&self) -> &Joints {
+        &self.servo.angle
+    }
+
+    /// Returns the present goal.
+    pub fn goal(&self) -> &Goal {
+        &self.goals[self.phase()]
+    }
+
+    /// Replaces the position of the present goal, m.
+    pub fn move_goal(&mut self, position: Vector) {
+        let phase = self.phase();
+        self.goals[phase].position = position;
+    }
+
+    /// Pushes a joint with this acceleration, rad/s², from now on for as long as the task's own pushes last.
+    pub fn push(&mut self, joint: usize, acceleration: f64) {
+        let (phase, start) = (self.phase(), self.step % STEPS_PER_GOAL);
+        let mut all = [0.0; 6];
+        if let Some(value) = all.get_mut(joint) {
+            *value = acceleration;
+        }
+        self.pushes[phase] = Push { start, acceleration: all };
     }
 
     /// Runs one control step (20 ms) with joint velocity commands `action` (rad/s). NaN counts as 0, as with a servo's

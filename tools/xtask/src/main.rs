@@ -1,6 +1,7 @@
 //! The commands for users and CI: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`,
 //! `cargo xtask fit`, `cargo xtask peers`, `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`,
-//! `cargo xtask capi`, `cargo xtask python`, `cargo xtask wasm`, `cargo xtask doctor`.
+//! `cargo xtask capi`, `cargo xtask python`, `cargo xtask wasm`, `cargo xtask gallery`, `cargo xtask
+//! doctor`.
 //!
 //! This crate has few dependencies, so that it builds fast and prints soon. The binaries of `actq-bench` and
 //! `actq-research` measure.
@@ -53,6 +54,9 @@ enum Command {
     Python(python::Options),
     /// Compile the kernels to the WebAssembly module of the report and of the npm package
     Wasm(wasm::Options),
+    /// Build the gallery: a page in which simulated robots are driven by images of few bits, with --out DIR
+    #[command(disable_help_flag = true)]
+    Gallery(Words),
     /// Quantize the UR3 policy, run it on a Cortex-M4 in QEMU in closed loop, and show cost and success
     #[command(disable_help_flag = true)]
     Demo(Words),
@@ -99,6 +103,7 @@ fn main() -> ExitCode {
         Command::Firmware(options) => options.run(),
         Command::Python(options) => python::test(options),
         Command::Wasm(options) => wasm::run(&options),
+        Command::Gallery(options) => wasm::gallery(options),
         Command::Compare(options) => measuring("actq-research", "compare", options),
         Command::Capi(options) => measure_for(Target::ALL.iter().copied(), "capi", options),
         Command::Stack(options) => measure_for(firmware::boards().map(|(target, _)| target), "stack", options),

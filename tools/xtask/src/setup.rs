@@ -32,7 +32,10 @@ pub(crate) fn ensure(targets: &[Target]) -> Result<()> {
 pub(crate) fn doctor() -> Result<()> {
     ensure(&Target::ALL)?;
     rust_target(crate::wasm::TARGET)?;
-    let optional = [node().map_err(|why| format!("tests of the npm package: {why}")), browser().map(drop)];
+    let optional = [
+        node().map_err(|why| format!("tests of the npm package: {why}")),
+        browser().map_err(|why| format!("tests of the pages: {why}")),
+    ];
     let missing: Vec<String> = optional.into_iter().filter_map(Result::err).collect();
     missing.iter().for_each(|why| println!("missing: {why}"));
     if missing.is_empty() {
@@ -49,12 +52,12 @@ pub(crate) fn node() -> Result<(), String> {
     if major.is_some_and(|major| major >= 20) { Ok(()) } else { Err(missing()) }
 }
 
-/// Returns the driver of a Chromium; an error names what to install.
-pub(crate) fn browser() -> Result<&'static str, String> {
-    let found = output("chromedriver", &["--version"]).and_then(|_| output("chromium", &["--version"]));
-    found.map(|_| "chromedriver").map_err(|_| {
-        "tests in a browser: Chromium is missing; on Debian, install chromium and chromium-driver".to_owned()
-    })
+/// Checks for a Chromium, and for npm, which brings its client; an error names what to install.
+pub(crate) fn browser() -> Result<(), String> {
+    let found = output("chromium", &["--version"]).and_then(|_| output("npm", &["--version"]));
+    found
+        .map(drop)
+        .map_err(|_| "Chromium or npm is missing; on Debian, install the packages chromium and npm".to_owned())
 }
 
 /// Installs cargo's tools that a toolchain may lack.

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use actq_boards::{root, target_dir};
@@ -10,7 +11,7 @@ use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
-use crate::setup;
+use crate::{Words, measuring, setup};
 
 /// rustc's target.
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
@@ -24,6 +25,19 @@ pub(crate) struct Options {
     /// Compare the module in the tree with a new one, and run the package's tests in Node, instead
     #[arg(long)]
     check: bool,
+}
+
+/// Compiles the robots, and builds the gallery with them.
+pub(crate) fn gallery(Words { mut words }: Words) -> Result<()> {
+    setup::rust_target(TARGET)?;
+    compile("actq-gallery", "actq_gallery")?;
+    words.extend(["--robots".to_owned(), place("actq_gallery").display().to_string()]);
+    measuring("actq-bench", "gallery", Words { words })
+}
+
+/// Returns the path of a compiled module.
+fn place(name: &str) -> PathBuf {
+    target_dir().join(TARGET).join("wasm").join(format!("{name}.wasm"))
 }
 
 /// Compiles the module, and writes or compares it.
@@ -48,7 +62,7 @@ pub(crate) fn compile(package: &str, name: &str) -> Result<Vec<u8>> {
     let mut cargo = setup::cargo();
     cargo.current_dir(root()).args(arguments).args(["--profile", "wasm"]);
     ensure!(cargo.status().context("cannot start cargo")?.success(), "{package}: cannot be compiled to WebAssembly");
-    let path = target_dir().join(TARGET).join("wasm").join(format!("{name}.wasm"));
+    let path = place(name);
     fs::read(&path).with_context(|| format!("{}: cannot read the file", path.display()))
 }
 
@@ -71,13 +85,27 @@ fn compare(compiled: &[u8], packed: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Runs the tests of the npm package, if there is a Node that can.
+/// Runs the tests of the npm package, if there is a Node that can; with a browser, also those of the pages.
 fn test_in_node() -> Result<()> {
     if let Err(why) = setup::node() {
-        println!("SKIPPED: tests of the npm package: {why}");
+        println!("SKIPPED: tests of the npm package and of the pages: {why}");
         return Ok(());
     }
-    let status = Command::new("node").args(["--test", "test/"]).current_dir(root().join("javascript")).status();
-    ensure!(status.context("cannot start node")?.success(), "the tests of the npm package failed");
-    Ok(())
+    let folder = root().join("javascript");
+    let run = |program: &str, arguments: &[&str], pages: &Path| -> Result<()> {
+        let status = Command::new(program).args(arguments).env("ACTQ_PAGES", pages).current_dir(&folder).status();
+        let text = format!("{program} {}", arguments.join(" "));
+        ensure!(status.with_context(|| format!("cannot start {program}"))?.success(), "{text} failed");
+        Ok(())
+    };
+    let pages = target_dir().join("pages");
+    if let Err(why) = setup::browser() {
+        println!("SKIPPED: tests of the pages: {why}");
+        return run("node", &["--test", "test/head.test.js"], &pages);
+    }
+    let words = ["--quick", "--out"].map(str::to_owned).into_iter().chain([pages.display().to_string()]);
+    gallery(Words { words: words.collect() })?;
+    // The client of the browser; it brings no browser.
+    run("npm", &["ci", "--ignore-scripts", "--no-audit", "--no-fund"], &pages)?;
+    run("node", &["--test", "test/"], &pages)
 }

@@ -86,7 +86,8 @@ impl Sweep {
 }
 
 const HTML: &str = include_str!("page/page.html");
-const CSS: &str = include_str!("page/page.css");
+/// The style of the page.
+pub const CSS: &str = include_str!("page/page.css");
 const SCRIPT: &str = include_str!("page/page.js");
 
 /// Formats the file.
@@ -131,12 +132,16 @@ fn script_safe(json: &str) -> String {
 }
 
 /// Encodes bytes for the page.
-fn encoded(bytes: &[u8]) -> String {
+pub fn encoded(bytes: &[u8]) -> String {
     Base64::encode_string(bytes)
 }
 
 /// Compresses bytes, and encodes them for the page.
-fn packed(bytes: &[u8]) -> Result<String> {
+///
+/// # Errors
+///
+/// If the compressor fails, which it does not in memory.
+pub fn packed(bytes: &[u8]) -> Result<String> {
     let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
     gzip.write_all(bytes)?;
     Ok(encoded(&gzip.finish()?))

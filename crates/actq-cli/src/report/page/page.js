@@ -88,6 +88,11 @@ document.getElementById("top").append(
   el("p", { class: "soft mono" }, `sha256 ${facts.sha256}`),
 );
 
+// Charts have the width of the page, so that their text keeps its size.
+const drawn = [];
+addEventListener("resize", () => drawn.forEach((draw) => draw()));
+const fitting = (most) => Math.max(280, Math.min(most, main.clientWidth - 40));
+
 // A chart of lines or points over two linear or logarithmic axes.
 function chart({ label, width = 560, height = 300, x, y, draw }) {
   const [left, right, top, bottom] = [64, 16, 14, 44];
@@ -107,7 +112,7 @@ function chart({ label, width = 560, height = 300, x, y, draw }) {
     return Array.from({ length: Math.floor(max / s + 1e-9) - Math.ceil(min / s - 1e-9) + 1 }, (_, i) => (Math.ceil(min / s - 1e-9) + i) * s);
   };
   const shown = (v, { log }) => (log ? v.toExponential(0) : String(Number(v.toPrecision(6))));
-  const root = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label });
+  const root = svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "img", "aria-label": label });
   for (const v of ticks(x)) {
     root.append(svg("line", { x1: sx(v), x2: sx(v), y1: top, y2: height - bottom, class: "axis" }),
       svg("text", { x: sx(v), y: height - bottom + 18, "text-anchor": "middle", class: "soft" }, shown(v, x)));
@@ -133,7 +138,7 @@ if (sweep?.images.length) {
   const curves = [...new Set(sweep.images.map(({ curve }) => curve))];
   const marks = ["M-5,0a5,5 0 1,0 10,0a5,5 0 1,0 -10,0", "M-5,-5h10v10h-10z", "M0,-6l6,10h-12z", "M0,-7l6,7l-6,7l-6,-7z", "M-6,-2h4v-4h4v4h4v4h-4v4h-4v-4h-4z"];
   const panel = (key, name) => chart({
-    label: `Error over ${name}`, x: { ...range(sweep.images.map((image) => image[key])), name }, y: range(sweep.images.map((image) => Math.max(image.nmse, 1e-14)), true),
+    width: fitting(560), label: `Error over ${name}`, x: { ...range(sweep.images.map((image) => image[key])), name }, y: range(sweep.images.map((image) => Math.max(image.nmse, 1e-14)), true),
     draw(root, sx, sy) {
       const at = (image) => [sx(image[key]), sy(Math.max(image.nmse, 1e-14))];
       const line = sweep.images.filter((image) => image.is_frontier).sort((a, b) => a[key] - b[key]).map((image) => at(image).join(",")).join(" ");
@@ -148,10 +153,14 @@ if (sweep?.images.length) {
       }
     },
   });
+  const place = el("div", { class: "two" });
+  const draw = () => place.replaceChildren(panel("bytes", "bytes of flash"), panel("milliseconds", `predicted ms, Cortex-M4F at ${sweep.clock_hz / 1e6} MHz`));
+  draw();
+  drawn.push(draw);
   const rows = sweep.images.map((image) => [image.curve + (image.is_own ? " (this image)" : ""), integer(image.bytes), image.milliseconds.toFixed(3), error(image.nmse), image.success ? percent(image.success[0]) : "-"]);
   section("frontier", "Frontier", el("p", {}, "Each mark is an image of the sweep; the line joins those that no other image beats in bytes and error. The vertical axis is the NMSE of the actions on held-out observations."),
     legend(curves.map((name, i) => [name, PALETTE[i % PALETTE.length]])),
-    el("div", { class: "two" }, panel("bytes", "bytes of flash"), panel("milliseconds", `predicted ms, Cortex-M4F at ${sweep.clock_hz / 1e6} MHz`)),
+    place,
     el("details", {}, el("summary", {}, "As a table"), table(["curve", "bytes", "ms", "NMSE", "success"], rows, [1, 2, 3, 4])));
 }
 
@@ -210,7 +219,7 @@ const live = {};
 if (runs) {
   const worstShare = Math.max(...runs.actions.map(([ratio]) => ratio ?? 0));
   const bar = (share) => el("div", { class: "bar", style: "--c: var(--image)" }, el("i", { style: `left:0;width:${100 * share}%` }));
-  const actions = table(["action", "NMSE", "", "largest difference"], runs.actions.map(([ratio, max], i) => [actionNames[i], error(ratio), bar(worstShare ? (ratio ?? 0) / worstShare : 0), value(max)]), [1, 3]);
+  const actions = table(["action", "NMSE", "", "largest"], runs.actions.map(([ratio, max], i) => [actionNames[i], error(ratio), bar(worstShare ? (ratio ?? 0) / worstShare : 0), value(max)]), [1, 3]);
   const layers = facts.ops.map((op, i) => [op, i]).filter(([op]) => op.matrix !== null);
   const byLayer = table(["matrix", "weights", "rounding"], layers.map(([op, i]) => {
     const { name, error_share } = facts.matrices[op.matrix];
@@ -223,13 +232,14 @@ if (runs) {
     const [exact, own] = [runs.trace[0][i], runs.trace[1][i]];
     const line = (values, sx, sy, stroke, dash) => svg("polyline", { points: values.map((v, t) => `${sx(t)},${sy(v)}`).join(" "), fill: "none", stroke, "stroke-width": 1.6, ...(dash && { "stroke-dasharray": dash }) });
     place.replaceChildren(chart({
-      label: `${actionNames[i]} over an episode, f32 and image`, width: 1100, height: 280, x: { min: 0, max: Math.max(1, exact.length - 1), name: "step of the first episode" }, y: { ...range([...exact, ...own]), name: "" },
+      label: `${actionNames[i]} over an episode, f32 and image`, width: fitting(1100), height: 280, x: { min: 0, max: Math.max(1, exact.length - 1), name: "step of the first episode" }, y: { ...range([...exact, ...own]), name: "" },
       draw(root, sx, sy) {
         root.append(line(own, sx, sy, "var(--image)"), line(exact, sx, sy, "var(--exact)", "6 4"));
       },
     }));
   }
   trace();
+  drawn.push(trace);
   const worst = table(["episode", "step", "error"], runs.worst.map((one) => {
     const load = () => live.load?.(one.observation);
     const key = (event) => (event.key === "Enter" || event.key === " ") && (event.preventDefault(), load());
@@ -304,7 +314,8 @@ async function start() {
     return { row, own, other, difference, mark };
   });
   output.replaceChildren(table(["action", "image", ...(exact ? ["f32", "difference"] : []), ""], rows.map(({ row }) => row), exact ? [1, 2, 3] : [1]),
-    exact && data.head.reference.bits === 16 ? el("p", { class: "soft" }, "For the size of this file, the weights of the f32 policy are rounded to 16 bits here; the errors above are of the exact ones.") : "");
+    exact && data.head.reference.bits === 16 ? el("p", { class: "soft" }, "For the size of this file, the weights of the f32 policy are rounded to 16 bits here; the errors above are of the exact ones.") : "",
+    runs && !exact ? el("p", { class: "soft" }, "The f32 policy is too large for this file; the section on errors compares with it.") : "");
   live.step = () => {
     message.textContent = "";
     try {
@@ -398,7 +409,7 @@ if (facts.ports.length) {
   const port = ({ kind, name, names, len, range: [low, high] }) => el("div", {}, el("strong", {}, name), ` (${kind}, ${len})`, low !== null || high !== null ? el("div", { class: "soft" }, `${low ?? "-"} to ${high ?? "-"}`) : "", names.length ? el("ol", { start: "0" }, ...names.map((joint) => el("li", {}, joint))) : "");
   const ops = (list) => el("ol", {}, ...list.map((op) => el("li", {}, `${op.name} ${op.detail} \u2192 ${op.output}`)));
   const column = (title, ...content) => el("div", {}, el("h3", { style: "margin-top:0" }, title), ...content);
-  section("around", "Raw inputs to targets", el("p", {}, "What the robot gives, what happens before and after the network, and what the robot gets, read from the image."),
+  section("around", "Raw inputs to targets", el("p", {}, "The values of the robot, the operations around the network, and its targets, read from the image."),
     el("div", { class: "flow" }, column("Raw inputs", ...facts.ports.filter(isInput).map(port)), column("Before the network", ops(first < 0 ? facts.ops : facts.ops.slice(0, first))), column("Network", el("p", {}, `${facts.matrices.length} matrices`)), column("After the network", ops(first < 0 ? [] : facts.ops.slice(last + 1))), column("Targets", ...facts.ports.filter((p) => !isInput(p)).map(port))));
 }
 

@@ -33,6 +33,8 @@ const MAX_LISTED: usize = 6_000;
 const MAX_GOLDEN: usize = 64_000;
 /// Most f32 weights that a page has whole; of more it has 16 bits each.
 const MAX_F32_WEIGHTS: usize = 210_000;
+/// Most weights of an f32 policy in a page, so that it takes at most 1.5 MB beside the image.
+const MAX_WEIGHTS: usize = 370_000;
 
 /// Actions of the image and of the f32 policy on a recording.
 #[derive(Debug, Serialize)]
@@ -81,7 +83,7 @@ pub struct HeadData {
     pub observations: String,
     /// Bits of this host's actions for them, u32.
     pub actions: String,
-    /// The policy before it was quantized.
+    /// The policy before it was quantized, if it is small enough for a page.
     pub reference: Option<ReferenceData>,
 }
 
@@ -361,7 +363,7 @@ impl HeadData {
             start: observations.first().cloned().unwrap_or_else(|| vec![0.0; image.obs_len()]),
             observations: encoded(&bytes_of(observations.iter().flatten().map(|value| value.to_bits()))),
             actions: encoded(&bytes_of(actions.into_iter())),
-            reference: reference.map(Reference::data).transpose()?,
+            reference: reference.filter(|one| one.weights.len() <= MAX_WEIGHTS).map(Reference::data).transpose()?,
         })
     }
 }

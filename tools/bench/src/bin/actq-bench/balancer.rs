@@ -33,8 +33,7 @@ pub(crate) fn quantize() -> Result<Dataset> {
     let bytes = 4 * policy.parameters;
     println!("\nReading the balancer's bundle ({} parameters, {bytes} bytes in f32)", policy.parameters);
     println!("Recording {RECORDED_EPISODES} episodes of the f32 policy to learn from");
-    let raw = F32::open()?.record()?;
-    let recordings = Recordings { calib: Some(observed(bundle(), &raw)?), heldout: None };
+    let (raw, recordings) = recordings()?;
     for bits in BITS {
         println!("Quantizing to {} with distill", name(bits));
         let options = Options { effort: Effort::Quick, ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
@@ -42,6 +41,13 @@ pub(crate) fn quantize() -> Result<Dataset> {
         files::write(&path(bits), &image)?;
     }
     Ok(raw)
+}
+
+/// Records episodes of the f32 policy: raw values, and the networks' observations in them.
+pub(crate) fn recordings() -> Result<(Dataset, Recordings)> {
+    let raw = F32::open()?.record()?;
+    let calib = Some(observed(bundle(), &raw)?);
+    Ok((raw, Recordings { calib, heldout: None }))
 }
 
 /// Drives the robot with the bundle in f32 and with the images of [`quantize`], on the host and in QEMU; returns a

@@ -35,7 +35,7 @@ const EPISODES_DIVISOR: u64 = 4;
 const RECORDED_EPISODES: usize = 100;
 
 /// Records the observations of the f32 policy's episodes.
-fn record(policy: &mut PolicyF32) -> Result<Dataset> {
+pub(crate) fn record(policy: &mut PolicyF32) -> Result<Dataset> {
     let mut obs = Vec::with_capacity(RECORDED_EPISODES * EPISODE_STEPS * OBS_DIM);
     for seed in 0..RECORDED_EPISODES as u64 {
         policy.reset();

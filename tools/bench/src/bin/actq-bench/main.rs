@@ -10,6 +10,7 @@ mod demo;
 mod descriptions;
 mod faults;
 mod fit;
+mod gallery;
 mod heads;
 mod kernels;
 mod peers;
@@ -98,6 +99,18 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
+    /// Build the gallery: a folder with a page in which simulated robots are driven by images of few bits
+    Gallery {
+        /// The folder to write
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// The module of the robots
+        #[arg(long, value_name = "FILE.wasm")]
+        robots: PathBuf,
+        /// Only the balancer at 2 bits, which learns briefly, and two reports: for tests
+        #[arg(long)]
+        quick: bool,
+    },
     /// Measure the cost model's rates again (after every change of the kernels)
     Fit,
     /// Package the C interface: header, static library, files for build systems, licences and a manifest
@@ -140,6 +153,7 @@ fn main() -> ExitCode {
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
         Command::Fit => fit::run(),
+        Command::Gallery { out, robots, quick } => gallery::build(&out, &robots, quick),
         Command::Peers { ours, json } => peers::run(ours, json.as_deref()),
         Command::Capi { target, out, image, compact } => capi(&target, &out, image.as_deref(), compact),
         Command::Stack { board: Some(board), .. } => stack::of_board(&board),

@@ -1,0 +1,194 @@
+const ROBOTS = [
+  { title: "Balancer", hertz: 100, push: 4, unit: "m/s", error: "speed error", goals: [["speed, m/s", -0.6, 0.6, 0], ["turn rate, rad/s", -1.5, 1.5, 0]], draw: drawBalancer },
+  { title: "UR3 arm", hertz: 50, push: 12, unit: "mm", error: "distance to the goal", goals: [["x, m", -0.45, -0.15, -0.3], ["y, m", -0.3, 0.3, -0.1], ["z, m", 0.05, 0.45, 0.2]], draw: drawArm },
+];
+const data = JSON.parse(document.getElementById("data").textContent);
+const byId = (id) => document.getElementById(id);
+const bytes = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+const unpacked = async (base64) => new Uint8Array(await new Response(new Blob([bytes(base64)]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer());
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name);
+const integer = (n) => n.toString().replace(/\B(?=(\d{3})+$)/g, ",");
+
+const heads = await compile(bytes(byId("heads").textContent));
+const simulation = await WebAssembly.compile(await unpacked(byId("simulation").textContent));
+let which = 0;
+let level = 0;
+let robot;
+let head;
+let seed = 1;
+let isPaused = false;
+let failed = "";
+const opened = new Map();
+
+function weightsOf({ shapes, bits, weights }) {
+  const buffer = bytes(weights).buffer;
+  if (bits === 32) return new Float32Array(buffer);
+  const count = shapes.reduce((sum, [rows, cols]) => sum + rows * cols, 0);
+  const [levels, scales, all] = [new Int16Array(buffer, 0, count), new Float32Array(buffer, 4 * Math.ceil(count / 2)), new Float32Array(count)];
+  let [at, row] = [0, 0];
+  for (const [rows, cols] of shapes) for (let r = 0; r < rows; r++, row++) for (let c = 0; c < cols; c++, at++) all[at] = levels[at] * scales[row];
+  return all;
+}
+/** Opens the head of a level, once: 0 is f32, the others are images. */
+async function headOf(which, level) {
+  const key = `${which} ${level}`;
+  if (!opened.has(key)) {
+    const { reference, images } = data[which];
+    const made = level > 0 ? await Head.open(bytes(images[level - 1].image), heads) : await Head.open(await unpacked(reference.image), heads);
+    if (level === 0) made.useWeights(weightsOf(reference));
+    opened.set(key, made);
+  }
+  return opened.get(key);
+}
+
+async function begin() {
+  const { exports } = await WebAssembly.instantiate(simulation, {});
+  exports.begin(which, seed++);
+  robot = exports;
+  head = await headOf(which, level);
+  head.reset();
+  failed = "";
+}
+/** Switches the bits while the robot runs: the new head starts from its reset. */
+async function change() {
+  head = await headOf(which, level);
+  head.reset();
+}
+const array = (Type, address, length) => new Type(robot.memory.buffer, address, length);
+function step() {
+  try {
+    const action = head.step(array(Float32Array, robot.observation(), robot.number(0)));
+    array(Float32Array, robot.action(), robot.number(1)).set(action);
+  } catch (error) {
+    failed = error.message;
+    head.reset();
+    array(Float32Array, robot.action(), robot.number(1)).fill(0);
+  }
+  if (robot.step()) head.reset();
+}
+
+// Controls.
+function choice(id, names, current, choose) {
+  byId(id).replaceChildren(...names.map((name, i) => {
+    const button = document.createElement("button");
+    Object.assign(button, { type: "button", textContent: name, onclick: () => choose(i) });
+    button.setAttribute("aria-pressed", i === current);
+    return button;
+  }));
+}
+function controls() {
+  choice("robots", data.map(({ robot }) => ROBOTS[robot].title), which, async (i) => {
+    which = i;
+    level = Math.min(level, data[which].images.length);
+    await begin();
+    controls();
+  });
+  choice("levels", ["f32", ...data[which].images.map(({ label }) => label)], level, async (i) => {
+    level = i;
+    await change();
+    controls();
+  });
+  const goals = ROBOTS[data[which].robot].goals;
+  const inputs = goals.map(([name, min, max, value], i) => Object.assign(document.createElement("input"), { type: "range", id: `goal${i}`, min, max, step: 0.01, value, oninput: aim }));
+  const aimAll = () => robot.aim(...[0, 1, 2].map((i) => inputs[i]?.valueAsNumber ?? 0));
+  function aim() { aimAll(); }
+  byId("goal").replaceChildren(...goals.flatMap(([name], i) => [Object.assign(document.createElement("label"), { htmlFor: `goal${i}`, textContent: name }), inputs[i]]));
+}
+byId("left").onclick = () => robot.push(-ROBOTS[data[which].robot].push);
+byId("right").onclick = () => robot.push(ROBOTS[data[which].robot].push);
+byId("pause").onclick = () => {
+  isPaused = !isPaused;
+  byId("pause").setAttribute("aria-pressed", isPaused);
+};
+
+// Pictures.
+function stage() {
+  const canvas = byId("stage");
+  const ratio = devicePixelRatio || 1;
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+  if (canvas.width !== Math.round(width * ratio)) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+  const context = canvas.getContext("2d");
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  Object.assign(context, { lineCap: "round", lineJoin: "round", font: "13px system-ui, sans-serif" });
+  return [context, width, height];
+}
+function line(context, points, stroke, width) {
+  context.beginPath();
+  points.forEach(([x, y]) => context.lineTo(x, y));
+  Object.assign(context, { strokeStyle: stroke, lineWidth: width });
+  context.stroke();
+}
+function disc(context, [x, y], radius, fill) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.fillStyle = fill;
+  context.fill();
+}
+function drawBalancer([distance, lean, yaw, speed, , command], context, width, height) {
+  const [scale, ground, middle] = [height * 1.6, height * 0.82, width / 2];
+  line(context, [[0, ground], [width, ground]], colour("--soft"), 2);
+  for (let mark = Math.ceil((distance - middle / scale) * 5) / 5; mark < distance + middle / scale; mark += 0.2) {
+    const x = middle + (mark - distance) * scale;
+    line(context, [[x, ground], [x, ground + 8]], colour("--soft"), 1);
+  }
+  const wheel = [middle, ground - 0.05 * scale];
+  const top = [wheel[0] + 0.26 * scale * Math.sin(lean), wheel[1] - 0.26 * scale * Math.cos(lean)];
+  line(context, [wheel, top], colour("--image"), 0.09 * scale);
+  disc(context, wheel, 0.05 * scale, colour("--text"));
+  const turn = distance / 0.05;
+  line(context, [wheel, [wheel[0] + 0.045 * scale * Math.sin(turn), wheel[1] - 0.045 * scale * Math.cos(turn)]], colour("--page"), 3);
+  context.fillStyle = colour("--text");
+  context.fillText(`speed ${speed.toFixed(2)} of ${command.toFixed(2)} m/s, heading ${((yaw * 180) / Math.PI).toFixed(0)}\u00b0`, 12, 22);
+}
+function drawArm(view, context, width, height) {
+  const scale = Math.min(width, height * 1.4) * 0.85;
+  const at = ([x, y, z]) => [width / 2 + (0.86 * y - 0.86 * x - 0.25) * scale * 0.8, height * 0.82 + (0.3 * (x + y) - z) * scale];
+  const points = Array.from({ length: view.length / 3 }, (_, i) => view.slice(3 * i, 3 * i + 3));
+  const goal = points.pop();
+  for (let i = -3; i <= 3; i++) {
+    line(context, [at([i / 6, -0.5, 0]), at([i / 6, 0.5, 0])], colour("--line"), 1);
+    line(context, [at([-0.5, i / 6, 0]), at([0.5, i / 6, 0])], colour("--line"), 1);
+  }
+  line(context, points.map(at), colour("--image"), 12);
+  points.forEach((point) => disc(context, at(point), 6, colour("--text")));
+  line(context, [at(goal), at([goal[0], goal[1], 0])], colour("--soft"), 1);
+  disc(context, at(goal), 9, colour("--b8"));
+}
+function figures() {
+  const { title, unit, error, hertz } = ROBOTS[data[which].robot];
+  const image = data[which].images[level - 1];
+  const [now, episodes, successes] = [robot.number(3), robot.number(4), robot.number(5)];
+  const entries = [
+    ["image", image ? `${integer(image.bytes)} B` : `${integer(data[which].f32_bytes)} B in f32`],
+    ["a step, predicted", image ? (image.milliseconds === null ? "-" : `${image.milliseconds.toFixed(3)} ms`) : "-"],
+    [error, unit === "mm" ? `${(1000 * now).toFixed(1)} mm` : `${now.toFixed(3)} ${unit}`],
+    ["successful episodes", `${successes} of ${episodes}`],
+  ];
+  byId("figures").replaceChildren(...entries.map(([name, text]) => {
+    const [div, dt, dd] = ["div", "dt", "dd"].map((tag) => document.createElement(tag));
+    [dt.textContent, dd.textContent] = [name, text];
+    div.append(dt, dd);
+    return div;
+  }));
+  byId("note").textContent = failed || (image ? `Predicted on a Cortex-M4F at ${data[which].clock_hz / 1e6} MHz with memory that never waits, of ${1000 / hertz} ms between steps.` : "The policy before it was quantized.");
+  Object.assign(document.documentElement.dataset, { ready: "true", robot: title, episodes, successes, error: now });
+}
+
+let last = performance.now();
+let owed = 0;
+function frame(now) {
+  if (robot && head) {
+    const { hertz, draw } = ROBOTS[data[which].robot];
+    owed = isPaused ? 0 : Math.min(owed + ((now - last) / 1000) * hertz, 12);
+    for (; owed >= 1; owed--) step();
+    draw([...array(Float64Array, robot.view(), robot.number(2))], ...stage());
+    figures();
+  }
+  last = now;
+  requestAnimationFrame(frame);
+}
+level = Math.max(0, data[0].images.findIndex(({ label }) => label === "2 bits") + 1);
+await begin();
+controls();
+requestAnimationFrame(frame);
