@@ -170,10 +170,10 @@ impl Image {
     fn report<'py>(
         &self,
         py: Python<'py>,
-        policy: Option<Bound<'py, Policy>>,
+        #[pyo3(from_py_with = given)] policy: Option<PyRef<'_, Policy>>,
         #[pyo3(from_py_with = given)] recordings: Vec<PathBuf>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let policy = policy.map(|policy| policy.get().policy.clone());
+        let policy = policy.map(|policy| policy.policy.clone());
         let page =
             py.detach(|| report::of_image(&self.buffer, &self.name, policy.as_deref(), &recordings)).or_raise()?;
         py.import("actq._report")?.getattr("Page")?.call1((page,))

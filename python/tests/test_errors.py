@@ -111,6 +111,8 @@ def test_wrong_types_are_errors_of_actq(mlp, observations):
         "load": lambda: actq.Image.load(3),
         "save": lambda: image.save(None),
         "inspect": lambda: image.inspect(clock="fast"),
+        "report's policy": lambda: image.report(object()),
+        "report's recordings": lambda: image.report(policy, recordings=3),
         "board": lambda: image.cost(3),
         "export": lambda: image.export_c("c", name=3),
         "port": lambda: actq.Link(3),
