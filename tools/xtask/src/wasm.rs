@@ -105,7 +105,9 @@ fn test_in_node() -> Result<()> {
     }
     let words = ["--quick", "--out"].map(str::to_owned).into_iter().chain([pages.display().to_string()]);
     gallery(Words { words: words.collect() })?;
-    // The client of the browser; it brings no browser.
-    run("npm", &["ci", "--ignore-scripts", "--no-audit", "--no-fund"], &pages)?;
+    // The client of the browser; it brings no browser. Without it, the tests of the pages skip themselves.
+    if let Err(why) = run("npm", &["ci", "--ignore-scripts", "--no-audit", "--no-fund"], &pages) {
+        println!("SKIPPED: tests of the pages: {why:#}");
+    }
     run("node", &["--test", "test/"], &pages)
 }
