@@ -10,7 +10,7 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|bytes: &[u8]| {
     let here = Path::new("no such folder");
     if let Ok(imported) = import_bytes(bytes.to_vec(), here, "fuzzed", &Choice::default()) {
-        Policy::of_files(here, [here, here], &imported.json, &imported.weights)
-            .expect("an imported file is a valid policy");
+        let [json, weights] = imported.source.files().expect("an imported file can be written");
+        Policy::of_files(here, [here, here], &json, &weights).expect("an imported file is a valid policy");
     }
 });

@@ -202,7 +202,7 @@ pub(crate) fn import_path(
             }
             let imported = import(&path, &choice).map_err(raise_of_import)?;
             let policy = imported.policy(&path, &path).or_raise()?;
-            return Ok(Policy::new(policy, Some([imported.json, imported.weights])));
+            return Ok(Policy::new(policy, Some(imported.source.files().or_raise()?)));
         }
         if choice.output.is_some() || !choice.states.is_empty() || !choice.observed.is_empty() {
             return Err(error!("{}: only an ONNX file takes output, states and observe", path.display()));
@@ -298,15 +298,15 @@ pub(crate) fn import_onnx<'py>(
         let (imported, policy) = import(&choice)?;
         let probes = probes(&imported, &policy, &MAGNITUDES, FRAMES);
         let actions = actions(&policy, &probes);
-        let (json, weights) = (imported.json.clone(), imported.weights.clone());
-        let (json, weights, policy) = match limits.is_empty() {
-            true => (json, weights, policy),
+        let (source, policy) = match limits.is_empty() {
+            true => (imported.source.clone(), policy),
             false => {
                 let (limited, policy) = import(&Choice { limits, ..choice })?;
-                (limited.json, limited.weights, policy)
+                (limited.source, policy)
             }
         };
-        PyResult::Ok((imported, Policy::new(policy, Some([json, weights])), probes, actions))
+        let files = source.files().or_raise()?;
+        PyResult::Ok((imported, Policy::new(policy, Some(files)), probes, actions))
     };
     let (imported, policy, probes, actions) = work::interruptible(py, None, move |_| Ok(import()))??;
     let plan = PyDict::new(py);

@@ -46,7 +46,7 @@ impl OnnxNetwork {
             let read = |is_inner| -> Result<_> {
                 let choice = Choice { output: Some(name.clone()), is_fed: true, is_inner, ..Choice::default() };
                 let imported = file.import(&choice)?;
-                let policy = imported.policy(path, path)?;
+                let policy = imported.source.policy_without_digest(path, path)?;
                 Ok((imported, Rc::new(policy)))
             };
             let (imported, policy) = read(false)?;

@@ -1,19 +1,13 @@
 //! Lowering of expressions to the ops of policy.json, with their tensors.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::import::json::{Input, JsonOp};
+use actq::import::values::{Tensor, Values};
 
 use crate::values::expr::{Cell, Expr, Exprs, Id, Matrix, Run, Unary};
-
-/// A tensor of policy.safetensors.
-pub(crate) struct Weight {
-    pub(crate) name: String,
-    pub(crate) shape: Vec<usize>,
-    pub(crate) data: Vec<f32>,
-}
 
 /// A run of elements of a slot. Slot 0 is the observation, slot `i + 1` the output of op `i`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,12 +24,11 @@ const MAX_COPIES: usize = 64;
 /// The ops and tensors.
 pub(crate) struct Lowered {
     pub(crate) ops: Vec<JsonOp>,
-    pub(crate) weights: Vec<Weight>,
+    pub(crate) tensors: BTreeMap<String, Tensor>,
     /// Input parts of each op, and the slot of its second operand.
     reads: Vec<(Vec<Part>, Option<usize>)>,
     /// Length of the observation, then of each op's output.
     lens: Vec<usize>,
-    names: HashSet<String>,
     /// The last number that was appended to a name in use.
     numbers: HashMap<String, usize>,
     /// Names of the matrices. Several ops may share one.
@@ -56,10 +49,9 @@ pub(crate) fn lower(
 ) -> Result<Lowered, (Id, actq::error::Error)> {
     let mut lowered = Lowered {
         ops: Vec::new(),
-        weights: Vec::new(),
+        tensors: BTreeMap::new(),
         reads: Vec::new(),
         lens: vec![obs_len],
-        names: HashSet::new(),
         numbers: HashMap::new(),
         matrices: HashMap::new(),
         places: HashMap::new(),
@@ -320,13 +312,13 @@ impl Lowered {
         let data: Vec<f32> = values.iter().map(|&v| v as f32).collect();
         ensure!(data.iter().all(|v| v.is_finite()), "tensor {wanted:?} holds a value that is not finite in float32");
         let mut name = wanted.to_owned();
-        while !self.names.insert(name.clone()) {
+        while self.tensors.contains_key(&name) {
             // One counter for each name, as a file may have thousands of equal names.
             let number = self.numbers.entry(wanted.to_owned()).or_insert(1);
             *number += 1;
             name = format!("{wanted}.{number}");
         }
-        self.weights.push(Weight { name: name.clone(), shape, data });
+        self.tensors.insert(name.clone(), Tensor { shape, values: Values::F32(data) });
         Ok(name)
     }
 }

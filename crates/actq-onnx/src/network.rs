@@ -1,8 +1,7 @@
-//! Conversion of a file to the two files of a policy folder: chooses the action output and the observed inputs, and
+//! Conversion of a file to a policy folder in memory: chooses the action output and the observed inputs, and
 //! converts the network between them.
 
 mod choice;
-mod files;
 mod observation;
 mod output;
 mod remarks;
@@ -10,15 +9,14 @@ mod remarks;
 use std::path::{Path, PathBuf};
 
 use actq::error::{Context as _, Error, Result};
-use actq::import::Importer;
 use actq::import::contract::JsonContract;
 use actq::import::json::PolicyJson;
+use actq::import::{Importer, PolicySource};
 use actq::policy::Policy;
 use actq::text::printable;
 use prost::bytes::Bytes;
 
 pub use self::choice::Choice;
-use self::files::{tensors, text};
 use self::observation::{Observation, named_states, observed_inputs, refuse_integers};
 use self::output::{actions, choose, refuse_batch};
 use crate::action;
@@ -32,13 +30,11 @@ use crate::values::elements::value;
 use crate::values::expr::{Exprs, Id};
 use crate::values::tensor::{Element, Tensor};
 
-/// The files of an imported policy, and a summary of the import.
+/// An imported policy, and a summary of the import.
 #[derive(Clone, Debug)]
 pub struct Imported {
-    /// policy.json
-    pub json: Vec<u8>,
-    /// policy.safetensors
-    pub weights: Vec<u8>,
+    /// The policy folder.
+    pub source: PolicySource,
     /// Exporter of the file.
     pub producer: String,
     /// Observed inputs, with their lengths. The observation is their concatenation in this order.
@@ -159,14 +155,13 @@ impl Importer for Onnx {
 }
 
 impl Imported {
-    /// Reads the policy in its two files. `file` names both in errors, and `folder` becomes the policy's.
+    /// Makes the policy. `file` is its name in errors, and `folder` becomes the policy's.
     ///
     /// # Errors
     ///
-    /// As [`Policy::of_files`].
+    /// As [`PolicySource::policy`].
     pub fn policy(&self, folder: &Path, file: &Path) -> Result<Policy> {
-        let policy = Policy::of_files(folder, [file, file], &self.json, &self.weights)?;
-        Ok(Policy { guards: self.guards.clone(), ..policy })
+        Ok(Policy { guards: self.guards.clone(), ..self.source.policy(folder, file)? })
     }
 }
 
@@ -215,18 +210,23 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
         control_hz: choice.rate_hz,
         // Without a contract, the actions of a chunk would be limited to -1 .. 1.
         action: contract.or_else(|| (chunk > 1).then(JsonContract::default)),
-        ops: Vec::new(),
+        ops: lowered.ops,
         ..PolicyJson::default()
     };
-    let source = format!("ONNX by {}", model.producer);
+    let mut about = vec![
+        ("source", format!("ONNX by {}", model.producer).into()),
+        ("inputs", serde_json::to_value(&observation.inputs)?),
+    ];
+    if !states.is_empty() {
+        about.push(("states", serde_json::to_value(&states)?));
+    }
     let next = pairs.iter().map(|&(_, next)| outputs[next].name.clone());
     let guards = remarks::guards(model, &exprs, &[output.name.clone()].into_iter().chain(next).collect::<Vec<_>>())?;
     let action = printable(&output.name).into_owned();
     Ok(Imported {
-        json: text(json, &lowered, &observation.inputs, &states, &source)?,
-        weights: tensors(&lowered)?,
+        ops: json.ops.iter().map(|op| op.op.clone()).collect(),
+        source: PolicySource { json, about, tensors: lowered.tensors },
         producer: model.producer.clone(),
-        ops: lowered.ops.iter().map(|op| op.op.clone()).collect(),
         cut_inputs: cut_inputs(model, &observation, &states),
         cut_outputs: cut_outputs(model, &action, &states),
         inputs: observation.inputs,

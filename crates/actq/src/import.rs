@@ -12,5 +12,5 @@ mod ops;
 pub mod tensors;
 pub mod values;
 
-pub use folder::{FILES, PolicyFolder};
+pub use folder::{FILES, PolicyFolder, PolicySource};
 pub use importer::{Importer, folder_of};

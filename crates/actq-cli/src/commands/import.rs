@@ -58,7 +58,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         true => Some(check(&args.model, &imported, &policy, calib.as_ref())?),
         false => None,
     };
-    let mut contents = vec![imported.json.clone(), imported.weights.clone()];
+    let mut contents = imported.source.files()?.to_vec();
     if let Some(calib) = &calib {
         contents.push(calib.npz()?);
     }

@@ -82,8 +82,7 @@ fn imported_again_a_file_computes_the_same() {
     let image = buffer.image(Path::new("made")).expect("an image");
     let bytes = file(&network(&image).expect("a network"), image.name());
     let imported = import_bytes(bytes, Path::new("."), "made", &Choice::default()).expect("a file");
-    let policy = Policy::of_files(Path::new("."), [Path::new("made"); 2], &imported.json, &imported.weights);
-    let policy = policy.expect("a policy");
+    let policy = imported.source.policy(Path::new("."), Path::new("made")).expect("a policy");
     let (mut evaluator, mut unrounded) = (Evaluator::new(&policy.graph), Unrounded::new(image));
     let mut random = Random::new(2);
     for _ in 0..20 {

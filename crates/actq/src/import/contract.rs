@@ -106,7 +106,7 @@ fn each(name: &str, values: &[f64], none: f64, len: usize) -> Result<Vec<f64>> {
 }
 
 /// Keys of `ensemble`.
-#[derive(Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct JsonEnsemble {
     pub horizon: usize,

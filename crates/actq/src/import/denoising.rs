@@ -11,7 +11,7 @@ use crate::numbers::positive;
 const MAX_STEPS: usize = 1000;
 
 /// Keys of `policy.json` for the kinds flow and diffusion.
-#[derive(Debug, Default, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub struct JsonDenoising {
     #[serde(skip_serializing_if = "Option::is_none")]
     euler_steps: Option<usize>,
@@ -56,7 +56,7 @@ pub(super) const KEYS: [&str; 12] = [
 ];
 
 /// Keys of the network's time input.
-#[derive(Debug, Default, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonTime {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -72,7 +72,7 @@ pub(super) struct JsonTime {
 }
 
 /// Keys of the normalization of observations before the ops.
-#[derive(Debug, Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct JsonNorm {
     pub(super) mean: String,

@@ -1,15 +1,18 @@
 //! Reads a policy folder: `policy.json` (the op list) and `policy.safetensors` (the weights).
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use actq_kernels::image::Kind;
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use super::importer::Importer;
 use super::json::PolicyJson;
 use super::ops::{Builder, Weights};
-use super::tensors::TensorFile;
+use super::tensors::{TensorFile, written};
+use super::values::Tensor;
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::{hoist, without_ignored};
 use crate::numbers::positive;
@@ -62,12 +65,68 @@ impl Policy {
         let [json_name, weights_name] = names.map(|name| name.display().to_string());
         let parsed = PolicyJson::parse(json).with_context(|| json_name.clone())?;
         let file = TensorFile::new(weights).with_context(|| format!("{weights_name}: not a safetensors file"))?;
-        let mut digest = Sha256::new();
-        digest.update(json);
-        digest.update(weights);
-        let weights = Weights { file, path: names[1] };
-        build(dir, &parsed, weights, digest.finalize().into()).context(json_name)
+        let tensors = Weights { tensors: &file.all(), path: names[1] };
+        build(dir, &parsed, tensors, digest([json, weights])).context(json_name)
     }
+}
+
+/// A policy folder in memory.
+#[derive(Clone, Debug)]
+pub struct PolicySource {
+    /// policy.json
+    pub json: PolicyJson,
+    /// Keys of policy.json about the policy's origin, which are not read.
+    pub about: Vec<(&'static str, Value)>,
+    /// policy.safetensors
+    pub tensors: BTreeMap<String, Tensor>,
+}
+
+impl PolicySource {
+    /// Makes the policy at `dir`; `name` is its name in errors.
+    ///
+    /// # Errors
+    ///
+    /// As [`Policy::load`].
+    pub fn policy(&self, dir: &Path, name: &Path) -> Result<Policy> {
+        let [json, weights] = self.files()?;
+        Ok(Policy { digest: digest([&json, &weights]), ..self.policy_without_digest(dir, name)? })
+    }
+
+    /// As [`Self::policy`], for a part of a policy that has its own digest; writes no files.
+    ///
+    /// # Errors
+    ///
+    /// As [`Policy::load`].
+    pub fn policy_without_digest(&self, dir: &Path, name: &Path) -> Result<Policy> {
+        let weights = Weights { tensors: &self.tensors, path: name };
+        let policy = self.json.check_text().and_then(|()| build(dir, &self.json, weights, [0; 32]));
+        policy.with_context(|| name.display().to_string())
+    }
+
+    /// Returns the bytes of [`FILES`]; policy.json has one op per line.
+    ///
+    /// # Errors
+    ///
+    /// If a tensor is not float32.
+    pub fn files(&self) -> Result<[Vec<u8>; 2]> {
+        let mut json = serde_json::to_string_pretty(&self.json)?;
+        // Without the end of the object.
+        json.truncate(json.len() - "\n}".len());
+        for (key, value) in &self.about {
+            json += &format!(",\n  \"{key}\": {value}");
+        }
+        let ops: Vec<String> =
+            self.json.ops.iter().map(|op| Ok(format!("    {}", serde_json::to_string(op)?))).collect::<Result<_>>()?;
+        json += &format!(",\n  \"ops\": [\n{}\n  ]\n}}\n", ops.join(",\n"));
+        Ok([json.into_bytes(), written(&self.tensors)?])
+    }
+}
+
+/// Returns the digest of a policy folder's two files.
+fn digest(files: [&[u8]; 2]) -> [u8; 32] {
+    let mut digest = Sha256::new();
+    files.iter().for_each(|bytes| digest.update(bytes));
+    digest.finalize().into()
 }
 
 fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) -> Result<Policy> {

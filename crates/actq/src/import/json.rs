@@ -12,7 +12,7 @@ use crate::graph::NodeKind;
 use crate::strict_json;
 use crate::text::is_control;
 
-#[derive(Default, Deserialize, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
 pub struct PolicyJson {
     pub name: String,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -35,6 +35,8 @@ pub struct PolicyJson {
     pub deadline: Option<usize>,
     #[serde(flatten)]
     pub denoising: JsonDenoising,
+    /// [`PolicySource::files`](super::PolicySource::files) writes them, one per line.
+    #[serde(skip_serializing)]
     pub ops: Vec<JsonOp>,
 }
 
@@ -60,7 +62,7 @@ const ABOUT: [&str; 8] = ["source", "commit", "source_path", "license", "recurre
 pub(super) const IDENTITY: &str = "identity";
 
 /// One op. [`NodeKind::syntax`] lists the keys of each beside these.
-#[derive(Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct JsonOp {
     pub op: String,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -104,7 +106,7 @@ impl JsonOp {
     }
 }
 
-#[derive(Deserialize, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(untagged)]
 pub enum Input {
     One(String),
@@ -137,6 +139,12 @@ impl PolicyJson {
             check_text(place, value)?;
         }
         serde_json::from_slice(bytes).context(WRONG)
+    }
+
+    /// As [`Self::parse`], refuses control characters in names.
+    pub(super) fn check_text(&self) -> Result<()> {
+        check_text("name", &Value::from(self.name.as_str()))?;
+        check_text("ops", &serde_json::to_value(&self.ops)?)
     }
 
     pub fn kind(&self) -> Result<Kind> {

@@ -1,13 +1,13 @@
 //! Builds a network from the op list of `policy.json` over named slots and the weights of `policy.safetensors`.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use serde_json::Value;
 
 use super::denoising::{JsonDenoising, JsonNorm, JsonTime, Schedule};
 use super::json::{IDENTITY, Input, JsonOp};
-use super::tensors::TensorFile;
+use super::values::Tensor;
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::ops::{Concat, Normalize, Span};
 use crate::graph::syntax::{Keys, required};
@@ -15,8 +15,9 @@ use crate::graph::{Graph, NodeKind, ValueId, WeightMatrix};
 use crate::numbers::limit;
 
 /// The weights, and their file's name for errors.
+#[derive(Clone, Copy)]
 pub(super) struct Weights<'a> {
-    pub(super) file: TensorFile<'a>,
+    pub(super) tensors: &'a BTreeMap<String, Tensor>,
     pub(super) path: &'a Path,
 }
 
@@ -24,8 +25,9 @@ impl Weights<'_> {
     /// Reads a tensor as f32 with its shape; refuses NaN, infinities and values beyond f32.
     fn read(&self, name: &str) -> Result<(Vec<usize>, Vec<f32>)> {
         let file = self.path.display();
-        let Some(tensor) = self.file.get(name) else {
-            bail!("{file}: tensor {name:?} is missing; the file holds {}", self.file.names().join(", "));
+        let Some(tensor) = self.tensors.get(name) else {
+            let names: Vec<&str> = self.tensors.keys().map(String::as_str).collect();
+            bail!("{file}: tensor {name:?} is missing; the file holds {}", names.join(", "));
         };
         let Some(data) = tensor.values.to_f32() else {
             bail!("{file}: tensor {name:?} is of type {}; export it as float32", tensor.values.type_name());
@@ -34,7 +36,7 @@ impl Weights<'_> {
             let wrong = tensor.values.not_f32(at);
             bail!("{file}: tensor {name:?} {wrong} at position {at}; retrain or repair the checkpoint");
         }
-        Ok((tensor.shape, data))
+        Ok((tensor.shape.clone(), data))
     }
 
     fn vector(&self, name: &str, len: usize) -> Result<Vec<f32>> {
@@ -97,7 +99,7 @@ impl<'a> Builder<'a> {
         }
         // The format's first exporter names the tensors, but writes no key.
         let file = JsonNorm { mean: "obs_norm.mean".to_owned(), scale: "obs_norm.scale".to_owned(), clip: Some(5.0) };
-        let implied = weights.file.get(&file.mean).is_some().then_some(&file);
+        let implied = weights.tensors.contains_key(&file.mean).then_some(&file);
         if let Some(norm) = by.obs_norm.as_ref().or(implied) {
             let normalize = Normalize {
                 mean: weights.vector(&norm.mean, obs_len)?,

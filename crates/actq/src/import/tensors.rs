@@ -1,10 +1,13 @@
 //! Tensor files in the format safetensors: policies and recordings.
 
+use std::collections::BTreeMap;
+
 use half::{bf16, f16};
+use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
 use super::values::{Tensor, Values};
-use crate::error::{Context, Result};
+use crate::error::{Context, Result, bail};
 use crate::strict_json;
 
 /// The tensors of a file.
@@ -30,6 +33,11 @@ impl<'a> TensorFile<'a> {
         names
     }
 
+    /// Returns all tensors by their names.
+    pub fn all(&self) -> BTreeMap<String, Tensor> {
+        self.names().into_iter().filter_map(|name| Some((name.clone(), self.get(&name)?))).collect()
+    }
+
     /// Returns a tensor; `None` if the file has none of that name.
     pub fn get(&self, name: &str) -> Option<Tensor> {
         let view = self.0.tensor(name).ok()?;
@@ -49,4 +57,18 @@ impl<'a> TensorFile<'a> {
 
 fn elements<const N: usize, T>(bytes: &[u8], of: fn([u8; N]) -> T) -> Vec<T> {
     bytes.as_chunks().0.iter().map(|b| of(*b)).collect()
+}
+
+/// Returns a file of float32 tensors.
+pub(super) fn written(tensors: &BTreeMap<String, Tensor>) -> Result<Vec<u8>> {
+    let bytes = |(name, tensor): (&String, &Tensor)| match &tensor.values {
+        Values::F32(values) => Ok(values.iter().flat_map(|v| v.to_le_bytes()).collect()),
+        other => bail!("tensor {name:?} is of type {}; a policy's tensors are float32", other.type_name()),
+    };
+    let bytes = tensors.iter().map(bytes).collect::<Result<Vec<Vec<u8>>>>()?;
+    let view = |((name, tensor), bytes): ((&'_ String, &Tensor), _)| {
+        Ok((name.clone(), TensorView::new(Dtype::F32, tensor.shape.clone(), bytes)?))
+    };
+    let views = tensors.iter().zip(bytes.iter().map(Vec::as_slice)).map(view);
+    Ok(safetensors::serialize(views.collect::<Result<BTreeMap<_, _>>>()?, None)?)
 }

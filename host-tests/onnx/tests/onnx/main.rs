@@ -31,7 +31,16 @@ const TOLERANCE: f32 = 1e-5;
 
 fn imported(bytes: &[u8], choice: &Choice) -> Result<(Imported, Policy)> {
     let imported = import_bytes(bytes.to_vec(), Path::new("."), "test", choice)?;
-    let policy = imported.policy(Path::new("."), Path::new("policy.json"))?;
+    let name = Path::new("policy.json");
+    let policy = imported.policy(Path::new("."), name)?;
+    // The files hold the same network.
+    let [json, weights] = imported.source.files()?;
+    let read = Policy::of_files(Path::new("."), [name; 2], &json, &weights)?;
+    let parts = |policy: &Policy| {
+        policy.graph.nodes.iter().map(|node| (node.kind.clone(), node.inputs.clone())).collect::<Vec<_>>()
+    };
+    let is_same = parts(&read) == parts(&policy) && read.graph.matrices == policy.graph.matrices;
+    ensure!(is_same && read.digest == policy.digest, "the policy folder holds another policy");
     Ok((imported, policy))
 }
 
