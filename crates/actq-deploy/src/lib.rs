@@ -1,5 +1,6 @@
 //! Surroundings of a robot policy's network: raw inputs, histories, clocks, joint orders and targets.
 #![deny(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod archive;
 mod bundle;

@@ -1,6 +1,7 @@
 //! Orders of values in which a reference differs from a description.
 
 use actq::error::Result;
+use actq::numbers::square;
 
 use crate::description::Description;
 use crate::label::{Label, labels};
@@ -117,7 +118,7 @@ impl Column {
         let values: Vec<f64> = values.into_iter().map(|value| value - mean).collect();
         let energy: f64 = values.iter().map(|value| value * value).sum();
         // What is only rounding does not vary.
-        let varies = energy > (1e-6 * largest).powi(2) * values.len() as f64;
+        let varies = energy > square(1e-6 * largest) * values.len() as f64;
         Self { mean, values, energy: if varies { energy } else { 0.0 } }
     }
 
@@ -131,7 +132,7 @@ impl Column {
     /// own; nothing if one of them does not vary.
     fn rest(&self, other: &Self) -> Option<f64> {
         let factor = self.factor(other)?;
-        let left = self.values.iter().zip(&other.values).map(|(a, b)| (a - factor * b).powi(2)).sum::<f64>();
+        let left = self.values.iter().zip(&other.values).map(|(a, b)| square(a - factor * b)).sum::<f64>();
         Some((left / self.energy).sqrt())
     }
 }

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::random::Random;
 use actq_kernels::math::ORIENTATION;
+use libm::{cos, sin};
 
 use crate::clock::Phases;
 use crate::description::{End, Op, Orientation, TargetKind};
@@ -252,8 +253,8 @@ fn apply(step: &PlannedOp, mut value: Vec<f64>, values: &[Vec<f64>]) -> Result<V
             with(high, |x, y| if x > y { y } else { x });
         }
         Op::Wrap => value.iter_mut().for_each(|x| *x = (*x + PI).rem_euclid(2.0 * PI) - PI),
-        Op::Sin => value.iter_mut().for_each(|x| *x = x.sin()),
-        Op::Cos => value.iter_mut().for_each(|x| *x = x.cos()),
+        Op::Sin => value.iter_mut().for_each(|x| *x = sin(*x)),
+        Op::Cos => value.iter_mut().for_each(|x| *x = cos(*x)),
         Op::Norm => return Ok(vec![norm(&value)]),
         Op::Gravity(orientation) => return gravity(*orientation, &value),
         // A history has a state.
@@ -274,7 +275,7 @@ fn gravity(orientation: Orientation, value: &[f64]) -> Result<Vec<f64>> {
             [w / length, x / length, y / length, z / length]
         }
         (Orientation::Rpy, [roll, pitch, _]) => {
-            return Ok(vec![pitch.sin(), -roll.sin() * pitch.cos(), -roll.cos() * pitch.cos()]);
+            return Ok(vec![sin(*pitch), -sin(*roll) * cos(*pitch), -cos(*roll) * cos(*pitch)]);
         }
         _ => bail!("{} values are no orientation", value.len()),
     };

@@ -1,5 +1,7 @@
 //! Points that no other one beats, and where a curve bends.
 
+use libm::log;
+
 /// Returns the points that no other one beats, as indices in the order of their first value. They are all points whose
 /// second value is less than that of every point with at most as much of the first. Of equal points, the first counts.
 pub fn frontier(points: &[(f64, f64)]) -> Vec<usize> {
@@ -43,7 +45,7 @@ pub(crate) fn knee(curves: &[Curve]) -> Option<(usize, usize)> {
     let mut points: Vec<(usize, f64, f64)> = curves[best].iter().enumerate().filter_map(at).collect();
     points.sort_by(|a, b| a.1.total_cmp(&b.1));
     let (&(_, x0, y0), &(_, x1, y1)) = (points.first()?, points.last()?);
-    let below = |x: f64, y: f64| y0.ln() + (y1 / y0).ln() * (x - x0) / (x1 - x0) - y.ln();
+    let below = |x: f64, y: f64| log(y0) + log(y1 / y0) * (x - x0) / (x1 - x0) - log(y);
     let depths = points.iter().map(|&(budget, x, y)| (below(x, y), budget));
     let (depth, budget) = depths.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (depth > 1e-9).then_some((best, budget))

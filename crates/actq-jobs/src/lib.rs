@@ -6,6 +6,7 @@
 //!
 //! `docs/SCALE.md` documents the files.
 #![deny(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod digest;
 pub mod error;
@@ -14,10 +15,10 @@ pub mod figures;
 pub mod frontier;
 pub mod host;
 pub mod job;
-pub mod merged;
 pub mod order;
 pub mod plan;
 pub mod record;
+pub mod results;
 pub mod run;
 pub mod schedule;
 mod source;

@@ -4,6 +4,7 @@
 //! expressions (`values`). It recognizes norms, activations and cells that exporters decompose, and simplifies
 //! (`patterns`). Then it lowers the expressions to the ops of policy.json (`lower`).
 #![deny(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod action;
 pub mod export;
@@ -17,5 +18,5 @@ mod states;
 mod values;
 
 pub use file::proto;
-pub use network::{Choice, Imported, Onnx, OnnxFile, data_files, import, import_bytes};
+pub use network::{ImportOptions, Imported, Onnx, OnnxFile, data_files, import, import_bytes};
 pub use signature::Signature;

@@ -63,7 +63,7 @@ pub struct Ensemble {
 impl Ensemble {
     /// Returns the weights of the chunks, then the reciprocals of the sums of the first i + 1 weights.
     pub fn weights(&self) -> Vec<f32> {
-        let weights = || (0..self.horizon).map(|i| (-self.m * i as f64).exp());
+        let weights = || (0..self.horizon).map(|i| libm::exp(-self.m * i as f64));
         let mut sum = 0.0;
         let sums = weights().map(|weight| {
             sum += weight;

@@ -5,6 +5,7 @@
 //! turns every weight matrix into codes and scales, based on what [`calibrate`] finds in the recordings. [`emit`]
 //! writes the bytes. [`measure`] runs the finished image through the same executor as the firmware.
 #![deny(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 #[cfg(test)]
 extern crate self as actq;

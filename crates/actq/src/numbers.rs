@@ -1,4 +1,4 @@
-//! Conversion of numbers to f32.
+//! Conversion of numbers to f32, and powers with the same bits on every platform.
 
 use crate::error::{Result, ensure};
 
@@ -25,4 +25,22 @@ pub fn positive(value: f64, name: &str) -> Result<f32> {
     let rounded = if value > 0.0 { "float32 rounds that to 0, and " } else { "" };
     ensure!(real > 0.0, "{name} is {value:?}; {rounded}it must be above 0");
     Ok(real)
+}
+
+/// Returns `x x`.
+pub fn square(x: f64) -> f64 {
+    x * x
+}
+
+/// Returns a power by repeated squares. `f32::powi` is this loop on Linux, and a rounded power in f64 on Windows.
+pub(crate) fn power(mut base: f32, mut exponent: u32) -> f32 {
+    let mut result = 1.0;
+    while exponent > 0 {
+        if exponent % 2 == 1 {
+            result *= base;
+        }
+        exponent /= 2;
+        base *= base;
+    }
+    result
 }

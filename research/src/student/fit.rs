@@ -67,7 +67,7 @@ pub fn fit(
             clip(&mut matrices, &mut vectors);
         }
         let rate = by.rate * 0.5 * (1.0 + (std::f32::consts::PI * share).cos());
-        let stride = Stride::new(rate, step as i32 + 1);
+        let stride = Stride::new(rate, step as u32 + 1);
         let all = of_matrices.iter_mut().zip(&mut weights.matrices).zip(matrices.iter_mut().zip(units));
         for ((adam, matrix), (grads, units)) in all {
             let grads = grads.as_slice_mut().unwrap_or_default();

@@ -121,8 +121,8 @@ fn e4m3(code: u8) -> f64 {
     let (exponent, mantissa) = (i32::from(code >> 3 & 15), f64::from(code & 7));
     let size = match (exponent, code & 7) {
         (15, 7) => f64::NAN,
-        (0, _) => mantissa * 2f64.powi(-9),
-        _ => (8.0 + mantissa) * 2f64.powi(exponent - 10),
+        (0, _) => libm::ldexp(mantissa, -9),
+        _ => libm::ldexp(8.0 + mantissa, exponent - 10),
     };
     if code & 0x80 == 0 { size } else { -size }
 }

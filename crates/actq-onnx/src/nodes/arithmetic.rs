@@ -143,7 +143,7 @@ fn known_with(op: &str, exprs: &mut Exprs, x: &[f64], y: Id) -> Result<Vec<Eleme
         }
         // b^y is e^(y ln b).
         "Pow" if x.iter().all(|b| *b > 0.0) => {
-            let exponent = exprs.affine(y, x.iter().map(|b| b.ln()).collect(), vec![0.0; x.len()]);
+            let exponent = exprs.affine(y, x.iter().map(|b| libm::log(*b)).collect(), vec![0.0; x.len()]);
             let power = exprs.function(Function::Exp, exponent);
             Ok(exprs.elements(power))
         }

@@ -119,7 +119,7 @@ pub(crate) fn real(op: &str) -> Option<fn(f64, f64) -> f64> {
         "Sub" => |x, y| x - y,
         "Mul" => |x, y| x * y,
         "Div" => |x, y| x / y,
-        "Pow" => f64::powf,
+        "Pow" => libm::pow,
         "Max" => f64::max,
         "Min" => f64::min,
         FMOD => |x, y| x % y,

@@ -14,7 +14,7 @@ pub(crate) fn near(a: f64, b: f64) -> bool {
 
 /// Rounds to a power of two within [`TOLERANCE`], as exporters write one as the quotient of rounded constants.
 pub(crate) fn exact(k: f64) -> f64 {
-    let power = k.abs().log2().round().exp2().copysign(k);
+    let power = libm::exp2(libm::log2(k.abs()).round()).copysign(k);
     if near(power, k) { power } else { k }
 }
 

@@ -68,7 +68,7 @@ impl Unary {
     fn of(self, x: f64) -> f64 {
         match self {
             Self::Known(function) => value(function, x),
-            Self::Log => x.ln(),
+            Self::Log => libm::log(x),
             Self::Sqrt => x.sqrt(),
             Self::Erf => libm::erf(x),
             Self::Reciprocal => 1.0 / x,
@@ -80,20 +80,20 @@ impl Unary {
 
 /// Evaluates a function of the network in f64.
 fn value(function: Function, x: f64) -> f64 {
-    let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
-    let softplus = |x: f64| x.max(0.0) + (-x.abs()).exp().ln_1p();
+    let sigmoid = |x: f64| 1.0 / (1.0 + libm::exp(-x));
+    let softplus = |x: f64| x.max(0.0) + libm::log1p(libm::exp(-x.abs()));
     match function {
         Function::Relu => x.max(0.0),
-        Function::Elu => x.max(0.0) + x.min(0.0).exp_m1(),
+        Function::Elu => x.max(0.0) + libm::expm1(x.min(0.0)),
         Function::Silu => x * sigmoid(x),
         Function::Gelu => x * 0.5 * libm::erfc(-x / 2f64.sqrt()),
-        Function::GeluTanh => x * sigmoid(2.0 * (2.0 / std::f64::consts::PI).sqrt() * (x + 0.044_715 * x.powi(3))),
-        Function::Tanh => x.tanh(),
+        Function::GeluTanh => x * sigmoid(2.0 * (2.0 / std::f64::consts::PI).sqrt() * (x + 0.044_715 * (x * x * x))),
+        Function::Tanh => libm::tanh(x),
         Function::Sigmoid => sigmoid(x),
-        Function::Exp => x.exp(),
-        Function::Sin => x.sin(),
-        Function::Cos => x.cos(),
+        Function::Exp => libm::exp(x),
+        Function::Sin => libm::sin(x),
+        Function::Cos => libm::cos(x),
         Function::Softplus => softplus(x),
-        Function::Mish => x * softplus(x).tanh(),
+        Function::Mish => x * libm::tanh(softplus(x)),
     }
 }

@@ -21,6 +21,7 @@ use crate::data::Dataset;
 use crate::graph::operation::Operand;
 use crate::graph::ops::Concat;
 use crate::graph::{Graph, Network, NodeKind, ValueId, WeightMatrix, Weights, start_state};
+use crate::numbers::square;
 use crate::random::Random;
 
 /// Frames that the mean squares are taken over, and steps of random observations if there is no recording.
@@ -74,7 +75,7 @@ fn mean_squares(graph: &Graph, calib: Option<&Dataset>) -> Vec<Vec<f64>> {
         for (value, of_value) in pass.all_values() {
             rows[value] += of_value.nrows();
             for row in of_value.rows() {
-                squares[value].iter_mut().zip(row).for_each(|(sum, x)| *sum += f64::from(*x).powi(2));
+                squares[value].iter_mut().zip(row).for_each(|(sum, x)| *sum += square(f64::from(*x)));
             }
         }
     }
@@ -216,7 +217,7 @@ impl Elements {
                 let ratio = of_fixed(&h) / of_fixed(&a);
                 let common = if ratio.is_normal() { ratio } else { 1.0 };
                 for ((a, h), &root) in a.iter().zip(&h).zip(&roots) {
-                    let (exponent, weight) = (0.25 * (common * a / h).log2(), (a * h).sqrt());
+                    let (exponent, weight) = (0.25 * libm::log2(common * a / h), (a * h).sqrt());
                     if exponent.is_finite() && weight > 0.0 {
                         wanted[root].0 += weight * exponent;
                         wanted[root].1 += weight;
@@ -227,7 +228,7 @@ impl Elements {
         let exponent = |&root: &usize| match wanted[root] {
             (sum, weight) if weight > 0.0 && !self.fixed[root] => sum / weight,
             // Only norms read it: its values become about 1.
-            _ if largest[root] > 0.0 && !self.fixed[root] => -0.5 * largest[root].log2(),
+            _ if largest[root] > 0.0 && !self.fixed[root] => -0.5 * libm::log2(largest[root]),
             _ => 0.0,
         };
         roots.iter().map(|root| power_of_two(exponent(root))).collect()
@@ -279,7 +280,7 @@ impl Elements {
 fn power_of_two(exponent: f64) -> f32 {
     const STEPS: f64 = 65536.0;
     let exponent = ((exponent * STEPS).round() / STEPS).clamp(-MAX_EXPONENT, MAX_EXPONENT);
-    ((exponent - exponent.floor()).exp2() * exponent.floor().exp2()) as f32
+    (libm::exp2(exponent - exponent.floor()) * libm::exp2(exponent.floor())) as f32
 }
 
 /// Multiplies values by factors, which repeat.
@@ -291,7 +292,7 @@ fn times(values: &mut [f32], factors: &[f32]) {
 fn relative_energies(matrix: &WeightMatrix, h: &[f64]) -> Vec<f64> {
     let mut sums = vec![0.0; matrix.cols];
     for row in matrix.data.chunks_exact(matrix.cols) {
-        let squares = || row.iter().map(|w| f64::from(*w).powi(2));
+        let squares = || row.iter().map(|w| square(f64::from(*w)));
         let output: f64 = squares().zip(h).map(|(square, h)| square * h).sum();
         if output > 0.0 {
             sums.iter_mut().zip(squares()).for_each(|(sum, square)| *sum += square / output);

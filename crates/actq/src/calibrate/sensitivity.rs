@@ -13,6 +13,7 @@ use super::moments::Moments;
 use super::windows::Windows;
 use crate::gemm::{Panels, add_product_parallel};
 use crate::graph::{Factors, Network, zero_state};
+use crate::numbers::square;
 use crate::random::Random;
 
 /// Batches that `G` is averaged over, and samples in each.
@@ -146,7 +147,7 @@ pub fn importance(second: &DMatrix<f64>, side: Side) -> Vec<f64> {
     if let Some(factor) = damped.cholesky() {
         let l = factor.l_dirty();
         for (i, &at) in order.iter().enumerate() {
-            importance[at] = (importance[at] * l[(i, i)].powi(2)).sqrt();
+            importance[at] = (importance[at] * square(l[(i, i)])).sqrt();
         }
     }
     importance

@@ -15,7 +15,7 @@ pub struct Widening {
     pub noise: f32,
     /// Exponent of the uniform draw from 0 to 1 that `noise` is multiplied by: the higher, the more windows stay close
     /// to the recorded path.
-    pub power: i32,
+    pub power: u32,
     /// Largest share of the difference of two recorded observations.
     pub mix: f32,
 }

@@ -8,6 +8,7 @@ use super::imagined::{Imagined, Recorded, Rollout};
 use super::widening::{MEMORY, Widening};
 use crate::data::{Dataset, mean_and_variance};
 use crate::graph::{Graph, Network, State, Weights, copy_sample, start_state, zero_state};
+use crate::numbers::power;
 use crate::random::Random;
 
 /// Steps of a recurrent network's window.
@@ -190,7 +191,7 @@ impl Windows {
             let (a, b) = (self.row(random), self.row(random));
             shift.iter_mut().zip(a.iter().zip(b)).for_each(|(s, (a, b))| *s = share * (a - b));
         }
-        let amplitude = widening.noise * random.share().powi(widening.power);
+        let amplitude = widening.noise * power(random.share(), widening.power);
         let fresh = (1.0 - MEMORY * MEMORY).sqrt();
         let mut noise: Vec<f32> = (0..self.graph.obs_len).map(|_| random.normal()).collect();
         for row in rows {
@@ -267,7 +268,7 @@ fn column_variances(arrays: &[Array2<f32>]) -> Vec<f64> {
 
 /// Returns the root of a variance as f32, with the same digits in any unit: f32 holds no squares from 1e20 on.
 fn root(variance: f64) -> f32 {
-    let unit = 2f64.powi((0.5 * variance.max(f64::MIN_POSITIVE).log2()) as i32);
+    let unit = libm::exp2((0.5 * libm::log2(variance.max(f64::MIN_POSITIVE))).trunc());
     ((variance / (unit * unit)) as f32).sqrt() * unit as f32
 }
 

@@ -13,6 +13,7 @@ use super::sizes::Sizes;
 use crate::error::{Context, Result, ensure};
 use crate::graph::{Evaluator, Graph};
 use crate::import::values::Tensor;
+use crate::numbers::square;
 use crate::text::count;
 
 /// Episodes of observations, with the f32 policy's own actions if they were recorded.
@@ -162,6 +163,6 @@ pub(crate) fn mean_and_variance<'a, R: Iterator<Item = ArrayView1<'a, f32>>>(
         sums.into_iter().map(|sum| sum / count).collect()
     };
     let mean = mean_of(&|_, v| v);
-    let variance = mean_of(&|i, v| (v - mean[i]).powi(2));
+    let variance = mean_of(&|i, v| square(v - mean[i]));
     (mean, variance)
 }

@@ -1,5 +1,7 @@
 //! Values and weight matrices of a network.
 
+use crate::numbers::square;
+
 /// Index of a value: 0 is the observation; `i + 1` is the output of node `i`.
 pub type ValueId = usize;
 
@@ -21,7 +23,7 @@ impl WeightMatrix {
     pub fn column_energies(&self) -> Vec<f64> {
         let mut energies = vec![0.0; self.cols];
         for row in self.data.chunks_exact(self.cols) {
-            energies.iter_mut().zip(row).for_each(|(energy, w)| *energy += f64::from(*w).powi(2));
+            energies.iter_mut().zip(row).for_each(|(energy, w)| *energy += square(f64::from(*w)));
         }
         energies
     }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::Denoising;
 use crate::numbers::positive;
+use crate::numbers::square;
 
 /// Most steps of a policy; an image has room for 65535.
 const MAX_STEPS: usize = 1000;
@@ -93,8 +94,8 @@ impl JsonTime {
         let of =
             |f: &dyn Fn(f64) -> f64| freq.iter().map(|w| f(unit * time * f64::from(*w)) as f32).collect::<Vec<f32>>();
         Ok(match self.order.as_deref() {
-            None | Some("cos,sin") => [of(&f64::cos), of(&f64::sin)].concat(),
-            Some("sin,cos") => [of(&f64::sin), of(&f64::cos)].concat(),
+            None | Some("cos,sin") => [of(&libm::cos), of(&libm::sin)].concat(),
+            Some("sin,cos") => [of(&libm::sin), of(&libm::cos)].concat(),
             Some(other) => bail!("time.order is {other:?}; it must be cos,sin or sin,cos"),
         })
     }
@@ -190,7 +191,7 @@ impl JsonDenoising {
             Some("cosine" | "squaredcos_cap_v2") => {
                 let power = |i: usize| {
                     let angle = (i as f64 / train as f64 + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2;
-                    angle.cos().powi(2)
+                    square(libm::cos(angle))
                 };
                 (0..train).map(|i| (1.0 - power(i + 1) / power(i)).min(0.999)).collect()
             }

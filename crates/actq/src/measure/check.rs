@@ -85,7 +85,7 @@ impl Check {
 
 /// Rounds up to two digits.
 fn two_digits(number: f64) -> usize {
-    let unit = 10f64.powf((number.max(10.0).log10().floor() - 1.0).max(0.0));
+    let unit = libm::pow(10.0, (libm::log10(number.max(10.0)).floor() - 1.0).max(0.0));
     ((number / unit).ceil() * unit) as usize
 }
 

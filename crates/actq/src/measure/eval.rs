@@ -12,6 +12,7 @@ use super::unrounded::Unrounded;
 use crate::data::{Dataset, Recording, Sizes};
 use crate::error::{Context, Result, ensure};
 use crate::graph::{Evaluator, Graph};
+use crate::numbers::square;
 use crate::policy::Policy;
 use crate::runtime::with_head;
 use crate::text::count;
@@ -313,7 +314,7 @@ impl Moment {
 
     fn variance(&self) -> f64 {
         // The rounding noise of a constant sequence may have either sign.
-        let variance = self.mean_square() - (self.sum / self.n).powi(2);
+        let variance = self.mean_square() - square(self.sum / self.n);
         if variance > 1e-12 * self.mean_square() { variance } else { 0.0 }
     }
 }

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::data::{Dataset, Recordings};
 use crate::graph::Graph;
+use crate::numbers::square;
 
 /// NMSE up to which recorded actions are the policy's: runs in other arithmetic and actions stored in f16 are closer.
 const SAME: f64 = 1e-6;
@@ -126,7 +127,7 @@ impl Pairs {
     fn nmse(&self) -> f64 {
         let of_axis = |i: usize| {
             let [policy, recorded] = [&self.policy, &self.recorded].map(|rows| column(rows, i));
-            let square = mean(policy.iter().zip(&recorded).map(|(p, r)| (p - r).powi(2)));
+            let square = mean(policy.iter().zip(&recorded).map(|(p, r)| square(p - r)));
             // An axis that never moves has no scale but its own size.
             let scale = variance(&policy).max(1e-6 * mean(policy.iter().map(|p| p * p))).max(f64::MIN_POSITIVE);
             square / scale
@@ -232,10 +233,10 @@ impl Fit {
             let (policy, recorded) = (column(&policy, axis), column(&recorded, axis));
             let fit = Axis::of(&policy, &recorded);
             let rest: Vec<f64> = policy.iter().zip(&recorded).map(|(p, r)| r - fit.give(*p)).collect();
-            let square = mean(rest.iter().map(|v| v * v));
-            rests.push(share(square, variance(&recorded)));
-            as_is.push(share(mean(policy.iter().zip(&recorded).map(|(p, r)| (r - p).powi(2))), variance(&recorded)));
-            correlations.push(share(mean(rest.windows(2).map(|pair| pair[0] * pair[1])), square));
+            let left = mean(rest.iter().map(|v| v * v));
+            rests.push(share(left, variance(&recorded)));
+            as_is.push(share(mean(policy.iter().zip(&recorded).map(|(p, r)| square(r - p))), variance(&recorded)));
+            correlations.push(share(mean(rest.windows(2).map(|pair| pair[0] * pair[1])), left));
             axes.push(fit);
         }
         let [rest, correlation, as_is] = [rests, correlations, as_is].map(|of| mean(of.into_iter()));
@@ -278,7 +279,7 @@ impl Axis {
         let inside: Vec<(f64, f64)> =
             policy.iter().copied().zip(recorded.iter().copied()).filter(|(_, r)| is_inside(*r)).collect();
         let (p_mean, r_mean) = (mean(inside.iter().map(|(p, _)| *p)), mean(inside.iter().map(|(_, r)| *r)));
-        let square = mean(inside.iter().map(|(p, _)| (p - p_mean).powi(2)));
+        let square = mean(inside.iter().map(|(p, _)| square(p - p_mean)));
         let factor = share(mean(inside.iter().map(|(p, r)| (p - p_mean) * (r - r_mean))), square);
         let offset = r_mean - factor * p_mean;
         let given = |of: fn(f64, f64) -> f64, from: f64| policy.iter().map(|p| factor * p + offset).fold(from, of);
@@ -309,7 +310,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 
 fn variance(values: &[f64]) -> f64 {
     let middle = mean(values.iter().copied());
-    mean(values.iter().map(|v| (v - middle).powi(2)))
+    mean(values.iter().map(|v| square(v - middle)))
 }
 
 /// Returns `part / whole`, 0 without a whole.
@@ -337,8 +338,8 @@ fn joined(values: impl Iterator<Item = String>) -> String {
 
 /// Formats a number by three digits.
 fn significant(value: f64) -> String {
-    let places = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 12.0);
-    let unit = 10f64.powf(places);
+    let places = (2.0 - libm::log10(value.abs().max(1e-9)).floor()).clamp(0.0, 12.0);
+    let unit = libm::pow(10.0, places);
     // Not "-0".
     ((value * unit).round() / unit + 0.0).to_string()
 }

@@ -182,13 +182,13 @@ impl Range {
     /// Predicts where the limit is reached: on the line through the logarithms of both errors, or from the only known
     /// one along [`SLOPE`].
     fn guess(&self, limit: f64) -> f64 {
-        let (low, low_error) = (self.fails.0 as f64, self.fails.1.max(1e-300).ln());
-        let limit = limit.ln();
+        let (low, low_error) = (self.fails.0 as f64, libm::log(self.fails.1.max(1e-300)));
+        let limit = libm::log(limit);
         let slope = SLOPE / PER_BIT as f64;
         match self.passes {
             None => low + (low_error - limit) / slope,
             Some((high, error)) => {
-                let (high, high_error) = (high as f64, error.max(1e-300).ln());
+                let (high, high_error) = (high as f64, libm::log(error.max(1e-300)));
                 if low_error.is_finite() {
                     low + (high - low) * (low_error - limit) / (low_error - high_error)
                 } else {

@@ -104,7 +104,7 @@ impl Exprs {
     fn gelu_scale(&self, u: Id, p: Id) -> Option<f64> {
         let polynomials = self.polynomials(u, p, DEPTH)?;
         let k = polynomials.first()?[1] / GELU_TANH[0];
-        let expected = [0.0, GELU_TANH[0] * k, 0.0, GELU_TANH[1] * k.powi(3)];
+        let expected = [0.0, GELU_TANH[0] * k, 0.0, GELU_TANH[1] * (k * k * k)];
         let is_gelu = |found: &[f64; 4]| found.iter().zip(expected).all(|(found, expected)| near(*found, expected));
         polynomials.iter().all(is_gelu).then_some(k)
     }

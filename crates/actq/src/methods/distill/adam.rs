@@ -1,5 +1,7 @@
 //! Adam (arXiv 1412.6980).
 
+use crate::numbers::power;
+
 /// Adam's moments of a range of parameters.
 #[derive(Clone, Debug)]
 pub struct Adam {
@@ -23,8 +25,8 @@ pub struct Stride {
 
 impl Stride {
     /// Returns the stride of step `t`, which counts from 1.
-    pub fn new(rate: f32, t: i32) -> Self {
-        Self { rate, first: 1.0 / (1.0 - FIRST.powi(t)), second: 1.0 / (1.0 - SECOND.powi(t)) }
+    pub fn new(rate: f32, t: u32) -> Self {
+        Self { rate, first: 1.0 / (1.0 - power(FIRST, t)), second: 1.0 / (1.0 - power(SECOND, t)) }
     }
 }
 

@@ -13,6 +13,7 @@ use super::size::{Price, Size};
 use crate::budget::{BudgetTooSmall, MIN_USED_SHARE};
 use crate::error::Result;
 use crate::graph::WeightMatrix;
+use crate::numbers::square;
 
 /// Returns the predicted squared error of a row in units of its own energy: that of the mid-rise grid with error
 /// feedback. The value at 8 bits is higher than the cost of rounding (0.00005). So 8 bits go only to rows for which 4
@@ -57,7 +58,7 @@ impl Rows {
 /// Returns the energies of a matrix's rows for the importances of its columns (`h`) and rows (`g`).
 pub fn energies(matrix: &WeightMatrix, h: &[f64], g: &[f64]) -> Vec<f64> {
     let rows = matrix.data.chunks_exact(matrix.cols).zip(g);
-    rows.map(|(row, g)| g * row.iter().zip(h).map(|(w, h)| f64::from(*w).powi(2) * h).sum::<f64>()).collect()
+    rows.map(|(row, g)| g * row.iter().zip(h).map(|(w, h)| square(f64::from(*w)) * h).sum::<f64>()).collect()
 }
 
 /// Returns the predicted error of all rows.

@@ -21,6 +21,7 @@ use crate::graph::{Derivatives, Graph, Matrix, Network, Node, NodeKind, STRIP, V
 use crate::methods::learning::Recipe;
 use crate::methods::options::Effort;
 use crate::methods::quantized::Quantized;
+use crate::numbers::square;
 use crate::random::Random;
 
 /// Learning rates.
@@ -187,7 +188,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Base
             clip(&mut of_matrices, &mut of_vectors);
         }
         schedule.took(loss);
-        let stride = |of: f32| Stride::new(of * task.recipe.rate * rate, schedule.steps() as i32);
+        let stride = |of: f32| Stride::new(of * task.recipe.rate * rate, schedule.steps() as u32);
         let of_codes =
             LearningRates { codes: stride(rates.latent), scales: stride(rates.scale), scaling: rates.scaling };
         let by_vector = stride(rates.vector);
@@ -250,7 +251,7 @@ fn column_deviations(values: &Array2<f32>) -> Vec<f32> {
 /// Raises units to a tenth of their root mean square: an element may hardly move in the recording. Units are 1 if none
 /// moves.
 fn with_least(mut units: Vec<f32>) -> Vec<f32> {
-    let square = units.iter().map(|unit| f64::from(*unit).powi(2)).sum::<f64>() / units.len().max(1) as f64;
+    let square = units.iter().map(|unit| square(f64::from(*unit))).sum::<f64>() / units.len().max(1) as f64;
     let least = if square > 0.0 { 0.1 * square.sqrt() as f32 } else { 1.0 };
     units.iter_mut().for_each(|unit| *unit = unit.max(least));
     units

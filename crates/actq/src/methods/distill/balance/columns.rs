@@ -11,6 +11,7 @@ use super::sites::{Reading, Site};
 use crate::calibrate::moments::Moments;
 use crate::calibrate::sensitivity::{Side, importance};
 use crate::graph::Graph;
+use crate::numbers::square;
 
 /// Maximum ratio of a factor to the geometric mean of the factors, or of this mean to a factor. The recording may not
 /// show the full range of a value.
@@ -43,7 +44,7 @@ impl Columns {
         for reading in &site.readings {
             let matrix = &graph.matrices[reading.matrix];
             for (row, g) in matrix.data.chunks_exact(matrix.cols).zip(&outputs[reading.matrix]) {
-                reading.columns().for_each(|(c, e)| weights[e] += g * f64::from(row[c]).powi(2));
+                reading.columns().for_each(|(c, e)| weights[e] += g * square(f64::from(row[c])));
             }
         }
         let moments = joint(len, &site.readings, moments);
@@ -145,7 +146,7 @@ impl RawColumns {
         for (c, unit) in units.iter().enumerate().filter(|(c, _)| self.deviation[*c] == 0.0) {
             self.centred.row_mut(c).fill(0.0);
             self.centred.column_mut(c).fill(0.0);
-            self.centred[(c, c)] = (usual / unit).powi(2);
+            self.centred[(c, c)] = square(usual / unit);
         }
         self.in_units(units)
     }
@@ -177,8 +178,8 @@ pub(super) fn deviations(moments: &Moments) -> Vec<f64> {
 /// the error of balanced columns.
 pub(super) fn lost_bits(weights: &[f64], values: &[f64]) -> f64 {
     let sum = |values: &[f64]| values.iter().sum::<f64>();
-    let balanced = weights.iter().zip(values).map(|(a, h)| (a * h).sqrt()).sum::<f64>().powi(2);
-    0.5 * (sum(weights) * sum(values) / balanced.max(f64::MIN_POSITIVE)).log2()
+    let balanced = square(weights.iter().zip(values).map(|(a, h)| (a * h).sqrt()).sum());
+    0.5 * libm::log2(sum(weights) * sum(values) / balanced.max(f64::MIN_POSITIVE))
 }
 
 /// Joins the moments of the elements of a value that matrices read; others are 0.
@@ -196,8 +197,8 @@ fn joint(len: usize, readings: &[Reading], moments: &[Moments]) -> Moments {
 
 /// Computes the geometric mean; `None` if there are no values.
 fn geometric_mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), value| (sum + value.ln(), count + 1));
-    (count > 0).then(|| (sum / count as f64).exp())
+    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), value| (sum + libm::log(value), count + 1));
+    (count > 0).then(|| libm::exp(sum / count as f64))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use crate::calibrate::moments::Moments;
 use crate::graph::operation::Operand;
 use crate::graph::ops::{Concat, Span};
 use crate::graph::{Graph, NodeKind, ValueId};
+use crate::numbers::square;
 
 /// Minimum loss from units that is worth a warning, in bits per weight.
 const FAR_APART: f64 = 3.0;
@@ -52,7 +53,7 @@ fn furthest(graph: &Graph, m: usize, observations: &[Option<usize>], moments: &M
     let energies = matrix.column_energies();
     let deviations = deviations(moments);
     let read = |(c, observation): (usize, &Option<usize>)| {
-        let (weights, values) = (energies[c], deviations[c].powi(2));
+        let (weights, values) = (energies[c], square(deviations[c]));
         (weights > 0.0 && values > 0.0).then_some(((*observation)?, weights, values))
     };
     let columns: Vec<(usize, f64, f64)> = observations.iter().enumerate().filter_map(read).collect();

@@ -188,7 +188,7 @@ impl Kept {
         }
         let [weights, values] = self.sums(&is_kept);
         let kept_factor = is_kept.contains(&true).then(|| (weights / values).sqrt().sqrt());
-        let lost_bits = (self.error(&is_kept) / self.least).log2();
+        let lost_bits = libm::log2(self.error(&is_kept) / self.least);
         let fits = kept_factor.map_or(!self.has_means, |factor| factor > 0.0 && factor.is_finite());
         let is_usable = fits && !runs.is_empty() && lost_bits.is_finite();
         is_usable.then_some(Part { runs, has_means: self.has_means, kept_factor, lost_bits })
