@@ -20,9 +20,9 @@ const NAMES: [&[&str]; 8] = [
 ];
 
 fuzz_target!(|bytes: &[u8]| {
-    let Some((choice, rest)) = bytes.split_first() else { return };
+    let Some((options, rest)) = bytes.split_first() else { return };
     let folder = tempfile::tempdir().expect("a folder");
-    let names = NAMES[usize::from(*choice) % NAMES.len()];
+    let names = NAMES[usize::from(*options) % NAMES.len()];
     let mut parts = rest.splitn(names.len(), |byte| *byte == 0);
     for name in names {
         let path = folder.path().join(name);

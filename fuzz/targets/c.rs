@@ -32,8 +32,8 @@ impl Script<'_> {
 
     /// A length: the right one, one less, one more, none, or another; never more than the buffer has.
     fn length(&mut self, right: usize, most: usize) -> usize {
-        let choice = self.next();
-        [right, right, right.saturating_sub(1), right + 1, 0, choice][choice % 6].min(most)
+        let options = self.next();
+        [right, right, right.saturating_sub(1), right + 1, 0, options][options % 6].min(most)
     }
 }
 
@@ -67,9 +67,9 @@ fn run(bytes: &[u8], script: &[u8]) {
         let mut saved_bytes = 0;
         actq_head_init(head, image, scratch.as_mut_ptr(), words);
         for _ in 0..CALLS {
-            let choice = script.next();
+            let options = script.next();
             // A buffer, or one that must be refused: null, misaligned, or the head's own memory.
-            let (o, a): (*const f32, *mut f32) = match choice / 16 {
+            let (o, a): (*const f32, *mut f32) = match options / 16 {
                 0 => (null(), actions.as_mut_ptr()),
                 1 => (observations.as_ptr(), null_mut()),
                 2 => (observations.as_ptr().wrapping_byte_add(1), actions.as_mut_ptr()),
@@ -79,7 +79,7 @@ fn run(bytes: &[u8], script: &[u8]) {
                 _ => (observations.as_ptr(), actions.as_mut_ptr()),
             };
             let (obs, act) = (script.length(obs, obs + 255), script.length(act, act + 255));
-            let status = match choice % 16 {
+            let status = match options % 16 {
                 0..4 => actq_step(head, o, obs, a, act),
                 4 => actq_begin(head, o, obs),
                 5 | 6 => actq_poll(head, cost.least_budget, a, act),

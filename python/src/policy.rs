@@ -14,7 +14,7 @@ use actq_cli::outputs::unfinished::Scratch;
 use actq_cli::probes::probes;
 use actq_cli::report::deployment;
 use actq_deploy::{Answers, Bundle, DESCRIPTION, DeployFolder, read};
-use actq_onnx::{Choice, Onnx, import, import_bytes};
+use actq_onnx::{ImportOptions, Onnx, import, import_bytes};
 use anyhow::anyhow;
 use numpy::{
     AllowTypeChange, IntoPyArray as _, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _, PyUntypedArrayMethods as _,
@@ -192,7 +192,7 @@ pub(crate) fn import_path(
 ) -> PyResult<Policy> {
     let import = move || {
         let limits = stated(limits);
-        let choice = Choice { output, states, observed: observe, limits, rate_hz, ..Choice::default() };
+        let options = ImportOptions { output, states, observed: observe, limits, rate_hz, ..ImportOptions::default() };
         let is_answered = accept_profile || !answers.is_empty() || profile.is_some();
         let refuse_answers =
             || error!("{}: only a deploy bundle takes accept_profile, answers and profile", path.display());
@@ -200,22 +200,22 @@ pub(crate) fn import_path(
             if is_answered {
                 return Err(refuse_answers());
             }
-            let imported = import(&path, &choice).map_err(raise_of_import)?;
+            let imported = import(&path, &options).map_err(raise_of_import)?;
             let policy = imported.policy(&path, &path).or_raise()?;
             return Ok(Policy::new(policy, Some(imported.source.files().or_raise()?)));
         }
-        if choice.output.is_some() || !choice.states.is_empty() || !choice.observed.is_empty() {
+        if options.output.is_some() || !options.states.is_empty() || !options.observed.is_empty() {
             return Err(error!("{}: only an ONNX file takes output, states and observe", path.display()));
         }
         let is_policy = DeployFolder.accepts(&path) || path.join(FILES[0]).is_file();
         let is_bundle = path.is_dir() || path.extension().is_some_and(|ending| ending == "kinfer");
-        if choice.rate_hz.is_some() {
+        if options.rate_hz.is_some() {
             return Err(error!("{}: only an ONNX file takes rate_hz; this source states its rate", path.display()));
         }
         if is_bundle && !is_policy {
-            return import_bundle(&path, accept_profile, &answers, profile.as_deref(), &choice.limits);
+            return import_bundle(&path, accept_profile, &answers, profile.as_deref(), &options.limits);
         }
-        if !choice.limits.is_empty() {
+        if !options.limits.is_empty() {
             return Err(error!("{}: a policy folder takes no limits; set them in its files", path.display()));
         }
         if is_answered {
@@ -288,20 +288,20 @@ pub(crate) fn import_onnx<'py>(
 ) -> PyResult<(Policy, Bound<'py, PyDict>)> {
     let import = move || {
         let limits = stated(limits);
-        let choice = Choice { output, states, observed: observe, rate_hz, ..Choice::default() };
-        let import = |choice: &Choice| {
-            let imported = import_bytes(bytes.clone(), Path::new(""), &name, choice);
+        let options = ImportOptions { output, states, observed: observe, rate_hz, ..ImportOptions::default() };
+        let import = |options: &ImportOptions| {
+            let imported = import_bytes(bytes.clone(), Path::new(""), &name, options);
             let imported = imported.map_err(|error| raise_of_import(error.context(name.clone())))?;
             let policy = imported.policy(Path::new(""), Path::new(&name)).or_raise()?;
             PyResult::Ok((imported, policy))
         };
-        let (imported, policy) = import(&choice)?;
+        let (imported, policy) = import(&options)?;
         let probes = probes(&imported, &policy, &MAGNITUDES, FRAMES);
         let actions = actions(&policy, &probes);
         let (source, policy) = match limits.is_empty() {
             true => (imported.source.clone(), policy),
             false => {
-                let (limited, policy) = import(&Choice { limits, ..choice })?;
+                let (limited, policy) = import(&ImportOptions { limits, ..options })?;
                 (limited.source, policy)
             }
         };

@@ -1,11 +1,11 @@
 //! The comparison: every method at every budget on every policy, each image made by one job and driven by another.
 
 mod actquant_k;
-mod allowed;
 mod cell;
+mod cell_image;
 mod jobs;
 mod least;
-mod making;
+mod limits;
 mod plan;
 mod report;
 mod results;
@@ -22,9 +22,9 @@ use actq_jobs::order;
 use actq_jobs::store::Store;
 use anyhow::{Context as _, Result, ensure};
 
-pub use allowed::Allowed;
 pub use cell::{Cell, CellKey, Made};
 use jobs::Entrant;
+pub use limits::Limit;
 use plan::UR3;
 pub use plan::{Contender, Plan};
 use results::{HEADER, LOG, PLAN, STORE};

@@ -11,8 +11,8 @@ use actq::graph::{Derivatives, Network, zero_state};
 use actq::random::Random;
 use ndarray::Array2;
 
-use crate::student::choice::Start;
 use crate::student::form::Form;
+use crate::student::recipes::Start;
 use crate::student::rival::{Rival, Settings, Teacher};
 use crate::student::widths::format_widths;
 

@@ -1,10 +1,10 @@
 //! A rival: a narrower network of the teacher's structure. It starts at random weights, and learns from the recordings
 //! and the teacher's outputs with the noise of the method distill.
 
-pub mod choice;
 pub mod codes;
 pub mod fit;
 pub mod form;
+pub mod recipes;
 pub mod rival;
 pub mod start;
 pub mod widths;
@@ -13,8 +13,8 @@ use actq::error::Result;
 use actq::graph::narrow::narrowed;
 use actq::random::Random;
 
-use choice::Start;
 use form::Form;
+use recipes::Start;
 use rival::{Rival, Settings, Teacher};
 use start::restart;
 use widths::format_widths;

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use actq::error::{Context as _, Result, ensure};
 use actq::graph::{Network, State, Weights, zero_state};
 use actq::policy::Policy;
-use actq_onnx::{Choice, OnnxFile};
+use actq_onnx::{ImportOptions, OnnxFile};
 
 use crate::sources::{Compute, Part};
 
@@ -15,7 +15,7 @@ use crate::sources::{Compute, Part};
 pub(crate) struct OnnxNetwork {
     inputs: Vec<(String, usize)>,
     /// Inputs that cells keep, and the outputs of their next values.
-    kept: Vec<(String, String)>,
+    states: Vec<(String, String)>,
     lens: Vec<usize>,
     outputs: Vec<Output>,
     /// What the file's nodes do with NaN and infinity, and the operations here do not.
@@ -41,11 +41,12 @@ impl OnnxNetwork {
         ensure!(!outputs.is_empty(), "nothing reads an output of it; remove it");
         let signature = file.signature();
         let mut lens = vec![None; signature.inputs.len()];
-        let (mut opened, mut kept, mut guards) = (Vec::new(), Vec::new(), BTreeSet::new());
+        let (mut opened, mut states, mut guards) = (Vec::new(), Vec::new(), BTreeSet::new());
         for name in outputs {
             let read = |is_inner| -> Result<_> {
-                let choice = Choice { output: Some(name.clone()), is_fed: true, is_inner, ..Choice::default() };
-                let imported = file.import(&choice)?;
+                let options =
+                    ImportOptions { output: Some(name.clone()), is_fed: true, is_inner, ..ImportOptions::default() };
+                let imported = file.import(&options)?;
                 let policy = imported.source.policy_without_digest(path, path)?;
                 Ok((imported, Rc::new(policy)))
             };
@@ -60,7 +61,7 @@ impl OnnxNetwork {
                 lens[at] = Some(*len);
                 reads.push(at);
             }
-            kept.extend(imported.states.into_iter().map(|(input, output, _)| (input, output)));
+            states.extend(imported.states.into_iter().map(|(input, output, _)| (input, output)));
             let (weights, state) = (Weights::of(&policy.graph), zero_state(&policy.graph, 1));
             opened.push(Output { policy, inner, weights: Rc::new(weights), state, reads });
         }
@@ -73,7 +74,7 @@ impl OnnxNetwork {
         }
         let inputs = used.iter().filter_map(|&i| Some((signature.inputs[i].0.clone(), lens[i]?))).collect();
         let lens = opened.iter().map(|output| output.policy.chunk * output.policy.act_len).collect();
-        Ok(Self { inputs, kept, lens, outputs: opened, guards })
+        Ok(Self { inputs, states, lens, outputs: opened, guards })
     }
 }
 
@@ -82,8 +83,8 @@ impl Compute for OnnxNetwork {
         &self.inputs
     }
 
-    fn kept(&self) -> &[(String, String)] {
-        &self.kept
+    fn states(&self) -> &[(String, String)] {
+        &self.states
     }
 
     fn outputs(&self) -> &[usize] {

@@ -14,7 +14,7 @@ pub trait Compute {
 
     /// Returns the graph's inputs that recurrent cells keep by themselves, from zero, with the outputs of their next
     /// values.
-    fn kept(&self) -> &[(String, String)] {
+    fn states(&self) -> &[(String, String)] {
         &[]
     }
 

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::figures::{CustomResult, Driven, Evaluated, JobResult};
-use crate::merged::Merged;
+use crate::results::Merged;
 
 /// The version of the files: 2 since results end in their checksum.
 pub const FORMAT: u32 = 2;

@@ -1,8 +1,8 @@
 //! Conversion of a file to a policy folder in memory: chooses the action output and the observed inputs, and
 //! converts the network between them.
 
-mod choice;
 mod observation;
+mod options;
 mod output;
 mod remarks;
 
@@ -16,8 +16,8 @@ use actq::policy::Policy;
 use actq::text::printable;
 use prost::bytes::Bytes;
 
-pub use self::choice::Choice;
 use self::observation::{Observation, named_states, observed_inputs, refuse_integers};
+pub use self::options::ImportOptions;
 use self::output::{actions, choose, refuse_batch};
 use crate::action;
 use crate::file::model::Model;
@@ -98,9 +98,9 @@ impl OnnxFile {
     /// # Errors
     ///
     /// If a part of it is not supported; names the node if known.
-    pub fn import(&self, choice: &Choice) -> Result<Imported> {
+    pub fn import(&self, options: &ImportOptions) -> Result<Imported> {
         let name = self.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        import_model(&self.model, &name, choice).with_context(|| self.path.display().to_string())
+        import_model(&self.model, &name, options).with_context(|| self.path.display().to_string())
     }
 
     /// Returns the values of an output that depends on no input; `None` if it depends on one.
@@ -116,13 +116,13 @@ impl OnnxFile {
 }
 
 /// Imports an ONNX file. An error names the file, and the node if known.
-pub fn import(path: &Path, choice: &Choice) -> Result<Imported> {
-    OnnxFile::read(path)?.import(choice)
+pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported> {
+    OnnxFile::read(path)?.import(options)
 }
 
 /// Imports a file's bytes as [`import`] does, with external tensors from `folder`.
-pub fn import_bytes(bytes: Vec<u8>, folder: &Path, name: &str, choice: &Choice) -> Result<Imported> {
-    import_model(&Model::parse(Bytes::from(bytes), folder)?, name, choice)
+pub fn import_bytes(bytes: Vec<u8>, folder: &Path, name: &str, options: &ImportOptions) -> Result<Imported> {
+    import_model(&Model::parse(Bytes::from(bytes), folder)?, name, options)
 }
 
 /// Returns the files that hold weights of an ONNX file, by their paths from its folder. They need not exist.
@@ -135,7 +135,7 @@ pub fn data_files(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(files.with_context(|| path.display().to_string())?.into_iter().collect())
 }
 
-/// Importer of ONNX files, without choices.
+/// Importer of ONNX files, without options.
 #[derive(Clone, Copy, Debug)]
 pub struct Onnx;
 
@@ -150,7 +150,7 @@ impl Importer for Onnx {
     }
 
     fn load(&self, path: &Path) -> Result<Policy> {
-        import(path, &Choice::default())?.policy(path, path)
+        import(path, &ImportOptions::default())?.policy(path, path)
     }
 }
 
@@ -166,11 +166,11 @@ impl Imported {
 }
 
 /// Imports the network of a model; `name` becomes the policy's.
-fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> {
-    choice.check(&model.graph)?;
-    let Followed { mut exprs, outputs, errors } = follow_outputs(model, choice)?;
-    let cells = Cells::find(model, &mut exprs, &outputs, &choice.states);
-    let output = &outputs[choose(&exprs, &cells, &outputs, errors, choice)?];
+fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Imported> {
+    options.check(&model.graph)?;
+    let Followed { mut exprs, outputs, errors } = follow_outputs(model, options)?;
+    let cells = Cells::find(model, &mut exprs, &outputs, &options.states);
+    let output = &outputs[choose(&exprs, &cells, &outputs, errors, options)?];
     let is_constant = |i: &usize| matches!(output.value.elements()[*i], Element::Known(_));
     let constant = (0..output.value.len()).filter(is_constant).collect();
     let root = action_root(&mut exprs, &cells, output)?;
@@ -178,24 +178,24 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
     refuse_integers(model, &exprs, &live)?;
     let pairs = cells.pairs(model, &exprs, &live, &outputs)?;
     let graph = Chosen { model, exprs: &exprs, cells: &cells, outputs: &outputs, action: &output.name };
-    let observed = observed_inputs(&graph, &live, &pairs, choice)?;
+    let observed = observed_inputs(&graph, &live, &pairs, options)?;
     let observation = Observation::of(model, &exprs, &live, &observed);
     let states = named_states(model, &pairs, &outputs);
 
     let values = exprs.len_of(root);
-    let (chunk, act_len) = if choice.is_fed {
+    let (chunk, act_len) = if options.is_fed {
         (1, values)
     } else {
         refuse_batch(model, &observed, &output.value.shape)?;
         actions(&output.value.shape, values)?
     };
-    let (root, contract) = if choice.is_inner { (root, None) } else { action::contract(&exprs, root, act_len) };
+    let (root, contract) = if options.is_inner { (root, None) } else { action::contract(&exprs, root, act_len) };
     let last = contract.iter().flat_map(keys).collect();
     let (contract, bounded) =
-        if choice.is_inner { (None, 0) } else { action::bounded(&exprs, root, contract, act_len) };
-    let contract = match choice.limits.is_empty() {
+        if options.is_inner { (None, 0) } else { action::bounded(&exprs, root, contract, act_len) };
+    let contract = match options.limits.is_empty() {
         true => contract,
-        false => Some(contract.unwrap_or_default().limited(&choice.limits, act_len)?),
+        false => Some(contract.unwrap_or_default().limited(&options.limits, act_len)?),
     };
     let root = simplify(&mut exprs, root, &cells.instead);
     let lowered = lower(&exprs, root, &observation.offsets, observation.len)
@@ -207,7 +207,7 @@ fn import_model(model: &Model, name: &str, choice: &Choice) -> Result<Imported> 
         chunk: (chunk > 1).then_some(chunk),
         obs_dim: observation.len,
         act_dim: act_len,
-        control_hz: choice.rate_hz,
+        control_hz: options.rate_hz,
         // Without a contract, the actions of a chunk would be limited to -1 .. 1.
         action: contract.or_else(|| (chunk > 1).then(JsonContract::default)),
         ops: lowered.ops,
@@ -251,7 +251,7 @@ struct Followed {
 }
 
 /// Converts the graph's outputs, and the value that the caller chooses, to expressions.
-fn follow_outputs(model: &Model, choice: &Choice) -> Result<Followed> {
+fn follow_outputs(model: &Model, options: &ImportOptions) -> Result<Followed> {
     let mut follower = Follower::new(model);
     let mut outputs = Vec::new();
     let mut errors = Vec::new();
@@ -261,7 +261,7 @@ fn follow_outputs(model: &Model, choice: &Choice) -> Result<Followed> {
             Err(error) => errors.push((port.name.clone(), error)),
         }
     }
-    if let Some(inner) = &choice.output
+    if let Some(inner) = &options.output
         && !outputs.iter().any(|output| output.name == *inner)
     {
         let value = follower.value(inner).with_context(|| format!("output {:?}", printable(inner)))?;

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use actq::pipeline::driven::DriveOutcome;
 
-use super::allowed::Allowed;
+use super::limits::Limit;
 use super::plan::Contender;
 
 /// The key of a result: a policy, its method and its budget; without a method the f32 policy.
@@ -16,7 +16,7 @@ pub struct CellKey {
     /// The method.
     pub method: Option<Contender>,
     /// Budget of the image.
-    pub budget: Option<Allowed>,
+    pub budget: Option<Limit>,
 }
 
 impl CellKey {

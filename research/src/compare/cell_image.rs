@@ -16,8 +16,8 @@ use actq_kernels::layout::GROUPS;
 use anyhow::{Context as _, Result};
 
 use super::actquant_k;
-use super::allowed::Allowed;
 use super::cell::Made;
+use super::limits::Limit;
 use super::plan::{Contender, Rival};
 use crate::actquant::ActionStatistics;
 use crate::kquants::Format;
@@ -83,7 +83,7 @@ impl<'a> Maker<'a> {
     pub(super) fn make(
         &mut self,
         contender: Contender,
-        budget: Allowed,
+        budget: Limit,
         mut progress: impl FnMut(&str, f64),
     ) -> Result<Attempt> {
         self.prepare(contender, &mut progress)?;
@@ -92,8 +92,8 @@ impl<'a> Maker<'a> {
         }
         if contender.is_simulated() {
             return match budget {
-                Allowed::Bits(bits) => self.simulate(contender, bits),
-                Allowed::Flash { .. } | Allowed::Time { .. } => {
+                Limit::Bits(bits) => self.simulate(contender, bits),
+                Limit::Flash { .. } | Limit::Time { .. } => {
                     Ok(Attempt::Impossible("a simulated format has no image; use bits per weight".to_owned()))
                 }
             };
@@ -175,7 +175,7 @@ impl<'a> Maker<'a> {
     fn rival(
         &self,
         (contender, rival): (Contender, Rival),
-        budget: Allowed,
+        budget: Limit,
         progress: &mut impl FnMut(&str, f64),
     ) -> Result<Attempt> {
         let quantizer = self.prepared(contender)?;
@@ -238,7 +238,7 @@ impl<'a> Maker<'a> {
     fn with_group(
         &self,
         contender: Contender,
-        budget: Allowed,
+        budget: Limit,
         group: usize,
         progress: &mut impl FnMut(&str, f64),
     ) -> Result<Result<Attempt, BudgetTooSmall>> {

@@ -13,8 +13,8 @@ use actq_jobs::work::{Custom, Work};
 use anyhow::{Context as _, Result};
 use serde::{Deserialize, Serialize};
 
-use super::allowed::Allowed;
 use super::cell::CellKey;
+use super::limits::Limit;
 use super::plan::{Contender, Plan};
 use super::simulator::Simulator;
 
@@ -41,7 +41,7 @@ pub(super) struct Entrant {
 pub(super) struct Making {
     policy: String,
     pub(super) method: Contender,
-    pub(super) budget: Allowed,
+    pub(super) budget: Limit,
     pub(super) steps: Option<usize>,
     pub(super) seed: u64,
     revision: u32,

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 
-use super::allowed::Allowed;
 use super::cell::{Cell, Made};
+use super::limits::Limit;
 use super::plan::Contender;
 
 /// Writes the fewest bytes and the fewest milliseconds at which each method keeps f32's success: that of the image is
@@ -14,7 +14,7 @@ pub(super) fn write(
     text: &mut String,
     methods: &[Contender],
     f32_cell: Option<&Cell>,
-    cells: &[(Contender, Allowed, Option<&Cell>)],
+    cells: &[(Contender, Limit, Option<&Cell>)],
 ) -> Result<()> {
     let Some([low, _]) = f32_cell.and_then(|cell| cell.outcome()?.interval()) else { return Ok(()) };
     // In whole percent, as the table above gives the interval.

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// milliseconds of a step at [`CLOCK`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Allowed {
+pub enum Limit {
     /// Bits per weight, everything counted.
     Bits(f64),
     /// Bytes of the whole image.
@@ -26,7 +26,7 @@ pub enum Allowed {
     },
 }
 
-impl Allowed {
+impl Limit {
     /// Parses a budget of the command line.
     ///
     /// # Errors
@@ -80,7 +80,7 @@ impl Allowed {
     }
 }
 
-impl fmt::Display for Allowed {
+impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Bits(bits) => write!(f, "{bits}"),
@@ -103,14 +103,14 @@ mod tests {
             ("10001B", Budget::ImageBytes(10_001)),
             ("0.25ms", Budget::Time(TimeLimit { milliseconds: 0.25, clock_hz: CLOCK, image_bytes: None })),
         ] {
-            let allowed = Allowed::parse(text).expect("a budget");
+            let allowed = Limit::parse(text).expect("a budget");
             assert_eq!((allowed.budget(), allowed.to_string().as_str()), (budget, text));
             let json = serde_json::to_string(&allowed).expect("JSON");
-            assert_eq!(serde_json::from_str::<Allowed>(&json).expect("a budget"), allowed);
+            assert_eq!(serde_json::from_str::<Limit>(&json).expect("a budget"), allowed);
         }
-        assert_eq!(serde_json::from_str::<Allowed>("2.5").expect("of former journals"), Allowed::Bits(2.5));
+        assert_eq!(serde_json::from_str::<Limit>("2.5").expect("of former journals"), Limit::Bits(2.5));
         for text in ["", "0", "17", "0K", "K", "1.5K", "ms", "0ms", "-1ms", "infms", "1msms"] {
-            assert!(Allowed::parse(text).is_err(), "{text}");
+            assert!(Limit::parse(text).is_err(), "{text}");
         }
     }
 }

@@ -6,7 +6,7 @@ use actq::methods::Method;
 use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-use super::allowed::Allowed;
+use super::limits::Limit;
 use crate::actquant::ActQuant;
 use crate::actquant::choices::Choices;
 use crate::student::form::Form;
@@ -172,10 +172,10 @@ pub struct Plan {
         default_value = "rtn,gptq,actquant,actquant-k,distill-0,distill"
     )]
     pub methods: Vec<Contender>,
-    /// Allowed bits per weight, everything counted; or flash of the whole image, in KiB as 12K or in bytes as 12000B;
+    /// Limit bits per weight, everything counted; or flash of the whole image, in KiB as 12K or in bytes as 12000B;
     /// or time of a step, in milliseconds at 168 MHz as 0.25ms
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Allowed::parse, default_value = "1.5,2,2.3,2.5,3,4")]
-    pub budgets: Vec<Allowed>,
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Limit::parse, default_value = "1.5,2,2.3,2.5,3,4")]
+    pub budgets: Vec<Limit>,
     /// Closed-loop episodes of each cell
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000), default_value_t = 100)]
     pub episodes: u64,

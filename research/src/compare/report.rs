@@ -12,9 +12,9 @@ use anyhow::Result;
 use serde::Deserialize as _;
 use serde_json::Value;
 
-use super::allowed::Allowed;
 use super::cell::{Cell, CellKey, Made};
 use super::least;
+use super::limits::Limit;
 use super::plan::Contender;
 use super::results::{Header, Results};
 
@@ -61,14 +61,14 @@ pub(super) fn write(results: &Results, folder: &Path) -> Result<PathBuf> {
 struct Asked {
     policies: Vec<String>,
     methods: Vec<Contender>,
-    budgets: Vec<Allowed>,
+    budgets: Vec<Limit>,
 }
 
 impl Asked {
     fn of(header: &Header) -> Result<Self> {
         let read = |key: &str| header.options[key].clone();
-        let mut budgets: Vec<Allowed> = serde_json::from_value(read("budgets"))?;
-        budgets.sort_by(Allowed::order);
+        let mut budgets: Vec<Limit> = serde_json::from_value(read("budgets"))?;
+        budgets.sort_by(Limit::order);
         Ok(Self {
             policies: serde_json::from_value(read("policies"))?,
             methods: serde_json::from_value(read("methods"))?,
@@ -147,7 +147,7 @@ fn head(header: &Header) -> Result<String> {
 /// Returns the command of these results.
 fn command(options: &Value) -> String {
     let list = |value: &Value| -> String {
-        let budget = |value: &Value| Allowed::deserialize(value).ok().filter(|_| value.is_object());
+        let budget = |value: &Value| Limit::deserialize(value).ok().filter(|_| value.is_object());
         let plain = |value: &Value| match budget(value) {
             Some(allowed) => allowed.to_string(),
             None => value.as_str().map_or_else(|| value.to_string(), str::to_owned),
@@ -164,11 +164,11 @@ fn command(options: &Value) -> String {
 }
 
 fn section(text: &mut String, results: &Results, asked: &Asked, policy: &str) -> Result<()> {
-    let find = |method: Option<Contender>, budget: Option<Allowed>| {
+    let find = |method: Option<Contender>, budget: Option<Limit>| {
         results.find(&CellKey { policy: policy.to_owned(), method, budget })
     };
     let f32_cell = find(None, None);
-    let cells: Vec<(Contender, Allowed, Option<&Cell>)> = asked
+    let cells: Vec<(Contender, Limit, Option<&Cell>)> = asked
         .budgets
         .iter()
         .flat_map(|&budget| asked.methods.iter().map(move |&method| (method, budget)))
@@ -239,7 +239,7 @@ fn section(text: &mut String, results: &Results, asked: &Asked, policy: &str) ->
 }
 
 /// Lists the impossible cells and their reasons; groups those of one method and one reason.
-fn reasons(text: &mut String, cells: &[(Contender, Allowed, Option<&Cell>)]) -> Result<()> {
+fn reasons(text: &mut String, cells: &[(Contender, Limit, Option<&Cell>)]) -> Result<()> {
     let mut reasons: Vec<(Contender, &str, Vec<String>)> = Vec::new();
     let mut open = Vec::new();
     for (method, budget, cell) in cells {
@@ -262,7 +262,7 @@ fn reasons(text: &mut String, cells: &[(Contender, Allowed, Option<&Cell>)]) -> 
     Ok(())
 }
 
-fn not_driven(text: &mut String, f32_cell: Option<&Cell>, cells: &[(Contender, Allowed, Option<&Cell>)]) -> Result<()> {
+fn not_driven(text: &mut String, f32_cell: Option<&Cell>, cells: &[(Contender, Limit, Option<&Cell>)]) -> Result<()> {
     let made = cells.iter().filter_map(|(.., cell)| cell.filter(|cell| cell.made.is_some()));
     if f32_cell
         .into_iter()

@@ -13,8 +13,8 @@ use serde_json::Value;
 
 use super::actquant_k;
 use super::cell::Attempted;
+use super::cell_image::{Attempt, Maker, Subject};
 use super::jobs::{DRIVE, Driving, MAKE, Making};
-use super::making::{Attempt, Maker, Subject};
 use super::simulator::{Driver, Episodes, Simulator, shared};
 
 /// Does a job of a comparison.

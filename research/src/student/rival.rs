@@ -14,10 +14,10 @@ use actq::methods::{Effort, Method, Options, Outcome};
 use actq::pipeline::QuantizedPolicy;
 use actq::policy::Policy;
 
-use super::choice::{Start, TRIAL_STEP_DIVISOR, choose};
 use super::codes::{Coded, Coder, Coding, column_squares};
 use super::fit::{Fit, fit};
 use super::form::{Form, Limits, Taken, milliseconds, taken};
+use super::recipes::{Start, TRIAL_STEP_DIVISOR, choose};
 use super::widths::Narrowing;
 use actq::graph::ties::Ties;
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use actq::data::{Dataset, Recording, Sizes};
 use actq::import::contract::StatedLimits;
 use actq::import::{FILES, Importer as _};
-use actq_onnx::{Choice, Onnx, import};
+use actq_onnx::{ImportOptions, Onnx, import};
 use anyhow::{Result, ensure};
 
 use crate::args::ImportArgs;
@@ -17,15 +17,15 @@ use crate::terminal::{note, print, reserve};
 /// Converts an ONNX file to a policy folder and prints a summary.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     let limits = args.reading.limits.as_ref().map(|limits| limits.at(args.rate_hz)).transpose()?;
-    let choice = Choice {
+    let options = ImportOptions {
         limits: limits.unwrap_or_default(),
         rate_hz: args.rate_hz,
         output: args.output.clone(),
         states: args.state.clone(),
         observed: args.observe.clone(),
-        ..Choice::default()
+        ..ImportOptions::default()
     };
-    let imported = import(&args.model, &choice)?;
+    let imported = import(&args.model, &options)?;
     let [json, weights] = FILES.map(|name| args.out.join(name));
     let policy = imported.policy(&args.out, &args.model)?;
     if let Some(fault) = imported.faults.first() {
@@ -51,8 +51,8 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     let outputs = reserve(&names, Onnx.files(&args.model).into_iter().chain(args.calib.clone()))?;
     let checked = match args.check {
         // Another program runs the file without the limits that the caller adds.
-        true if !choice.limits.is_empty() => {
-            let own = import(&args.model, &Choice { limits: StatedLimits::default(), ..choice })?;
+        true if !options.limits.is_empty() => {
+            let own = import(&args.model, &ImportOptions { limits: StatedLimits::default(), ..options })?;
             Some(check(&args.model, &own, &own.policy(&args.out, &args.model)?, calib.as_ref())?)
         }
         true => Some(check(&args.model, &imported, &policy, calib.as_ref())?),

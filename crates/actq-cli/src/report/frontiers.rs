@@ -1,7 +1,7 @@
 //! The plots of a sweep: errors and success over bytes and over predicted milliseconds.
 
 use actq_jobs::frontier::{drawn_error, frontier};
-use actq_jobs::merged::{Figures, Merged, MergedPolicy};
+use actq_jobs::results::{Figures, Merged, MergedPolicy};
 
 use super::plot::{Mark, Plot, Series, Vertical, stacked};
 
@@ -63,7 +63,7 @@ fn places(made: &Figures, clock_hz: f64) -> [f64; 2] {
 
 /// Returns a line for each curve, from small values of x to large ones, each image once.
 fn series(policy: &MergedPolicy, clock_hz: f64, y: impl Fn(&Figures) -> Option<f64>) -> Vec<Series> {
-    let line = |(name, images): (String, Vec<&actq_jobs::merged::MergedImage>)| {
+    let line = |(name, images): (String, Vec<&actq_jobs::results::MergedImage>)| {
         let made = || images.iter().filter_map(|image| image.made.as_ref());
         let panel = |axis: usize| {
             let mut points: Vec<(f64, f64)> =

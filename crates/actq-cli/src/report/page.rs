@@ -8,7 +8,7 @@ pub mod runs;
 
 use std::io::Write as _;
 
-use actq_jobs::merged::MergedPolicy;
+use actq_jobs::results::MergedPolicy;
 use anyhow::Result;
 use base64ct::{Base64, Encoding as _};
 use flate2::Compression;
@@ -67,7 +67,7 @@ pub struct SweptImage {
 impl Sweep {
     /// Takes the images of a policy; `sha256` is the digest of the page's image.
     pub fn new(policy: &MergedPolicy, clock_hz: f64, sha256: &str) -> Self {
-        let image = |(i, image): (usize, &actq_jobs::merged::MergedImage)| {
+        let image = |(i, image): (usize, &actq_jobs::results::MergedImage)| {
             let made = image.made.as_ref()?;
             let episodes = made.driven.as_ref().map(|driven| driven.episodes);
             let success = made.success().zip(episodes).zip(made.interval);

@@ -1,6 +1,6 @@
 //! The table of a sweep.
 
-use actq_jobs::merged::{Figures, Merged, MergedImage, MergedPolicy};
+use actq_jobs::results::{Figures, Merged, MergedImage, MergedPolicy};
 
 use super::{table, time};
 

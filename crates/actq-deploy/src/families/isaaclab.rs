@@ -166,7 +166,7 @@ impl Family for IsaacLab {
         if learner.is_some() || !states.is_empty() {
             let network = bundle.network(&network, &outputs).with_context(|| file.clone())?;
             // Cells keep their states by themselves.
-            states.retain(|input, _| network.kept().iter().all(|(kept, _)| kept != input));
+            states.retain(|input, _| network.states().iter().all(|(kept, _)| kept != input));
             if let (Some(yaml), Some(part)) = (learner, network.part(0)) {
                 agent::agrees(yaml, &part.policy.graph, file, facts)?;
             }

@@ -139,7 +139,7 @@ impl Limx {
         facts.note("joint_pos", yaml.location("PointfootCfg.normalization.obs_scales.dof_pos"));
         parts.value("joint_vel", "dq", vec![select(), scaled(scale("dof_vel")?)]);
         facts.note("joint_vel", yaml.location("PointfootCfg.normalization.obs_scales.dof_vel"));
-        parts.kept("last_action", n, if facts.is_choice("last_action", "raw")? { "ordered" } else { "limited" });
+        parts.state("last_action", n, if facts.is_choice("last_action", "raw")? { "ordered" } else { "limited" });
         parts.value("fed_back", "last_action", vec![select()]);
         facts.note("fed_back", facts.source("last_action"));
 
@@ -156,7 +156,7 @@ impl Limx {
         parts.value("gait_sin", "gait_phase", vec![turn(), Op::Sin]);
         parts.value("gait_cos", "gait_phase", vec![turn(), Op::Cos]);
         // A constant is a value that has no input, so it is a state that nothing changes.
-        parts.unchanged("gait", gait);
+        parts.constant_value("gait", gait);
         parts.values(
             "frame",
             &["scaled_gyro", "gravity", "joint_pos", "joint_vel", "fed_back", "gait_sin", "gait_cos", "gait"],

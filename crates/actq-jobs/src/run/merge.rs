@@ -7,8 +7,8 @@ use actq::measure::eval::ErrorSums;
 
 use crate::error::JobError;
 use crate::figures::{Driven, JobResult};
-use crate::merged::{Figures, Merged, MergedImage, MergedPolicy};
 use crate::record::Outcome;
+use crate::results::{Figures, Merged, MergedImage, MergedPolicy};
 use crate::store::Results;
 use crate::work::{Merge, Row};
 

@@ -4,10 +4,10 @@ use std::fs;
 
 use crate::common::{Fake, SPEC, files, folder, jobs, run_all};
 use actq::budget::{Budget, TimeLimit};
-use actq_jobs::merged::{Merged, MergedImage};
 use actq_jobs::order;
 use actq_jobs::plan::Jobs;
 use actq_jobs::record::Outcome;
+use actq_jobs::results::{Merged, MergedImage};
 use actq_jobs::run::run;
 use actq_jobs::store::Store;
 use actq_jobs::work::{Custom, Work};

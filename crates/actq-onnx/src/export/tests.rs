@@ -16,7 +16,7 @@ use actq_kernels::Width;
 use actq_kernels::math::Function;
 
 use super::{file, network};
-use crate::{Choice, import_bytes};
+use crate::{ImportOptions, import_bytes};
 
 const OBS: usize = 5;
 const HIDDEN: usize = 8;
@@ -81,7 +81,7 @@ fn imported_again_a_file_computes_the_same() {
     let buffer = feed_forward();
     let image = buffer.image(Path::new("made")).expect("an image");
     let bytes = file(&network(&image).expect("a network"), image.name());
-    let imported = import_bytes(bytes, Path::new("."), "made", &Choice::default()).expect("a file");
+    let imported = import_bytes(bytes, Path::new("."), "made", &ImportOptions::default()).expect("a file");
     let policy = imported.source.policy(Path::new("."), Path::new("made")).expect("a policy");
     let (mut evaluator, mut unrounded) = (Evaluator::new(&policy.graph), Unrounded::new(image));
     let mut random = Random::new(2);

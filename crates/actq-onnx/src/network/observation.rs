@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use actq::error::{Result, bail, ensure};
 use actq::text::printable;
 
-use super::choice::Choice;
+use super::options::ImportOptions;
 use crate::file::model::Model;
 use crate::nodes::follow::INTEGERS;
 use crate::states::{Chosen, Output, Pairs};
@@ -41,18 +41,23 @@ impl Observation {
 }
 
 /// Returns the indices of the inputs that the action depends on, except states. Refuses an action without any.
-pub(super) fn observed_inputs(graph: &Chosen<'_>, live: &[Id], pairs: &Pairs, choice: &Choice) -> Result<Vec<usize>> {
+pub(super) fn observed_inputs(
+    graph: &Chosen<'_>,
+    live: &[Id],
+    pairs: &Pairs,
+    options: &ImportOptions,
+) -> Result<Vec<usize>> {
     let input = |&id: &Id| if let Expr::Input(i) = graph.exprs.get(id) { Some(*i) } else { None };
     let mut read: Vec<usize> = live.iter().filter_map(input).collect();
     read.sort_unstable();
-    if !choice.is_fed {
-        graph.refuse_lost_states(&read, pairs, &choice.states, &choice.observed)?;
+    if !options.is_fed {
+        graph.refuse_lost_states(&read, pairs, &options.states, &options.observed)?;
     }
     read.retain(|i| !pairs.iter().any(|(state, _)| state == i));
     let action = printable(graph.action);
     ensure!(!read.is_empty(), "output {action:?} depends on no input; choose another by --output NAME");
-    if !choice.is_fed {
-        refuse_constants(graph.model, &read, &choice.observed)?;
+    if !options.is_fed {
+        refuse_constants(graph.model, &read, &options.observed)?;
     }
     Ok(read)
 }

@@ -1,4 +1,4 @@
-//! Choices of the caller.
+//! Options of the import.
 
 use actq::error::{Result, ensure};
 use actq::import::contract::StatedLimits;
@@ -9,9 +9,9 @@ use crate::file::model::{Graph, Port};
 /// The most names in a message.
 const MAX_LISTED: usize = 20;
 
-/// Choices of the caller; none by default.
+/// Options of the import; none by default.
 #[derive(Clone, Debug, Default)]
-pub struct Choice {
+pub struct ImportOptions {
     /// The value that is the action: an output of the graph, or any value inside.
     pub output: Option<String>,
     /// Inputs that hold recurrent state, with the outputs of their next values.
@@ -29,7 +29,7 @@ pub struct Choice {
     pub rate_hz: Option<f64>,
 }
 
-impl Choice {
+impl ImportOptions {
     /// Fails for names that the file does not have.
     pub(super) fn check(&self, graph: &Graph) -> Result<()> {
         let outputs = || format!("its outputs are {}", listed(&graph.outputs));

@@ -3,7 +3,7 @@
 use actq::error::{Context as _, Error, Result, bail};
 use actq::text::printable;
 
-use super::choice::Choice;
+use super::options::ImportOptions;
 use crate::file::model::Model;
 use crate::states::{Cells, Output, is_state};
 use crate::values::expr::Exprs;
@@ -14,9 +14,9 @@ pub(super) fn choose(
     cells: &Cells,
     outputs: &[Output],
     mut errors: Vec<(String, Error)>,
-    choice: &Choice,
+    options: &ImportOptions,
 ) -> Result<usize> {
-    if let Some(name) = &choice.output {
+    if let Some(name) = &options.output {
         return outputs.iter().position(|output| output.name == *name).context("the chosen output is missing");
     }
     let mut can: Vec<usize> = (0..outputs.len()).filter(|&i| !outputs[i].value.is_known()).collect();
@@ -26,7 +26,7 @@ pub(super) fn choose(
         return Err(error.context(format!("output {:?} cannot be imported", printable(&name))));
     }
     let is_paired = |i: &usize| is_state(cells, exprs, &outputs[*i].value);
-    let named = |i: &usize| choice.states.iter().any(|(_, to)| *to == outputs[*i].name);
+    let named = |i: &usize| options.states.iter().any(|(_, to)| *to == outputs[*i].name);
     for keep in [
         &(|i: &usize| !is_paired(i) && !named(i)) as &dyn Fn(&usize) -> bool,
         &|i: &usize| is_action(&outputs[*i].name),

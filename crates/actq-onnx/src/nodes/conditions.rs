@@ -111,7 +111,7 @@ fn negated(exprs: &mut Exprs, condition: Id) -> Option<Id> {
 }
 
 /// Converts a choice by a value of the network that forms an activation.
-pub(crate) fn choice(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Tensor> {
+pub(crate) fn options(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Tensor> {
     let refused =
         || format!("chooses by a value of the network and does not form an activation; {}", crate::nodes::call::HELP);
     let (condition, x, y) = (call.input(0)?, call.input(1)?, call.input(2)?);

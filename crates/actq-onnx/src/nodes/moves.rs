@@ -350,15 +350,15 @@ fn pad(call: &Call<'_>, most: usize) -> Result<Tensor> {
 
 /// Converts a choice that is known for every element.
 fn where_known(call: &Call<'_>, most: usize) -> Result<Option<Vec<Tensor>>> {
-    let (choice, x, y) = (call.input(0)?, call.input(1)?, call.input(2)?);
-    if choice.integers().is_none() {
+    let (options, x, y) = (call.input(0)?, call.input(1)?, call.input(2)?);
+    if options.integers().is_none() {
         return Ok(None);
     }
-    let shape = broadcast(&broadcast(&choice.shape, &x.shape)?, &y.shape)?;
-    let choice = expanded(choice, &shape, most)?;
+    let shape = broadcast(&broadcast(&options.shape, &x.shape)?, &y.shape)?;
+    let options = expanded(options, &shape, most)?;
     let (x, y) = (expanded(x, &shape, most)?, expanded(y, &shape, most)?);
     let n = x.len();
-    let places: Vec<usize> = choice
+    let places: Vec<usize> = options
         .integers()
         .unwrap_or_default()
         .iter()

@@ -35,7 +35,7 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, most: usize) -> Result<Opt
         "Equal" => conditions::itself(call, exprs),
         "And" | "Or" => conditions::both(call, most),
         "Not" => conditions::not(call, exprs),
-        "Where" => conditions::choice(call, exprs, most).map(Some),
+        "Where" => conditions::options(call, exprs, most).map(Some),
         _ => functions::one(call, exprs),
     }
 }

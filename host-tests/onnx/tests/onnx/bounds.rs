@@ -2,7 +2,7 @@
 
 use actq::measure::actions::actions;
 use actq_cli::report::imported::summary;
-use actq_onnx::Choice;
+use actq_onnx::ImportOptions;
 use anyhow::{Context as _, Result, ensure};
 
 use super::file::File;
@@ -22,7 +22,7 @@ fn file(shape: &[i64], text: &str) -> File {
 /// Imports the file, requires that its limits contain all actions and that actions come close to them, and returns
 /// them.
 fn limits(file: &File) -> Result<Vec<Option<[f32; 2]>>> {
-    let (imported, mut policy) = imported(&file.bytes(), &Choice::default())?;
+    let (imported, mut policy) = imported(&file.bytes(), &ImportOptions::default())?;
     let limits: Vec<Option<[f32; 2]>> = (0..policy.act_len).map(|i| policy.contract.limits(i)).collect();
     let are_clipped = imported.contract.contains(&"low");
     assert_eq!(imported.bounded, if are_clipped { 0 } else { limits.iter().flatten().count() });

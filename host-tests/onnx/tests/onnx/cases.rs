@@ -9,7 +9,7 @@
 
 use actq_cli::report::imported::summary;
 use actq_cli::report::notes;
-use actq_onnx::{Choice, Imported};
+use actq_onnx::{ImportOptions, Imported};
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::file::File;
@@ -110,14 +110,14 @@ impl Case<'_> {
 
     fn check(&self) -> Result<()> {
         let bytes = self.bytes();
-        let choice = Choice {
+        let options = ImportOptions {
             output: self.all("choose").next().map(str::to_owned),
             observed: self.all("observe").map(str::to_owned).collect(),
-            ..Choice::default()
+            ..ImportOptions::default()
         };
         ensure!(!self.expected.is_empty(), "nothing is expected");
         let is_refused = self.expected.iter().any(|(key, _)| *key == "refused");
-        let result = imported(&bytes, &choice);
+        let result = imported(&bytes, &options);
         if is_refused {
             let error = result.err().map(|error| format!("{error:#}")).context("it is imported")?;
             for (key, text) in &self.expected {

@@ -1,7 +1,7 @@
 //! Computations of constants in a file, against the same file with their results.
 
 use actq::measure::actions::actions;
-use actq_onnx::{Choice, proto};
+use actq_onnx::{ImportOptions, proto};
 use anyhow::Result;
 
 use super::file::tensor;
@@ -22,7 +22,7 @@ fn is(expected: &str, constant: &str, initializers: &[proto::Tensor]) -> Result<
         initializers.iter().for_each(|tensor| file.initializer(tensor));
         file.write(&[], &format!("actions := gemm(obs, 3, 11) + {constant}"));
         file.output("actions", &[1, 3]);
-        imported(&file.bytes(), &Choice::default())
+        imported(&file.bytes(), &ImportOptions::default())
     };
     let ((_, ours), (_, plain)) = (network(constant)?, network(expected)?);
     let observations = drawn(&ours);

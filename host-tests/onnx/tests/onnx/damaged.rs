@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use actq_onnx::{Choice, data_files, import_bytes, proto};
+use actq_onnx::{ImportOptions, data_files, import_bytes, proto};
 use anyhow::Result;
 use proptest::prelude::*;
 use tempfile::TempDir;
@@ -123,7 +123,7 @@ fn each_malformed_file_is_refused_with_its_fault() {
 
 fn read(bytes: Vec<u8>) -> Result<()> {
     let dir = TempDir::new()?;
-    Ok(import_bytes(bytes, dir.path(), "test", &Choice::default()).map(drop)?)
+    Ok(import_bytes(bytes, dir.path(), "test", &ImportOptions::default()).map(drop)?)
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Forms found in the output of PyTorch's exporters and tf2onnx (docs/records/2026-11-22-exporters.md), against tract.
 
 use actq::measure::actions::actions;
-use actq_onnx::{Choice, proto};
+use actq_onnx::{ImportOptions, proto};
 use anyhow::Result;
 use prost::Message as _;
 use prost::bytes::Bytes;
@@ -58,7 +58,7 @@ fn same_as_called(functions: Vec<Bytes>, between: impl Fn(&mut File, String, boo
     };
     let plain = network(false).encode_to_vec();
     let called = proto::Model { functions, ..network(true) }.encode_to_vec();
-    let [ours, theirs] = [called, plain].map(|bytes| imported(&bytes, &Choice::default()));
+    let [ours, theirs] = [called, plain].map(|bytes| imported(&bytes, &ImportOptions::default()));
     let (ours, theirs) = (ours?.1, theirs?.1);
     let observations = drawn(&ours);
     compare(&actions(&theirs, &observations), &actions(&ours, &observations))
@@ -126,7 +126,7 @@ fn the_same_file_gives_the_same_bytes() -> Result<()> {
     let bytes = ended(file, &x, 8);
     let first = same(&bytes)?;
     for _ in 0..8 {
-        let again = imported(&bytes, &Choice::default())?.0;
+        let again = imported(&bytes, &ImportOptions::default())?.0;
         assert_eq!(again.source.files()?, first.source.files()?);
     }
     Ok(())

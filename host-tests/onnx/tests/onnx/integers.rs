@@ -1,7 +1,7 @@
 //! Integer inputs.
 
 use actq::measure::actions::actions;
-use actq_onnx::Choice;
+use actq_onnx::ImportOptions;
 use anyhow::Result;
 
 use super::file::File;
@@ -27,9 +27,9 @@ fn denoiser(integers: bool) -> Vec<u8> {
 
 #[test]
 fn a_cast_time_step_is_a_float() -> Result<()> {
-    let (integers, policy) = imported(&denoiser(true), &Choice::default())?;
+    let (integers, policy) = imported(&denoiser(true), &ImportOptions::default())?;
     assert_eq!((integers.inputs.len(), &integers.integers[..]), (2, &["time".to_owned()][..]));
-    let (floats, _) = imported(&denoiser(false), &Choice::default())?;
+    let (floats, _) = imported(&denoiser(false), &ImportOptions::default())?;
     assert!(floats.integers.is_empty());
     let observations = drawn(&policy);
     compare(&by_tract(&denoiser(false), &floats, &observations)?, &actions(&policy, &observations))

@@ -17,7 +17,7 @@ use std::path::Path;
 
 use actq::measure::actions::actions;
 use actq::policy::Policy;
-use actq_onnx::{Choice, Imported, import_bytes, proto};
+use actq_onnx::{ImportOptions, Imported, import_bytes, proto};
 use actq_testkit::Random;
 use anyhow::{Context as _, Result, ensure};
 use prost::Message as _;
@@ -29,8 +29,8 @@ const STEPS: usize = 6;
 /// Tolerance, relative to the largest action.
 const TOLERANCE: f32 = 1e-5;
 
-fn imported(bytes: &[u8], choice: &Choice) -> Result<(Imported, Policy)> {
-    let imported = import_bytes(bytes.to_vec(), Path::new("."), "test", choice)?;
+fn imported(bytes: &[u8], options: &ImportOptions) -> Result<(Imported, Policy)> {
+    let imported = import_bytes(bytes.to_vec(), Path::new("."), "test", options)?;
     let name = Path::new("policy.json");
     let policy = imported.policy(Path::new("."), name)?;
     // The files hold the same network.
@@ -104,7 +104,7 @@ fn values(value: &TValue) -> Result<Vec<f32>> {
 
 /// Requires that the policy's actions agree with tract's.
 fn same(bytes: &[u8]) -> Result<Imported> {
-    let (imported, policy) = imported(bytes, &Choice::default())?;
+    let (imported, policy) = imported(bytes, &ImportOptions::default())?;
     let observations = drawn(&policy);
     compare(&by_tract(bytes, &imported, &observations)?, &actions(&policy, &observations))?;
     Ok(imported)
@@ -112,7 +112,7 @@ fn same(bytes: &[u8]) -> Result<Imported> {
 
 /// Requires that the import refuses the file with a message that contains these words.
 fn refused(bytes: &[u8], expected: &str) {
-    let error = format!("{:#}", imported(bytes, &Choice::default()).expect_err(expected));
+    let error = format!("{:#}", imported(bytes, &ImportOptions::default()).expect_err(expected));
     assert!(error.contains(expected), "{error} instead of {expected}");
 }
 

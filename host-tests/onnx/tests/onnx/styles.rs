@@ -2,7 +2,7 @@
 
 use actq::data::{Recording, Sizes};
 use actq_bench::shared_policies;
-use actq_onnx::{Choice, Onnx};
+use actq_onnx::{ImportOptions, Onnx};
 use anyhow::{Context as _, Result};
 use proptest::prelude::*;
 
@@ -75,7 +75,7 @@ fn published_files_are_imported() -> Result<()> {
     ] {
         let path = folder.join(name).join("model.onnx");
         let bytes = std::fs::read(&path)?;
-        let file = import(&path, &Choice::default())?;
+        let file = import(&path, &ImportOptions::default())?;
         assert_eq!(file.ops.join(" "), expected);
         let policy = Onnx.load(&path)?;
         // Uses the recording if there is one: beyond its path, sums of random values lose more digits than the
@@ -180,8 +180,8 @@ fn a_critic_never_replaces_a_drawn_action() -> Result<()> {
         let bytes = with_outputs(&names);
         refused(&bytes, "value (1 values)");
         refused(&bytes, "mean (3 values)");
-        let choice = Choice { output: Some("mean".to_owned()), ..Choice::default() };
-        assert_eq!(imported(&bytes, &choice)?.0.output, ("mean".to_owned(), 3));
+        let options = ImportOptions { output: Some("mean".to_owned()), ..ImportOptions::default() };
+        assert_eq!(imported(&bytes, &options)?.0.output, ("mean".to_owned(), 3));
     }
     Ok(())
 }

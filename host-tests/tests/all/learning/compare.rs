@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Output;
 
 use actq_bench::command::{failed, research, run, succeeded};
-use actq_research::compare::{Allowed, Cell, Contender, Results};
+use actq_research::compare::{Cell, Contender, Limit, Results};
 use anyhow::{Context as _, Result, ensure};
 
 /// Runs `cargo xtask compare` with two methods on a policy.
@@ -26,7 +26,7 @@ fn a_comparison_runs_once_and_explains_impossible_cells() -> Result<()> {
     ensure!(header.options["episodes"] == 2 && header.commits.len() == 1, "{header:?}");
     let found: Vec<_> = cells.iter().map(|cell| (cell.key.method, cell.key.budget)).collect();
     let methods = [Contender::Rtn, Contender::Distill].map(Some);
-    let [few, many] = [1.5, 3.0].map(|bits| Some(Allowed::Bits(bits)));
+    let [few, many] = [1.5, 3.0].map(|bits| Some(Limit::Bits(bits)));
     let expected = [(methods[0], many), (methods[0], few), (methods[1], many), (methods[1], few)];
     ensure!(found[0] == (None, None) && found[1..] == expected, "{found:?}");
     let success = |cell: &Cell| cell.driven.as_ref().and_then(|driven| driven["success"].as_f64());
@@ -36,7 +36,7 @@ fn a_comparison_runs_once_and_explains_impossible_cells() -> Result<()> {
     ensure!(cells[2].made.is_none() && cells[2].driven.is_none(), "{:?}", cells[2]);
     for cell in [&cells[1], &cells[3], &cells[4]] {
         let made = cell.made.as_ref().context("an image")?;
-        let is_within = matches!(cell.key.budget, Some(Allowed::Bits(bits)) if made.bpw <= bits);
+        let is_within = matches!(cell.key.budget, Some(Limit::Bits(bits)) if made.bpw <= bits);
         ensure!(made.nmse > 0.0 && is_within && success(cell).is_some(), "{cell:?}");
         ensure!(made.default_group && made.bytes_per_parameter < 1.0, "{made:?}");
         ensure!(made.milliseconds.is_some_and(|ms| (0.5..5.0).contains(&ms)), "{made:?}");

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use actq::text::count;
 use actq_jobs::job::Job;
-use actq_jobs::merged::Merged;
 use actq_jobs::record::Outcome;
+use actq_jobs::results::Merged;
 use actq_jobs::run::{self, Read};
 use actq_jobs::store::Store;
 use actq_jobs::work::{Merge, Work};
@@ -16,7 +16,7 @@ use super::host::Command;
 use super::plan;
 use crate::args::jobs::MergeArgs;
 use crate::outputs::files::Outputs;
-use crate::report::{frontiers, merged};
+use crate::report::{frontiers, sweep_table};
 use crate::terminal::{note, print, reserve};
 
 /// Prints the results of a sweep.
@@ -53,7 +53,7 @@ pub(crate) fn report_finished(jobs: &[Job], store: &Store) -> Result<()> {
     let merge = rows_of(merge_of(jobs)?)?;
     let Some(finished) = run::merge_finished(merge, &store.results(jobs))? else { return Ok(()) };
     let rows: usize = finished.policies.iter().map(|policy| policy.images.len()).sum();
-    print(&merged::report(&finished))?;
+    print(&sweep_table::report(&finished))?;
     note([format!("the table has {rows} of {}, and no success where a drive failed", count(merge.rows.len(), "row"))]);
     Ok(())
 }
@@ -75,7 +75,7 @@ pub(crate) fn refuse_inside<'a>(store: &Path, outputs: impl IntoIterator<Item = 
 /// Prints the results of a plan that are in the store, and writes the outputs: a plot, then figures as JSON.
 pub(crate) fn report(jobs: &[Job], read: Read<'_>, outputs: Outputs, svg: bool, json: bool) -> Result<()> {
     let merged = merged(jobs, read)?;
-    print(&merged::report(&merged))?;
+    print(&sweep_table::report(&merged))?;
     let svg = svg.then(|| frontiers::svg(&merged));
     let json = if json { Some(serde_json::to_string_pretty(&merged)? + "\n") } else { None };
     outputs.write(&svg.into_iter().chain(json).collect::<Vec<_>>())

@@ -24,14 +24,14 @@ pub(crate) fn clip(parts: &mut Parts, facts: &mut Facts) -> Result<()> {
 /// Adds the state last_action, which is the action or the value clipped, by the rule last_action.
 pub(crate) fn fed_back(parts: &mut Parts, len: usize, facts: &mut Facts) -> Result<()> {
     let next = if facts.is_choice("last_action", "raw")? { ACTION } else { "clipped" };
-    parts.kept("last_action", len, next);
+    parts.state("last_action", len, next);
     facts.note("last_action", facts.source("last_action"));
     Ok(())
 }
 
 /// Adds the value `NAME_and_zero`, which has one 0 after a value, for places that nothing moves.
 pub(crate) fn add_zero(parts: &mut Parts, name: &str) {
-    parts.unchanged("zero", vec![0.0]);
+    parts.constant_value("zero", vec![0.0]);
     parts.values(&format!("{name}_and_zero"), &[name, "zero"]);
 }
 

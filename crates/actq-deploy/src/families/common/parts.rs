@@ -93,7 +93,7 @@ impl Parts {
     }
 
     /// Adds a state that starts at zero, for the term of its name.
-    pub(crate) fn state(&mut self, name: &str, len: usize, next: &str) -> Vec<Op> {
+    pub(crate) fn state_term(&mut self, name: &str, len: usize, next: &str) -> Vec<Op> {
         let state = State { name: format!("{name}_state"), len, start: Numbers::default(), next: next.to_owned() };
         self.begin(name, &state.name.clone());
         self.description.states.push(state);
@@ -101,19 +101,19 @@ impl Parts {
     }
 
     /// Adds a state that starts at zero.
-    pub(crate) fn kept(&mut self, name: &str, len: usize, next: &str) {
+    pub(crate) fn state(&mut self, name: &str, len: usize, next: &str) {
         let state = State { name: name.to_owned(), len, start: Numbers::default(), next: next.to_owned() };
         self.description.states.push(state);
     }
 
     /// Adds a state that starts at given numbers.
-    pub(crate) fn kept_from(&mut self, name: &str, len: usize, start: Numbers, next: &str) {
+    pub(crate) fn state_from(&mut self, name: &str, len: usize, start: Numbers, next: &str) {
         let state = State { name: name.to_owned(), len, start, next: next.to_owned() };
         self.description.states.push(state);
     }
 
     /// Adds numbers as a value: a state that stays as it starts.
-    pub(crate) fn unchanged(&mut self, name: &str, numbers: Vec<f64>) {
+    pub(crate) fn constant_value(&mut self, name: &str, numbers: Vec<f64>) {
         let (len, start) = (numbers.len(), Numbers::Each(numbers));
         self.description.states.push(State { name: name.to_owned(), len, start, next: name.to_owned() });
     }

@@ -4,7 +4,7 @@ use actq::error::{Result, bail};
 use actq::graph::{Graph, NodeKind};
 use actq::text::printable;
 
-use super::model::Given;
+use super::model::Sourced;
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::families::common::count;
@@ -14,7 +14,7 @@ use crate::yaml::Node;
 #[derive(Debug, Default)]
 pub(super) struct Agent {
     /// Limit of the action, which the learner's wrapper of the environment applies.
-    pub(super) clip: Option<Given>,
+    pub(super) clip: Option<Sourced>,
     /// Group of observations that the policy reads, with its file and key.
     pub(super) group: Option<(String, String)>,
 }
@@ -66,7 +66,7 @@ impl Agent {
     pub(super) fn of(yaml: &Document) -> Result<Self> {
         let limit = |node: &Node| node.number().filter(|limit| *limit > 0.0);
         let limit = yaml.optional("clip_actions", "a number above 0, or null", limit)?;
-        let clip = limit.map(|limit| Given { numbers: vec![limit], from: yaml.location("clip_actions") });
+        let clip = limit.map(|limit| Sourced { numbers: vec![limit], from: yaml.location("clip_actions") });
         // The network has another name in later versions.
         let path = ["obs_groups.actor", "obs_groups.policy"].into_iter().find(|path| yaml.peek(path).is_some());
         let group = match path.map(|path| Ok::<_, actq::error::Error>((path, yaml.texts(path)?))).transpose()? {

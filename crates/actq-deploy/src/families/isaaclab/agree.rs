@@ -2,7 +2,7 @@
 
 use actq::error::Result;
 
-use super::model::{Action, Given, Policy, Term, What};
+use super::model::{Action, Policy, Sourced, Term, TermSource};
 use crate::document::Document;
 use crate::facts::Facts;
 use crate::families::common::{names, numbers};
@@ -46,7 +46,7 @@ pub(super) fn with_descriptors(environment: &mut Policy, descriptors: &Policy) -
         let other = described.next_if(|other| other.function == term.function);
         let Some(other) = other else {
             // The exporter leaves out functions without a descriptor; all that this reader knows have one.
-            if !matches!(term.what, What::Unknown(..)) {
+            if !matches!(term.what, TermSource::Unknown(..)) {
                 let next = described.peek().map_or("no further term", |other| other.function.as_str());
                 return Err(Facts::contradiction(
                     "terms of the observation",
@@ -57,7 +57,7 @@ pub(super) fn with_descriptors(environment: &mut Policy, descriptors: &Policy) -
             continue;
         };
         of_term(term, other, total)?;
-        if let What::Unknown(_, len) = &mut term.what {
+        if let TermSource::Unknown(_, len) = &mut term.what {
             *len = other.len(total);
         }
         last.clone_from(&term.name);
@@ -75,7 +75,7 @@ pub(super) fn with_descriptors(environment: &mut Policy, descriptors: &Policy) -
 fn of_term(own: &Term, other: &Term, actions: usize) -> Result<()> {
     let lens = (own.len(actions), other.len(actions));
     let len = lens.0.or(lens.1).unwrap_or(1);
-    let of = |term: &Term, numbers: Vec<f64>| Given { numbers, from: term.from.clone() };
+    let of = |term: &Term, numbers: Vec<f64>| Sourced { numbers, from: term.from.clone() };
     let pairs: [(&str, OfTerm); 5] = [
         ("number of joints", |term, _| vec![term.joints.len() as f64]),
         ("joints", |term, _| term.joints.iter().map(|place| *place as f64).collect()),
@@ -103,7 +103,7 @@ fn of_actions(own: &[Action], others: &[Action]) -> Result<()> {
         ));
     }
     for (own, other) in own.iter().zip(others) {
-        let of = |action: &Action, numbers: &[f64]| Given { numbers: numbers.to_vec(), from: action.from.clone() };
+        let of = |action: &Action, numbers: &[f64]| Sourced { numbers: numbers.to_vec(), from: action.from.clone() };
         let places = |action: &Action| action.joints.iter().map(|place| *place as f64).collect::<Vec<_>>();
         let name = &own.name;
         same(&format!("joints of {name:?}"), &of(own, &places(own)), &of(other, &places(other)), 0.0)?;
@@ -121,8 +121,8 @@ fn of_actions(own: &[Action], others: &[Action]) -> Result<()> {
 /// Checks a policy by the metadata that some exporters store in the ONNX file. `named` is set if the terms have the
 /// names of an environment.
 pub(super) fn with_metadata(policy: &Policy, meta: &Document, named: bool) -> Result<()> {
-    let list = |key: &str| -> Result<Option<Given>> {
-        Ok(numbers(meta, key)?.map(|numbers| Given { numbers, from: meta.location(key) }))
+    let list = |key: &str| -> Result<Option<Sourced>> {
+        Ok(numbers(meta, key)?.map(|numbers| Sourced { numbers, from: meta.location(key) }))
     };
     let mut pairs = vec![("default positions", Some(policy.default.clone()), list("default_joint_pos")?)];
     if let Some([stiffness, damping]) = &policy.gains {
@@ -130,8 +130,8 @@ pub(super) fn with_metadata(policy: &Policy, meta: &Document, named: bool) -> Re
         pairs.push(("damping", Some(damping.clone()), list("joint_damping")?));
     }
     if let ([action], Some(scale)) = (&policy.actions[..], list("action_scale")?) {
-        let scale = Given { numbers: spread(&scale.numbers, action.scale.len()), ..scale };
-        let own = Given { numbers: action.scale.clone(), from: action.from.clone() };
+        let scale = Sourced { numbers: spread(&scale.numbers, action.scale.len()), ..scale };
+        let own = Sourced { numbers: action.scale.clone(), from: action.from.clone() };
         pairs.push(("scale of the action", Some(own), Some(scale)));
     }
     for (what, own, other) in pairs {
@@ -171,7 +171,7 @@ fn limits(of: &str, own: (&str, &[[f64; 2]]), other: (&str, &[[f64; 2]])) -> Res
 }
 
 /// Refuses lists whose lengths differ, or whose numbers differ by more than `most`, relative to 1 and their size.
-fn same(what: &str, own: &Given, other: &Given, most: f64) -> Result<()> {
+fn same(what: &str, own: &Sourced, other: &Sourced, most: f64) -> Result<()> {
     let lens = (own.numbers.len(), other.numbers.len());
     if lens.0 != lens.1 {
         let shown = |len: usize| format!("{len} values");

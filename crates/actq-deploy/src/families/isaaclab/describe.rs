@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use actq::error::{Result, ensure};
 
-use super::model::{Action, Given, Kind, Layout, Policy, Term, What, parts_of};
+use super::model::{Action, Kind, Layout, Policy, Sourced, Term, TermSource, parts_of};
 use crate::description::{Description, Gains, Network, Op, Operand, Order, TargetKind};
 use crate::facts::Facts;
 use crate::families::common::{ACTION, Graph, Histories, Parts, given_gravity};
@@ -21,7 +21,7 @@ pub(super) struct Builder<'a> {
     pub(super) policy: &'a Policy,
     pub(super) graph: &'a Graph,
     /// Limit of the action, which the training's wrapper of the environment applies.
-    pub(super) clip: Option<Given>,
+    pub(super) clip: Option<Sourced>,
     /// Name of the action that is fed back and becomes targets.
     pub(super) action: &'static str,
     pub(super) facts: &'a mut Facts,
@@ -78,7 +78,7 @@ impl Builder<'_> {
             added.push(("joint_pos", "rad"));
         }
         for term in terms {
-            if let What::Joints(input, unit) = term.what
+            if let TermSource::Joints(input, unit) = term.what
                 && !added.contains(&(input, unit))
             {
                 added.push((input, unit));
@@ -195,8 +195,9 @@ impl Builder<'_> {
 
     /// Returns `true` if lengths depend on open questions.
     fn is_open(&self) -> bool {
-        let unknown =
-            |term: &Term| matches!(term.what, What::Unknown(..)) && self.facts.is_open(&format!("raw.{}", term.name));
+        let unknown = |term: &Term| {
+            matches!(term.what, TermSource::Unknown(..)) && self.facts.is_open(&format!("raw.{}", term.name))
+        };
         self.policy.joints.open || self.policy.terms.iter().any(unknown)
     }
 
@@ -207,7 +208,7 @@ impl Builder<'_> {
         let rest = self.graph.input_len.saturating_sub(known);
         let mut lens = Vec::new();
         for term in terms {
-            let What::Unknown(why, given) = &term.what else {
+            let TermSource::Unknown(why, given) = &term.what else {
                 lens.push(term.len(total).unwrap_or(1));
                 continue;
             };
@@ -241,9 +242,9 @@ impl Builder<'_> {
         let name =
             if RESERVED.contains(&term.name.as_str()) { format!("{}_term", term.name) } else { term.name.clone() };
         let ops = match &term.what {
-            What::Raw(input, len, unit) => parts.input_as(&name, input, *len, unit),
-            What::Unknown(..) => parts.input_as(&name, &name, len, ""),
-            What::Command(input, len, ranges) => {
+            TermSource::Raw(input, len, unit) => parts.input_as(&name, input, *len, unit),
+            TermSource::Unknown(..) => parts.input_as(&name, &name, len, ""),
+            TermSource::Command(input, len, ranges) => {
                 let unit = if *len == 3 { "m/s, m/s, rad/s" } else { "" };
                 let mut ops = parts.input_as(&name, input, *len, unit);
                 if let Some(ranges) = ranges {
@@ -254,19 +255,19 @@ impl Builder<'_> {
                 }
                 ops
             }
-            What::Quaternion(input) => {
+            TermSource::Quaternion(input) => {
                 let order: Option<String> = self.facts.value("quaternion")?;
                 let unit = if order.as_deref() == Some("wxyz") { "w, x, y, z" } else { "x, y, z, w" };
                 also(self.facts, "quaternion");
                 parts.input_as(&name, input, 4, unit)
             }
-            What::Gravity => {
+            TermSource::Gravity => {
                 let (input, len, ops) = given_gravity(self.facts, "gravity", "vector", "orientation")?;
                 parts.input_as(&name, input, len, "");
                 also(self.facts, "gravity");
                 ops
             }
-            What::Joints(input, _) => {
+            TermSource::Joints(input, _) => {
                 parts.begin(&name, input);
                 let mut ops = self.select(&term.joints);
                 if term.offset.iter().any(|offset| *offset != 0.0) {
@@ -276,11 +277,11 @@ impl Builder<'_> {
                 }
                 ops
             }
-            What::LastAction(places) => {
+            TermSource::LastAction(places) => {
                 let is_processed = self.facts.is_choice("last_action", "processed")?;
                 also(self.facts, "last_action");
                 let next = if is_processed { "processed" } else { self.action };
-                let ops = parts.state(&name, total, next);
+                let ops = parts.state_term(&name, total, next);
                 let select = places.iter().map(|places| Op::Select(Order::Places(places.clone())));
                 ops.into_iter().chain(select).collect()
             }
@@ -348,7 +349,7 @@ impl Builder<'_> {
     /// Limits a target of positions to the joints' ranges, by the rule.
     fn limit(&mut self, parts: &mut Parts, action: &Action, kind: TargetKind) -> Result<()> {
         let Some(ranges) = &self.policy.limits else { return Ok(()) };
-        let of = |given: &Given| action.joints.iter().map(|place| given.numbers[*place]).collect();
+        let of = |given: &Sourced| action.joints.iter().map(|place| given.numbers[*place]).collect();
         let limits = ranges.each_ref().map(of);
         if kind == TargetKind::Position && self.facts.is_choice("target.limits", "range")? {
             parts.limit(limits);

@@ -3,7 +3,7 @@
 use actq::error::{Result, ensure};
 use actq::text::printable;
 
-use super::model::{Action, Given, Kind, Layout, Policy, Term, What, known, observation, plain};
+use super::model::{Action, Kind, Layout, Policy, Sourced, Term, TermSource, known, observation, plain};
 use super::patterns::{Joints, MAX_COUNT};
 use super::values::{bounds, history, no_delay, numbers};
 use crate::document::Document;
@@ -45,7 +45,7 @@ pub(super) fn read(yaml: &Document, asset: &str, group: &str, joints: Joints) ->
             numbers.len(),
             joints.len()
         );
-        Ok(Given { numbers, from: yaml.location(&path) })
+        Ok(Sourced { numbers, from: yaml.location(&path) })
     };
     let (default, default_velocity) = (of_joints("default_joint_pos")?, of_joints("default_joint_vel")?);
     let limits = limits(yaml, &format!("articulations.{asset}.default_joint_pos_limits"), joints.len())?;
@@ -63,15 +63,15 @@ pub(super) fn read(yaml: &Document, asset: &str, group: &str, joints: Joints) ->
 }
 
 /// Reads the lowest and highest positions of all joints.
-fn limits(yaml: &Document, path: &str, joints: usize) -> Result<Option<[Given; 2]>> {
+fn limits(yaml: &Document, path: &str, joints: usize) -> Result<Option<[Sourced; 2]>> {
     let pairs = |node: &Node| node.items().iter().map(bounds).collect::<Option<Vec<_>>>();
     let Some(pairs) = yaml.optional(path, "pairs of numbers", pairs)? else { return Ok(None) };
     ensure!(pairs.len() == joints, "{} has {} pairs, but joint_names {joints}", yaml.location(path), pairs.len());
-    let of = |i: usize| Given { numbers: pairs.iter().map(|pair| pair[i]).collect(), from: yaml.location(path) };
+    let of = |i: usize| Sourced { numbers: pairs.iter().map(|pair| pair[i]).collect(), from: yaml.location(path) };
     Ok(Some([of(0), of(1)]))
 }
 
-fn rate(yaml: &Document) -> Result<Given> {
+fn rate(yaml: &Document) -> Result<Sourced> {
     let (dt, step, decimation) =
         (yaml.number("scene.dt")?, yaml.number("scene.physics_dt")?, yaml.number("scene.decimation")?);
     ensure!((1e-6..1e6).contains(&dt), "{} = {dt}: give the seconds of a tick", yaml.location("scene.dt"));
@@ -82,7 +82,7 @@ fn rate(yaml: &Document) -> Result<Given> {
             (&yaml.location("scene.physics_dt"), &format!("{step} s, {decimation} times")),
         ));
     }
-    Ok(Given { numbers: vec![1.0 / dt], from: yaml.location("scene.dt") })
+    Ok(Sourced { numbers: vec![1.0 / dt], from: yaml.location("scene.dt") })
 }
 
 /// Reads one number for all values or one for each; `otherwise` if it is not there.
@@ -167,13 +167,13 @@ fn term(yaml: &Document, path: &str, joints: &Joints, total: usize, before: &[Te
     let (what, relative) = match content(name, &function, len, total) {
         _ if has_modifiers(yaml, path) => {
             let why = format!("term {name:?} has modifiers, which this reader does not know");
-            (What::Unknown(why, Some(len)), false)
+            (TermSource::Unknown(why, Some(len)), false)
         }
         Ok(known) => known,
-        Err(why) => (What::Unknown(why, Some(len)), false),
+        Err(why) => (TermSource::Unknown(why, Some(len)), false),
     };
     let (places, offset) = match what {
-        What::Joints(input, _) => observed_joints(yaml, path, joints, relative.then_some(input))?,
+        TermSource::Joints(input, _) => observed_joints(yaml, path, joints, relative.then_some(input))?,
         _ => (Vec::new(), Vec::new()),
     };
     // Names are those of functions, which several terms may share.
@@ -181,7 +181,7 @@ fn term(yaml: &Document, path: &str, joints: &Joints, total: usize, before: &[Te
     let name = if same == 0 { name.to_owned() } else { format!("{name}_{}", same + 1) };
     let term = Term {
         what: match what {
-            What::Command(_, len, ranges) => What::Command(name.clone(), len, ranges),
+            TermSource::Command(_, len, ranges) => TermSource::Command(name.clone(), len, ranges),
             other => other,
         },
         name,
@@ -203,10 +203,10 @@ fn term(yaml: &Document, path: &str, joints: &Joints, total: usize, before: &[Te
 /// # Errors
 ///
 /// The reason why only the application can compute it.
-fn content(name: &str, function: &str, len: usize, total: usize) -> Result<(What, bool), String> {
+fn content(name: &str, function: &str, len: usize, total: usize) -> Result<(TermSource, bool), String> {
     match observation(function) {
-        Some("generated_commands") => Ok((What::Command(name.to_owned(), len, None), false)),
-        Some("last_action") if len == total => Ok((What::LastAction(None), false)),
+        Some("generated_commands") => Ok((TermSource::Command(name.to_owned(), len, None), false)),
+        Some("last_action") if len == total => Ok((TermSource::LastAction(None), false)),
         Some("last_action") => Err(format!("term {name:?} is a part of the last action, and only env.yaml says which")),
         _ => known(function).ok_or_else(|| {
             format!("the function of term {name:?}, {}, is not known to this reader", printable(function))

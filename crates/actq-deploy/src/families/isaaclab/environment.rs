@@ -3,7 +3,9 @@
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 
-use super::model::{Action, Given, Kind, Layout, MODULES, Policy, Term, What, known, observation, parts_of, plain};
+use super::model::{
+    Action, Kind, Layout, MODULES, Policy, Sourced, Term, TermSource, known, observation, parts_of, plain,
+};
 use super::patterns::{Joints, MAX_COUNT};
 use super::values::{bounds, history, no_delay, numbers};
 use crate::document::Document;
@@ -58,7 +60,7 @@ impl Environment<'_> {
         );
         let pose = |key: &str, facts: &mut Facts| {
             let path = robot(&format!("init_state.{key}"));
-            Ok::<_, actq::error::Error>(Given {
+            Ok::<_, actq::error::Error>(Sourced {
                 numbers: self
                     .by_joint(&path, &self.joints, 0.0, facts)?
                     .unwrap_or_else(|| vec![0.0; self.joints.len()]),
@@ -71,7 +73,7 @@ impl Environment<'_> {
         yaml.node(&format!("scene.{}", self.asset));
         let actions = self.actions(&default, &default_velocity, facts)?;
         let (terms, layout) = self.terms(&actions, &default, &default_velocity)?;
-        let rate = Given {
+        let rate = Sourced {
             numbers: vec![1.0 / (dt * decimation)],
             from: format!("{}; {}", yaml.location("sim.dt"), yaml.location("decimation")),
         };
@@ -110,9 +112,9 @@ impl Environment<'_> {
     }
 
     /// Reads the gains of all actuators; nothing if the USD file has some of them.
-    fn gains(&self, path: &str, facts: &mut Facts) -> Result<Option<[Given; 2]>> {
+    fn gains(&self, path: &str, facts: &mut Facts) -> Result<Option<[Sourced; 2]>> {
         let yaml = self.yaml;
-        let mut gains = ["stiffness", "damping"].map(|key| Given {
+        let mut gains = ["stiffness", "damping"].map(|key| Sourced {
             numbers: vec![0.0; self.joints.len()],
             from: yaml.location(&format!("{path}.*.{key}")),
         });
@@ -147,7 +149,7 @@ impl Environment<'_> {
         Ok(is_complete.then_some(gains))
     }
 
-    fn actions(&self, default: &Given, default_velocity: &Given, facts: &mut Facts) -> Result<Vec<Action>> {
+    fn actions(&self, default: &Sourced, default_velocity: &Sourced, facts: &mut Facts) -> Result<Vec<Action>> {
         let yaml = self.yaml;
         let mut actions = Vec::new();
         for name in yaml.keys("actions") {
@@ -176,7 +178,7 @@ impl Environment<'_> {
             let scale = self.by_joint(&of("scale"), &joints, 1.0, facts)?.unwrap_or_else(|| vec![1.0; joints.len()]);
             let own = self.by_joint(&of("offset"), &joints, 0.0, facts)?.unwrap_or_else(|| vec![0.0; joints.len()]);
             let needs = |key: &str| yaml.required(&of(key), "true or false", Node::truth);
-            let of_default = |all: &Given| places.iter().map(|place| all.numbers[*place]).collect();
+            let of_default = |all: &Sourced| places.iter().map(|place| all.numbers[*place]).collect();
             let offset = match kind {
                 Kind::Position if needs("use_default_offset")? => of_default(default),
                 Kind::Velocity if needs("use_default_offset")? => of_default(default_velocity),
@@ -228,8 +230,8 @@ impl Environment<'_> {
     fn terms(
         &self,
         actions: &[Action],
-        default: &Given,
-        default_velocity: &Given,
+        default: &Sourced,
+        default_velocity: &Sourced,
     ) -> Result<(Vec<Term>, Option<Layout>)> {
         let (yaml, group) = (self.yaml, format!("observations.{}", self.group));
         let in_group = |key: &str| format!("{group}.{key}");
@@ -268,19 +270,21 @@ impl Environment<'_> {
     }
 
     /// Reads a term without its history. `defaults` are the positions and velocities of all joints.
-    fn term(&self, name: &str, path: &str, actions: &[Action], defaults: [&Given; 2]) -> Result<Term> {
+    fn term(&self, name: &str, path: &str, actions: &[Action], defaults: [&Sourced; 2]) -> Result<Term> {
         let yaml = self.yaml;
         let of = |key: &str| format!("{path}.{key}");
         plain(name, &yaml.location(path))?;
         let function = yaml.required(&of("func"), "a function", Node::text)?.replace(':', ".");
         let (what, relative) = self.what(name, &function, path, actions)?;
         let joints =
-            if matches!(what, What::Joints(..)) { self.observed(&of("params.asset_cfg"))? } else { Vec::new() };
+            if matches!(what, TermSource::Joints(..)) { self.observed(&of("params.asset_cfg"))? } else { Vec::new() };
         yaml.node(&of("params"));
         let [default, default_velocity] = defaults;
         let offset = match what {
-            What::Joints("joint_pos", _) if relative => joints.iter().map(|place| default.numbers[*place]).collect(),
-            What::Joints(..) if relative => joints.iter().map(|place| default_velocity.numbers[*place]).collect(),
+            TermSource::Joints("joint_pos", _) if relative => {
+                joints.iter().map(|place| default.numbers[*place]).collect()
+            }
+            TermSource::Joints(..) if relative => joints.iter().map(|place| default_velocity.numbers[*place]).collect(),
             _ => Vec::new(),
         };
         Ok(Term {
@@ -297,9 +301,9 @@ impl Environment<'_> {
     }
 
     /// Returns a term's content, and `true` if a default is subtracted from it.
-    fn what(&self, name: &str, function: &str, path: &str, actions: &[Action]) -> Result<(What, bool)> {
+    fn what(&self, name: &str, function: &str, path: &str, actions: &[Action]) -> Result<(TermSource, bool)> {
         let yaml = self.yaml;
-        let unknown = |why: String| Ok((What::Unknown(why, None), false));
+        let unknown = |why: String| Ok((TermSource::Unknown(why, None), false));
         let modifiers = yaml.node(&format!("{path}.modifiers"));
         if modifiers.is_some_and(|node| !node.items().is_empty() || !node.entries().is_empty()) {
             return unknown(format!("term {name:?} has modifiers, which this reader does not know"));
@@ -317,12 +321,12 @@ impl Environment<'_> {
         let asset = text("asset_cfg.name")?.unwrap_or(self.asset);
         match observation(function) {
             Some("last_action") => {
-                let Some(of) = text("action_name")? else { return Ok((What::LastAction(None), false)) };
+                let Some(of) = text("action_name")? else { return Ok((TermSource::LastAction(None), false)) };
                 let part = actions.iter().position(|action| action.name == of);
                 let part = part.with_context(|| {
                     format!("{}.params.action_name = {:?}: there is no such action", yaml.location(path), printable(of))
                 })?;
-                Ok((What::LastAction(parts_of(actions).into_iter().nth(part)), false))
+                Ok((TermSource::LastAction(parts_of(actions).into_iter().nth(part)), false))
             }
             Some("generated_commands") => match text("command_name")? {
                 Some(command) => self.command(command, name),
@@ -346,7 +350,7 @@ impl Environment<'_> {
     }
 
     /// Returns a velocity command with its ranges; any other command is unknown.
-    fn command(&self, command: &str, term: &str) -> Result<(What, bool)> {
+    fn command(&self, command: &str, term: &str) -> Result<(TermSource, bool)> {
         let yaml = self.yaml;
         let class =
             yaml.optional(&format!("commands.{command}.class_type"), "a class", Node::text)?.unwrap_or_default();
@@ -357,12 +361,12 @@ impl Environment<'_> {
         });
         if !is_velocity {
             let why = format!("command {:?} of term {term:?} is not one of Isaac Lab's velocities", printable(command));
-            return Ok((What::Unknown(why, None), false));
+            return Ok((TermSource::Unknown(why, None), false));
         }
         plain(command, &yaml.location("commands"))?;
         let range = |axis: &str| yaml.optional(&format!("commands.{command}.ranges.{axis}"), "two numbers", bounds);
         let ranges = [range("lin_vel_x")?, range("lin_vel_y")?, range("ang_vel_z")?];
-        Ok((What::Command(command.to_owned(), 3, ranges.into_iter().collect()), false))
+        Ok((TermSource::Command(command.to_owned(), 3, ranges.into_iter().collect()), false))
     }
 
     /// Returns the places of the joints that a term observes.

@@ -10,18 +10,18 @@ pub(super) const MODULES: [&str; 2] = ["isaaclab.envs.mdp.", "omni.isaac.lab.env
 /// A policy with what surrounds it.
 #[derive(Debug)]
 pub(super) struct Policy {
-    pub(super) rate: Given,
+    pub(super) rate: Sourced,
     /// Steps of the simulation in a tick.
     pub(super) decimation: f64,
     /// All joints of the robot, in the simulation's order.
     pub(super) joints: Joints,
     /// Default positions and velocities of all joints.
-    pub(super) default: Given,
-    pub(super) default_velocity: Given,
+    pub(super) default: Sourced,
+    pub(super) default_velocity: Sourced,
     /// Lowest and highest positions of all joints, if they are given.
-    pub(super) limits: Option<[Given; 2]>,
+    pub(super) limits: Option<[Sourced; 2]>,
     /// Stiffness and damping of all joints, unless only the robot's USD file has them.
-    pub(super) gains: Option<[Given; 2]>,
+    pub(super) gains: Option<[Sourced; 2]>,
     pub(super) terms: Vec<Term>,
     /// Layout of the terms' histories, if it is given.
     pub(super) layout: Option<Layout>,
@@ -41,7 +41,7 @@ pub(super) enum Layout {
 
 /// Numbers and where they are.
 #[derive(Clone, Debug)]
-pub(super) struct Given {
+pub(super) struct Sourced {
     pub(super) numbers: Vec<f64>,
     pub(super) from: String,
 }
@@ -52,7 +52,7 @@ pub(super) struct Term {
     pub(super) name: String,
     /// Module and name of its function, with a point between them.
     pub(super) function: String,
-    pub(super) what: What,
+    pub(super) what: TermSource,
     /// Places of its joints, if it is of joints.
     pub(super) joints: Vec<usize>,
     /// Offsets that are subtracted from the joints' values; empty for none.
@@ -67,7 +67,7 @@ pub(super) struct Term {
 
 /// Content of a term.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum What {
+pub(super) enum TermSource {
     /// A raw input of this name, length and unit.
     Raw(String, usize, &'static str),
     /// A command: a raw input of this name and length, and the ranges of its values, if they are given.
@@ -88,12 +88,12 @@ impl Term {
     /// Returns the number of its values in a frame, if it is known.
     pub(super) fn len(&self, actions: usize) -> Option<usize> {
         match &self.what {
-            What::Raw(_, len, _) | What::Command(_, len, _) => Some(*len),
-            What::Quaternion(_) => Some(4),
-            What::Gravity => Some(3),
-            What::Joints(..) => Some(self.joints.len()),
-            What::LastAction(places) => Some(places.as_ref().map_or(actions, Vec::len)),
-            What::Unknown(_, len) => *len,
+            TermSource::Raw(_, len, _) | TermSource::Command(_, len, _) => Some(*len),
+            TermSource::Quaternion(_) => Some(4),
+            TermSource::Gravity => Some(3),
+            TermSource::Joints(..) => Some(self.joints.len()),
+            TermSource::LastAction(places) => Some(places.as_ref().map_or(actions, Vec::len)),
+            TermSource::Unknown(_, len) => *len,
         }
     }
 }
@@ -105,8 +105,8 @@ pub(super) fn observation(function: &str) -> Option<&str> {
 
 /// Returns what a function of Isaac Lab's observations gives without parameters of its own, and whether a default is
 /// subtracted from it.
-pub(super) fn known(function: &str) -> Option<(What, bool)> {
-    let raw = |name: &str, len, unit| (What::Raw(name.to_owned(), len, unit), false);
+pub(super) fn known(function: &str) -> Option<(TermSource, bool)> {
+    let raw = |name: &str, len, unit| (TermSource::Raw(name.to_owned(), len, unit), false);
     Some(match observation(function)? {
         "base_pos_z" => raw("base_pos_z", 1, "m"),
         name @ ("base_lin_vel" | "root_lin_vel_w") => raw(name, 3, "m/s"),
@@ -114,13 +114,15 @@ pub(super) fn known(function: &str) -> Option<(What, bool)> {
         "root_pos_w" => raw("root_pos_w", 3, "m"),
         "imu_lin_acc" => raw("imu_lin_acc", 3, "m/s^2"),
         name @ ("imu_projected_gravity" | "pva_projected_gravity") => raw(name, 3, ""),
-        name @ ("root_quat_w" | "imu_orientation" | "pva_orientation") => (What::Quaternion(name.to_owned()), false),
-        "projected_gravity" => (What::Gravity, false),
-        "joint_pos" => (What::Joints("joint_pos", "rad"), false),
-        "joint_pos_rel" => (What::Joints("joint_pos", "rad"), true),
-        "joint_vel" => (What::Joints("joint_vel", "rad/s"), false),
-        "joint_vel_rel" => (What::Joints("joint_vel", "rad/s"), true),
-        "joint_effort" => (What::Joints("joint_effort", "N m"), false),
+        name @ ("root_quat_w" | "imu_orientation" | "pva_orientation") => {
+            (TermSource::Quaternion(name.to_owned()), false)
+        }
+        "projected_gravity" => (TermSource::Gravity, false),
+        "joint_pos" => (TermSource::Joints("joint_pos", "rad"), false),
+        "joint_pos_rel" => (TermSource::Joints("joint_pos", "rad"), true),
+        "joint_vel" => (TermSource::Joints("joint_vel", "rad/s"), false),
+        "joint_vel_rel" => (TermSource::Joints("joint_vel", "rad/s"), true),
+        "joint_effort" => (TermSource::Joints("joint_effort", "N m"), false),
         _ => return None,
     })
 }

@@ -172,7 +172,7 @@ fn state(
         network.states.insert(input.to_owned(), output.to_owned());
     } else {
         let name = base(input).replace('.', "_");
-        parts.kept_from(&name, len, Numbers::All(start), &format!("policy.{output}"));
+        parts.state_from(&name, len, Numbers::All(start), &format!("policy.{output}"));
         network.inputs.insert(input.to_owned(), name);
     }
     Ok(())

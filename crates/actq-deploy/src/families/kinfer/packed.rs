@@ -83,7 +83,7 @@ pub(super) fn read(bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Re
                 ensure!(carried == len, "{file}: the carry has {len} values, and its next value {carried}");
                 let start = initial(bundle, &found.others[0], *len)?;
                 facts.note(input, format!("{}; output {:?}", found.others[0], printable(next)));
-                parts.kept_from(input, *len, Numbers::Each(start), &format!("policy.{next}"));
+                parts.state_from(input, *len, Numbers::Each(start), &format!("policy.{next}"));
             }
         }
         network.inputs.insert(input.clone(), input.clone());

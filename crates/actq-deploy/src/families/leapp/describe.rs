@@ -187,13 +187,13 @@ impl Builder<'_> {
                     self.facts.note(&name, format!("{at}; {also}"));
                     let is_one = start.iter().all(|number| *number == start[0]);
                     let start = if is_one { Numbers::All(start[0]) } else { Numbers::Each(start) };
-                    self.parts.kept_from(&name, port.len, start, &self.value(from));
+                    self.parts.state_from(&name, port.len, start, &self.value(from));
                     name
                 }
             };
             inputs.insert(port.graph.clone(), value);
         }
-        for (input, output) in network.kept() {
+        for (input, output) in network.states() {
             self.check_cell(i, input, output)?;
         }
         let (name, file) = (self.networks[i].clone(), model.file.clone());

@@ -48,7 +48,7 @@ impl Robot {
         };
         let (observed, source) = observed_joints(meta, ros, &raw, &listed, facts)?;
         let moved = moved_joints(&observed, &source, graph, facts)?;
-        let given = Given { meta, ros, raw: &raw, moved: &moved, listed: &listed };
+        let given = JointNumbers { meta, ros, raw: &raw, moved: &moved, listed: &listed };
         let (default, default_source) =
             agreed(given.pair("default_joint_pos", "walkready_state", false)?, "default_pose", &observed, facts)?
                 .with_context(|| format!("{} is missing", meta.location("default_joint_pos")))?;
@@ -200,7 +200,7 @@ fn sent_joints(ros: Option<&Ros<'_>>, moved: &[String]) -> Result<Vec<String>> {
 }
 
 /// The files that give numbers of joints, and the joints that their lists are of.
-struct Given<'a> {
+struct JointNumbers<'a> {
     meta: &'a Document,
     ros: Option<&'a Ros<'a>>,
     raw: &'a [String],
@@ -209,7 +209,7 @@ struct Given<'a> {
     listed: &'a [String],
 }
 
-impl Given<'_> {
+impl JointNumbers<'_> {
     /// Returns numbers by joint of the metadata, and of the YAML file. With `one`, a single number is that of all
     /// joints.
     fn pair(&self, own: &str, yaml: &str, one: bool) -> Result<(Option<ByJoint>, Option<ByJoint>)> {

@@ -188,7 +188,7 @@ impl Builder<'_> {
             }
             Term::Action => {
                 let is_processed = self.facts.is_choice("last_action", "processed")?;
-                let ops = self.parts.state(name, len, if is_processed { "processed" } else { ACTION });
+                let ops = self.parts.state_term(name, len, if is_processed { "processed" } else { ACTION });
                 (ops, by_rule(self.facts, "last_action"))
             }
             Term::Unknown => (self.parts.input(name, len, ""), listed),

@@ -77,7 +77,7 @@ impl Terms<'_, '_> {
                 if self.facts.is_choice("lin_vel", "input")? {
                     self.parts.input(name, 3, "m/s");
                 } else {
-                    self.parts.unchanged("no_lin_vel", vec![0.0; 3]);
+                    self.parts.constant_value("no_lin_vel", vec![0.0; 3]);
                     self.parts.begin(name, "no_lin_vel");
                 }
                 term.source = format!("{}; {}", term.source, self.facts.source("lin_vel"));
@@ -116,7 +116,7 @@ impl Terms<'_, '_> {
             "dof_vel" => scaled("dof_vel_scale", n, self.joints.input(self.parts, name, "rad/s")),
             "actions" => {
                 let is_raw = self.facts.is_choice("last_action", "raw")?;
-                let ops = self.parts.state(name, n, if is_raw { "policy.ACTION" } else { self.action });
+                let ops = self.parts.state_term(name, n, if is_raw { "policy.ACTION" } else { self.action });
                 Ok(Term { len: Some(n), ops, source: self.facts.source("last_action") })
             }
             // One turn of the clock is one of the slowest sine, and four of the fastest.

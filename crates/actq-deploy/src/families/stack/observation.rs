@@ -7,7 +7,7 @@ use actq_onnx::Signature;
 
 use super::super::common::{ACTION, Histories, count, counts, given_gravity};
 use super::Reader;
-use super::schema::{Observation, Schema, Source, Term, Terms, What};
+use super::schema::{Observation, Schema, Source, Term, TermSource, Terms};
 use crate::description::{Clock, Fill, First, Op, Operand, Order, Standing, When};
 use crate::document::fits;
 use crate::facts::Facts;
@@ -214,12 +214,12 @@ impl Reader<'_> {
         let len = kind.len + kind.per_joint * self.robot.len;
         let mut ops = Vec::new();
         let (from, len) = match kind.is {
-            What::Raw => {
+            TermSource::Raw => {
                 self.parts.raw(&input, len, &kind.unit);
                 ops.extend(self.clamp(kind)?);
                 (input, len)
             }
-            What::Gravity => {
+            TermSource::Gravity => {
                 let rule = kind.rule.as_deref().unwrap_or("gravity");
                 let (name, len, made) = given_gravity(self.values.facts, rule, "vector", &input)?;
                 self.parts.raw(name, len, "");
@@ -227,7 +227,7 @@ impl Reader<'_> {
                 ops.extend(made);
                 (name.to_owned(), 3)
             }
-            What::Joints => {
+            TermSource::Joints => {
                 if self.robot.is_named {
                     self.parts.raw_joints(&input, "robot", &kind.unit);
                 } else {
@@ -237,7 +237,7 @@ impl Reader<'_> {
                 ops.extend(kind.relative.then(|| Op::Subtract(Operand::Name("default".to_owned()))));
                 (input, self.robot.len)
             }
-            What::Action => {
+            TermSource::Action => {
                 let fed_back: Option<String> =
                     self.schema.action.fed_back.as_ref().map_or(Ok(None), |rule| self.values.facts.value(rule))?;
                 let next = match fed_back.as_deref() {
@@ -246,18 +246,18 @@ impl Reader<'_> {
                     _ => ACTION,
                 };
                 let state = kind.input.clone().unwrap_or_else(|| format!("{}_state", item.name));
-                self.parts.kept(&state, self.action_len, next);
+                self.parts.state(&state, self.action_len, next);
                 if let Some(rule) = &self.schema.action.fed_back {
                     self.values.facts.note(&state, self.values.facts.source(rule));
                 }
                 (state, self.action_len)
             }
-            What::Phase | What::Sin | What::Cos => {
+            TermSource::Phase | TermSource::Sin | TermSource::Cos => {
                 let (name, len, turn) = self.phases()?;
-                if kind.is != What::Phase {
+                if kind.is != TermSource::Phase {
                     let in_turns = turn == 1.0;
                     ops.extend(in_turns.then_some(Op::Scale(Operand::Number(TAU))));
-                    ops.push(if kind.is == What::Sin { Op::Sin } else { Op::Cos });
+                    ops.push(if kind.is == TermSource::Sin { Op::Sin } else { Op::Cos });
                 }
                 (name, len)
             }

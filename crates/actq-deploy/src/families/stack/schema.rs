@@ -38,7 +38,7 @@ pub(crate) struct Schema {
 pub(super) enum Source {
     Stated(Numbers),
     Key(String),
-    Of(Given),
+    Of(Sourced),
 }
 
 impl Source {
@@ -55,7 +55,7 @@ impl Source {
 /// A key, and a rule if the file does not have it. Answers to the rule must agree with the key.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Given {
+pub(super) struct Sourced {
     pub(super) key: Option<String>,
     pub(super) rule: Option<String>,
 }
@@ -90,7 +90,7 @@ pub(super) struct Joints {
 pub(super) enum Terms {
     Key(String),
     Listed(Vec<String>),
-    Of(Given),
+    Of(Sourced),
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -112,7 +112,7 @@ pub(super) struct Observation {
     /// Keys of a term's number of values, of limits, of its number of frames, and of the joints that it selects.
     pub(super) dim: Option<String>,
     pub(super) clip: Option<String>,
-    pub(super) history: Option<Given>,
+    pub(super) history: Option<Sourced>,
     pub(super) select: Option<String>,
     /// Factors of terms whose kind has none.
     pub(super) scale: Option<Source>,
@@ -134,7 +134,7 @@ pub(super) struct Observation {
 pub(super) struct Term {
     /// Names, with `*` for any text.
     pub(super) names: Vec<String>,
-    pub(super) is: What,
+    pub(super) is: TermSource,
     /// Name of the raw input or of the state, if it is not that of the term.
     pub(super) input: Option<String>,
     /// Number of values, and of values for each joint.
@@ -160,7 +160,7 @@ pub(super) struct Term {
 /// Content of a term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum What {
+pub(super) enum TermSource {
     /// A value of the application.
     Raw,
     /// The direction of gravity in the body's frame.

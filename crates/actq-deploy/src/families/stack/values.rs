@@ -2,7 +2,7 @@
 
 use actq::error::{Context as _, Result, bail, ensure};
 
-use super::schema::{Given, Source};
+use super::schema::{Source, Sourced};
 use crate::description::Numbers;
 use crate::document::Document;
 use crate::facts::Facts;
@@ -55,7 +55,7 @@ impl Values<'_> {
         };
         let given = match source {
             Source::Stated(numbers) => return Ok(Some((all(numbers.clone()), "profile".to_owned()))),
-            Source::Key(key) => &Given { key: Some(key.clone()), rule: None },
+            Source::Key(key) => &Sourced { key: Some(key.clone()), rule: None },
             Source::Of(given) => given,
         };
         let rule = given.rule.as_ref().map(|rule| rule.replace("{term}", term));
@@ -99,7 +99,7 @@ impl Values<'_> {
     pub(super) fn is_single(&self, source: &Source) -> Result<bool> {
         Ok(match source {
             Source::Stated(Numbers::All(_)) => true,
-            Source::Key(key) | Source::Of(Given { key: Some(key), .. }) => {
+            Source::Key(key) | Source::Of(Sourced { key: Some(key), .. }) => {
                 self.document.peek(&self.path(key, "")?).is_some_and(|node| node.number().is_some())
             }
             _ => false,
@@ -108,7 +108,7 @@ impl Values<'_> {
 
     /// Refuses a missing key without a rule; the error says by `what` which value it must have.
     pub(super) fn require(&self, source: &Source, term: &str, what: &str) -> Result<()> {
-        if let Source::Key(key) | Source::Of(Given { key: Some(key), rule: None }) = source {
+        if let Source::Key(key) | Source::Of(Sourced { key: Some(key), rule: None }) = source {
             let path = self.path(key, term)?;
             self.document.required(&path, what, numbers).map(drop)?;
         }
