@@ -54,13 +54,7 @@ struct Levels([[i8; LANES * QUAD]; REGISTERS]);
 impl Narrow {
     /// Returns `true` if this module multiplies a vector of values up to `x_max` on the level.
     pub(crate) fn is_for(level: Level, x_max: u16) -> bool {
-        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-        return x_max <= MAX_X && level.as_avx2().is_some();
-        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-        return {
-            let _ = (level, x_max);
-            false
-        };
+        x_max <= MAX_X && multiplies_bytes(level)
     }
 
     /// Returns `true` if the rows of a block are narrow enough.
@@ -127,6 +121,16 @@ impl Narrow {
             }
         }
     }
+}
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+fn multiplies_bytes(level: Level) -> bool {
+    level.as_avx2().is_some()
+}
+
+#[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+fn multiplies_bytes(_: Level) -> bool {
+    false
 }
 
 /// Returns the most quads whose sums fit in 16 bits and that divide a group, if there is one.
