@@ -9,7 +9,11 @@ const WITH_DSP: [&str; 5] = ["cortex-m33", "cortex-m35p", "cortex-m52", "cortex-
 
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(actq_armv7em)");
+    println!("cargo::rustc-check-cfg=cfg(actq_armv6m)");
     println!("cargo::rustc-check-cfg=cfg(actq_armv7m)");
+    println!("cargo::rustc-check-cfg=cfg(actq_rv32im)");
+    println!("cargo::rustc-check-cfg=cfg(actq_loops)");
+    println!("cargo::rustc-check-cfg=cfg(actq_scaling)");
     println!("cargo::rustc-check-cfg=cfg(actq_armv8m)");
     println!("cargo::rustc-check-cfg=cfg(actq_fpu)");
     println!("cargo::rustc-check-cfg=cfg(actq_soft)");
@@ -29,8 +33,14 @@ fn main() {
     if target.starts_with("thumbv6m") {
         println!("cargo::rustc-cfg=actq_narrow");
     }
-    if target.starts_with("thumbv7m") && !portable {
-        println!("cargo::rustc-cfg=actq_armv7m");
+    // Loops of the scalar layouts, and the scaling of sums.
+    let loops = [("thumbv6m", "actq_armv6m"), ("thumbv7m-", "actq_armv7m"), ("riscv32im", "actq_rv32im")];
+    if let Some((_, loops)) = loops.iter().find(|(prefix, _)| target.starts_with(prefix) && !portable) {
+        println!("cargo::rustc-cfg={loops}");
+        println!("cargo::rustc-cfg=actq_loops");
+        if !has_fpu(&target) {
+            println!("cargo::rustc-cfg=actq_scaling");
+        }
     }
     let dsp = target.starts_with("thumbv7em") || target.starts_with("thumbv8m.main") && flags_have_dsp();
     if dsp && !portable {

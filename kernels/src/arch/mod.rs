@@ -2,7 +2,8 @@
 //!
 //! `reference` is the standard that tests compare all others with, `portable` is Rust for every target, `armv7em`
 //! assembler for Cortex-M4, M7 and M33, and `armv7em_fpu` assembler that also needs their FPU's registers. All of them
-//! compute the same bits; the tests run them on the same data. The build script detects the backends of a target.
+//! compute the same bits; the tests run them on the same data. On cores without the DSP extension, `portable` has its
+//! innermost loops in assembler: `loops` for the scalar layouts, `scaling` for the results. The build script detects the backends of a target.
 
 /// The first line of a file. A module's assembler accepts the instructions of its architecture, which for Armv8-M
 /// exclude the DSP extension whatever processor the build names; so the file names the processor.
@@ -47,12 +48,15 @@ mod armv7em;
 #[cfg(actq_fpu)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
 mod armv7em_fpu;
-#[cfg(all(actq_armv7m, feature = "scalar"))]
+#[cfg(all(actq_loops, feature = "scalar"))]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
-mod armv7m;
+mod loops;
 pub mod portable;
 mod product;
 pub mod reference;
+#[cfg(actq_scaling)]
+#[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
+mod scaling;
 mod tables;
 
 #[cfg(actq_armv7em)]
@@ -64,9 +68,13 @@ use portable as floats;
 #[cfg(not(actq_armv7em))]
 use portable as integers;
 
-pub(crate) use floats::{denoise, gru_elements, lstm_elements, normalize, scale, sqrt, standardize, sum, sum_squares};
+#[cfg(not(actq_scaling))]
+pub(crate) use floats::scale;
+pub(crate) use floats::{denoise, gru_elements, lstm_elements, normalize, sqrt, standardize, sum, sum_squares};
 pub(crate) use integers::copy;
 pub use product::{Mismatch, Product};
+#[cfg(actq_scaling)]
+pub(crate) use scaling::scale;
 pub use tables::Tables;
 
 use crate::activations::{Plan, Prepared, Scale};

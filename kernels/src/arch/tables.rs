@@ -1,7 +1,9 @@
 //! Memory for the tables of bit planes, and for activations with start values.
 
 #[cfg(feature = "scalar")]
-use crate::layout::Width;
+use crate::layout::{STRIP, Width};
+#[cfg(feature = "scalar")]
+use crate::meter::RUN;
 
 /// Words of a table: 256 halfwords.
 #[cfg(feature = "scalar")]
@@ -45,6 +47,15 @@ impl<'w> Tables<'w> {
     #[inline(always)]
     pub(crate) fn lend(&mut self) -> Tables<'_> {
         Tables { words: self.words }
+    }
+
+    /// Takes up to half of the memory for the sums of `rows` rows; `None` for fewer than two runs of rows. Tables are then built
+    /// less often.
+    pub(crate) fn with_sums(self, rows: usize) -> Option<(&'w mut [i32], Self)> {
+        let most = (self.words.len() / 2) & !(STRIP - 1);
+        let len = rows.next_multiple_of(STRIP).min(most);
+        let (sums, words) = self.words.split_at_mut_checked(len)?;
+        (len > RUN).then(|| (bytemuck::must_cast_slice_mut(sums), Self { words }))
     }
 
     /// Returns the memory.

@@ -17,7 +17,7 @@ use super::format::{Cell, Format, Kernel, QUAD, Sums, XLayout};
 use super::width::Width;
 
 /// A column of two rows.
-#[cfg(not(actq_armv7m))]
+#[cfg(not(actq_loops))]
 pub(crate) const MASK: u32 = 0x00ff_00ff;
 
 /// The 8-bit layout without lanes.

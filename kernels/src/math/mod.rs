@@ -21,7 +21,7 @@ mod functions;
 mod limits;
 pub(crate) mod real;
 #[cfg(any(all(test, feature = "writer"), actq_soft))]
-mod soft;
+pub(crate) mod soft;
 
 pub use functions::Function;
 pub use functions::sigmoid;

@@ -340,48 +340,101 @@ fn slow_scaled(mut start: f32, sum: i32, scale: f32, x_scale: f32) -> f32 {
     start
 }
 
-/// Computes [`Real::add_scaled`] for a sum below 2^24, which f32 represents exactly; `None` outside the range of normal numbers.
+/// Returns the high word of a product of numbers whose last 8 bits are zeros; its last bit is set if any of the low word
+/// is.
+#[inline(always)]
+fn high_jammed<const NARROW: bool>(a: u32, b: u32) -> u32 {
+    if NARROW {
+        let [(ah, al), (bh, bl)] = [a, b].map(|x| (x >> 20, x >> 8 & 0xfff));
+        let low = al * bl;
+        let middle = ah * bl + al * bh + (low >> 12);
+        return (((ah * bh) << 8) + jammed(middle, 4)) | u32::from(low << 20 != 0);
+    }
+    let product = u64::from(a) * u64::from(b);
+    (product >> 32) as u32 | u32::from(product as u32 != 0)
+}
+
+/// Moves the leading bit of a number that has no other bits above bit 23 to bit 31, and returns the distance, too.
+#[inline(always)]
+fn to_the_top(mut m: u32) -> (u32, u32) {
+    if cfg!(all(target_arch = "arm", not(actq_narrow))) {
+        return (m << (m.leading_zeros() & 31), m.leading_zeros());
+    }
+    // The core cannot count zeros.
+    let mut zeros = 0;
+    for step in [16, 8, 4, 2, 1] {
+        if m >> (32 - step) == 0 {
+            (m, zeros) = (m << step, zeros + step);
+        }
+    }
+    (m, zeros)
+}
+
+/// Returns a number of 31 or 32 bits with its leading bit at bit 31, and 1 if it was there.
+#[inline(always)]
+fn one_up(m: u32) -> (u32, u32) {
+    let is_there = m >> 31;
+    (m << (1 - is_there), is_there)
+}
+
+/// Rounds to nearest even, and sets the last 8 bits to zeros; `None` for a result of 33 bits.
+#[inline(always)]
+fn rounded_in_place(m: u32) -> Option<u32> {
+    Some(m.checked_add(0x7f + (m >> 8 & 1))? & !0xff)
+}
+
+/// Returns `true` for a positive number from 2^-47 on and below 2^48. No product of a sum below 2^24 with two of them leaves
+/// the range of normal numbers.
+pub(crate) const fn is_usual(bits: u32) -> bool {
+    bits.wrapping_sub(80 << 23) < 95 << 23
+}
+
+/// Computes [`Real::add_scaled`] for usual numbers: a sum below 2^24, which f32 represents exactly, scales that
+/// [`is_usual`] accepts, and a start that is 0 or at most 30 binary places from the term. Otherwise, and very rarely for
+/// them, it returns `None`.
+///
+/// Mantissas have their leading bit at bit 31.
 #[inline(always)]
 fn scaled<const NARROW: bool>(start: u32, sum: i32, scale: u32, x_scale: u32) -> Option<u32> {
     let magnitude = sum.unsigned_abs();
-    if !are_normal(scale, x_scale) || magnitude >> 24 != 0 {
-        return None;
-    }
-    // A bf16 has 8 bits: one word holds the product.
-    let (by, x) = (Magnitude::of(scale), Magnitude::of(x_scale));
-    let product = (by.mantissa >> 16) * x.mantissa;
-    let factor = Magnitude::of_30_bits(jammed(product, 2), by.exponent + x.exponent - 126);
-    if !factor.is_normal() {
+    if !is_usual(scale) || !is_usual(x_scale) || magnitude >> 24 != 0 {
         return None;
     }
     if magnitude == 0 {
         // Only a sum of two negative zeros is negative.
         return (start == 0 || is_normal(start)).then_some(start);
     }
-    let (mantissa, exponent) = normalized::<23>(magnitude, 150);
-    let term = Magnitude { exponent, mantissa }.times::<NARROW>(factor);
-    let sign = sum as u32 & SIGN ^ (scale ^ x_scale) & SIGN;
+    // A bf16 has 8 bits: one word holds the product.
+    let (factor, carry) = one_up((scale >> 16 & 0x7f | 0x80) * (x_scale & (LEAD - 1) | LEAD));
+    let (sum_up, zeros) = to_the_top(magnitude);
+    let (term, term_carry) = one_up(high_jammed::<NARROW>(sum_up, rounded_in_place(factor)?));
+    let term = rounded_in_place(term)?;
+    let exponent = ((scale >> 23) + (x_scale >> 23) + carry + term_carry) as i32 - zeros as i32 - 96;
     if start << 1 == 0 {
-        return term.bits(sign);
+        return Some(sum as u32 & SIGN | (((exponent as u32 - 1) << 23) + (term >> 8)));
     }
-    if !term.is_normal() || !is_normal(start) {
+    // The sum's leading bit is 24 places below the smaller number's at least.
+    if (start << 1).wrapping_sub(30 << 24) >= 221 << 24 {
         return None;
     }
-    add_normal(term, sign, Magnitude::of(start), start & SIGN)
-}
-
-/// Adds two numbers, each as magnitude and sign; `None` outside the range of normal numbers.
-#[inline(always)]
-fn add_normal(a: Magnitude, a_sign: u32, b: Magnitude, b_sign: u32) -> Option<u32> {
-    let is_larger = a.exponent > b.exponent || a.exponent == b.exponent && a.mantissa >= b.mantissa;
-    let (large, sign, small) = if is_larger { (a, a_sign, b) } else { (b, b_sign, a) };
-    if a_sign == b_sign {
-        return large.plus(small).bits(sign);
+    let signed = |m: u32, sign: i32| ((m >> 2) as i32 ^ sign >> 31).wrapping_sub(sign >> 31);
+    let (term, start_exponent) = (signed(term, sum), (start >> 23 & 0xff) as i32);
+    let start = signed(start << 8 | 1 << 31, start as i32);
+    let distance = exponent - start_exponent;
+    let (large, small, exponent, distance) = if distance >= 0 {
+        (term, start, exponent, distance as u32)
+    } else {
+        (start, term, start_exponent, distance.unsigned_abs())
+    };
+    if distance > 30 {
+        return None;
     }
-    match large.minus(small) {
-        Some(difference) => difference.bits(sign),
-        None => Some(0),
+    let result = large + (small >> distance | i32::from(small << 1 << (31 - distance) != 0));
+    if result == 0 {
+        return Some(0);
     }
+    let (m, exponent) = normalized::<30>(result.unsigned_abs(), exponent + 1);
+    Some(result as u32 & SIGN | (((exponent as u32 - 1) << 23) + rounded::<7>(m)))
 }
 
 impl<const NARROW: bool> Add for Soft<NARROW> {

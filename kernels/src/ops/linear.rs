@@ -87,6 +87,10 @@ impl RowBlock<'_> {
     ) -> Option<()> {
         let x_scale = x_scale.get();
         if start.is_none() || !self.steps.is_empty() {
+            #[cfg(feature = "scalar")]
+            if let Some((sums, mut tables)) = tables.lend().with_sums(rows.len()) {
+                return self.apply_runs(sums, rows, output, x, &mut tables, x_scale, start, y);
+            }
             return self.apply_runs(&mut [0; RUN], rows, output, x, tables, x_scale, start, y);
         }
         // Sums of rows in order fit in y itself, except those of a last strip with padding.

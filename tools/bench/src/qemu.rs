@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail, ensure};
 use tempfile::NamedTempFile;
 
 use crate::bits;
-use crate::firmware::{cargo_build, harness, symbol};
+use crate::firmware::{cargo_build, harness_for, symbol};
 
 /// Returns QEMU's command for `elf`, an image in the slot if one is given, and arguments of the firmware.
 pub fn command(elf: &Path, slot: Option<&Path>, arguments: &str) -> Result<Command> {
@@ -118,14 +118,14 @@ impl Server {
     }
 }
 
-/// Runs an image from the slot on observations, in QEMU and on the host, with a reset in the middle; every action must
+/// Runs an image on observations, in QEMU and on the host, with a reset in the middle; every action must
 /// have the same bits.
 pub fn same_bits(target: Target, bytes: &[u8], observations: &[Vec<f32>]) -> Result<()> {
-    let elf = harness(target)?;
-    let slot = slot(bytes)?;
+    let file = slot(bytes)?;
+    let (elf, slot) = harness_for(target, file.path())?;
     let buffer = ImageBuffer::new(bytes);
-    let image = buffer.image(slot.path())?;
-    let mut server = Server::start(command_on(target, &elf, Some(slot.path()), "serve")?, image.act_len())?;
+    let image = buffer.image(file.path())?;
+    let mut server = Server::start(command_on(target, &elf, slot, "serve")?, image.act_len())?;
     with_head(image, |head| {
         for (step, observation) in observations.iter().enumerate() {
             if step == observations.len() / 2 {

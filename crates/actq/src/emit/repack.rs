@@ -2,7 +2,7 @@
 
 use actq_kernels::activations::{Plan, max_prepared_words};
 use actq_kernels::image::{BlockRecord, Image, Matrix, MatrixRecord, Port, Records, RowBlock, header as h, op};
-use actq_kernels::layout::{BlockShape, Lanes, Width, pack};
+use actq_kernels::layout::{BlockShape, Lanes, pack};
 
 use super::writer::sealed;
 use crate::error::{Context, Result, ensure};
@@ -55,11 +55,9 @@ impl Core {
         !matches!(self, Self::M0 | Self::M3 | Self::Rv32imac | Self::Rv32zb)
     }
 
-    /// Returns the lanes of a block for the core. Activations of more than 8 bits have only the DSP extension's. On a
-    /// Cortex-M0, so have 8 bits with group scales: the other layout takes a quarter more there.
-    fn lanes(self, width: Width, x_max: u16, group: usize) -> Lanes {
-        let is_slower = self == Self::M0 && width == Width::W8 && group != 0;
-        match self.has_dsp() || x_max > Lanes::PAIRED_X_MAX || is_slower {
+    /// Returns the lanes of a matrix for the core. Activations of more than 8 bits have only the DSP extension's.
+    fn lanes(self, x_max: u16, group: usize) -> Lanes {
+        match self.has_dsp() || x_max > Lanes::PAIRED_X_MAX {
             true => Lanes::of(x_max, group),
             false => Lanes::Scalar,
         }
@@ -77,7 +75,7 @@ pub fn repack(bytes: &[u8], core: Core) -> Result<Vec<u8>> {
     let image = Image::new_checked(buffer.bytes()).context("the image to repack")?;
     let old: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
     let is_packed = image.matrices().all(|matrix| {
-        let fits = |shape: BlockShape| shape.lanes == core.lanes(shape.width, matrix.x_max, matrix.group);
+        let fits = |shape: BlockShape| shape.lanes == core.lanes(matrix.x_max, matrix.group);
         matrix.blocks().all(|block| fits(block.block.shape()))
     });
     if is_packed {
@@ -108,7 +106,7 @@ impl Repacked {
             let mut blocks = Vec::new();
             for block in matrix.blocks() {
                 let from = block.block.shape();
-                let lanes = core.lanes(from.width, matrix.x_max, matrix.group);
+                let lanes = core.lanes(matrix.x_max, matrix.group);
                 let shape = BlockShape { lanes, ..from };
                 let (codes, scales) = unpacked(&block);
                 let mut packed = vec![0; shape.words()];

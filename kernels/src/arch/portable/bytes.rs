@@ -2,22 +2,28 @@
 //!
 //! The start values of two columns are the same for all rows. They are computed for a tile of columns, next to the
 //! activations, before all strips use them. Until the end, the sums of two rows are all of `t`, modulo 2^32, and
-//! `t >> 16`.
+//! `t >> 16`. In the loop of ARMv6-M a product is that of one row ([`PLAIN`]).
 
-#[cfg(actq_armv7m)]
-use crate::arch::armv7m::add_bytes;
+#[cfg(actq_loops)]
+use crate::arch::loops::add_bytes;
 use crate::arch::product::Product;
 use crate::arch::tables::TWO_COLUMNS;
 use crate::layout::QUAD;
 use crate::layout::half::halves;
-#[cfg(not(actq_armv7m))]
+#[cfg(not(actq_loops))]
 use crate::layout::w8_scalar::MASK;
 
 /// Pairs of columns for which there is always memory, a multiple of the step's.
 const LEAST_PAIRS: usize = 16;
 
-/// Two columns: their activations, the start value `s`, and `s + 2^8 s`.
-type TwoColumns = [i32; TWO_COLUMNS];
+/// `true` if sums are those of `code * x`, row by row: no instruction masks and shifts, so two rows at once save nothing.
+const PLAIN: bool = cfg!(actq_armv6m);
+
+/// Two columns: their activations and, unless sums are plain, the start value `s`, and `s + 2^8 s`.
+type TwoColumns = [i32; WORDS];
+
+/// Words of two columns.
+const WORDS: usize = if PLAIN { 2 } else { TWO_COLUMNS };
 
 /// Computes a product as [`crate::arch::gemv`] does.
 #[inline(never)]
@@ -32,7 +38,7 @@ pub(super) fn gemv(mut product: Product<'_>) {
 /// Computes a product with a tile on the stack.
 #[inline(never)]
 fn on_stack(product: Product<'_>) {
-    tiles(product, &mut [[0; TWO_COLUMNS]; LEAST_PAIRS]);
+    tiles(product, &mut [[0; WORDS]; LEAST_PAIRS]);
 }
 
 fn tiles(Product { block, x, first_row, acc, .. }: Product<'_>, tile: &mut [TwoColumns]) {
@@ -43,12 +49,13 @@ fn tiles(Product { block, x, first_row, acc, .. }: Product<'_>, tile: &mut [TwoC
     let strips = acc.as_chunks_mut::<QUAD>().0;
     let most = tile.len() & !3;
     strips.as_flattened_mut().fill(0);
-    let (mut at, mut end, mut groups) = (0, group, 0);
+    let (mut at, mut end, mut groups, mut fixed) = (0, group, 0, 0);
     while at < units {
         let len = most.min(end.min(units) - at);
         let Some(pairs) = x.words().get(at..at + len) else { return };
         tile.iter_mut().zip(pairs).for_each(|(columns, pair)| *columns = two_columns(*pair));
         let tile = tile.get(..len).unwrap_or(&[]);
+        fixed = if shape.group == 0 { fixed } else { 0 } + terms(tile);
         let weights = words.get(2 * at + groups..).unwrap_or(&[]);
         if shape.group == 0 {
             add_bytes(weights, stride, tile, strips);
@@ -58,7 +65,7 @@ fn tiles(Product { block, x, first_row, acc, .. }: Product<'_>, tile: &mut [TwoC
                 let mut sums = [0; QUAD];
                 let weights = weights.get(i * stride..).unwrap_or(&[]);
                 add_bytes(weights, stride, tile, core::slice::from_mut(&mut sums));
-                separate(&mut sums, len);
+                separate(&mut sums, fixed);
                 let scales = scales.get(i * stride).map_or([0; QUAD], |word| u32::from_le(*word).to_le_bytes());
                 for ((acc, sum), scale) in acc.iter_mut().zip(sums).zip(scales) {
                     *acc = acc.wrapping_add(sum.wrapping_mul(i32::from(scale)));
@@ -71,7 +78,7 @@ fn tiles(Product { block, x, first_row, acc, .. }: Product<'_>, tile: &mut [TwoC
         }
     }
     if shape.group == 0 {
-        separate(strips.as_flattened_mut(), units);
+        separate(strips.as_flattened_mut(), fixed);
     }
 }
 
@@ -80,19 +87,26 @@ fn tiles(Product { block, x, first_row, acc, .. }: Product<'_>, tile: &mut [TwoC
 fn two_columns(pair: u32) -> TwoColumns {
     let (even, odd) = halves(pair);
     let start = 0x8000i32.wrapping_sub((even + odd).wrapping_mul(128 * 0x1_0001));
-    [even, odd, start, start.wrapping_add(start << 8)]
+    let all = [even, odd, start, start.wrapping_add(start << 8)];
+    core::array::from_fn(|i| all[i])
 }
 
-/// Separates the sums of pairs of rows over `pairs` pairs of columns.
-fn separate(rows: &mut [i32], pairs: usize) {
-    let biases = (pairs as i32).wrapping_mul(0x8000);
+/// Returns the terms that the sums of a tile contain in every row: the offsets of the codes, or the biases of the low
+/// halves.
+fn terms(tile: &[TwoColumns]) -> i32 {
+    if PLAIN { 128 * tile.as_flattened().iter().sum::<i32>() } else { 0x8000 * tile.len() as i32 }
+}
+
+/// Separates the sums of pairs of rows, and subtracts these terms.
+fn separate(rows: &mut [i32], terms: i32) {
     for [even, odd] in rows.as_chunks_mut().0 {
-        *even = even.wrapping_sub(*odd << 16).wrapping_sub(biases);
+        let (low, high) = if PLAIN { (*even, odd.wrapping_sub(terms)) } else { (even.wrapping_sub(*odd << 16), *odd) };
+        (*even, *odd) = (low.wrapping_sub(terms), high);
     }
 }
 
 /// Adds the products of a tile to the sums of strips, whose weights are `stride` words apart.
-#[cfg(not(actq_armv7m))]
+#[cfg(not(actq_loops))]
 fn add_bytes(words: &[u32], stride: usize, tile: &[TwoColumns], strips: &mut [[i32; QUAD]]) {
     for (sums, words) in strips.iter_mut().zip(words.chunks(stride)) {
         let mut t = *sums;

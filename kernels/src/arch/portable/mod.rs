@@ -18,5 +18,7 @@ pub use gemv::gemv;
 pub use norm::{standardize, sum, sum_squares};
 #[cfg(any(not(actq_fpu), feature = "scalar"))]
 pub(crate) use vector::quantize;
+#[cfg(actq_scaling)]
+pub(crate) use vector::scale_one;
 pub use vector::{copy, magnitude};
 pub use vector::{scale, sqrt};

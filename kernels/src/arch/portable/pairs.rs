@@ -4,8 +4,8 @@
 //! of two rows are all of `t`, modulo 2^32, and `t >> 16`.
 
 use crate::activations::Prepared;
-#[cfg(actq_armv7m)]
-use crate::arch::armv7m::add_pairs;
+#[cfg(actq_loops)]
+use crate::arch::loops::add_pairs;
 use crate::arch::product::Product;
 use crate::layout::half::halves;
 use crate::layout::w4_scalar::MASK;
@@ -139,7 +139,7 @@ fn add<const R: usize>(words: &[u32], chunk: &[u32], sums: &mut [i32; R]) {
 }
 
 /// Adds a chunk's products to the sums of strips, whose weights are `stride` words apart.
-#[cfg(not(actq_armv7m))]
+#[cfg(not(actq_loops))]
 fn add_pairs(words: &[u32], stride: usize, chunk: &[u32], strips: &mut [[i32; STRIP]]) {
     strips.iter_mut().zip(words.chunks(stride)).for_each(|(sums, words)| add(words, chunk, sums));
 }

@@ -7,11 +7,11 @@
 //! Entries are halfwords with [`BIAS`], so none is negative, and one addition of a word builds two. Tables are built for
 //! a tile of columns, used by all rows, and overwritten by those of the next tile; the sums wait in `acc`.
 
-#[cfg(actq_armv7m)]
-use crate::arch::armv7m::{add_strips, build};
+#[cfg(actq_loops)]
+use crate::arch::loops::{add_strips, build};
 use crate::arch::product::Product;
 use crate::arch::tables::{TABLE_WORDS, Table};
-#[cfg(not(actq_armv7m))]
+#[cfg(not(actq_loops))]
 use crate::layout::half::halves;
 use crate::layout::{Format, QUAD, STRIP};
 
@@ -153,7 +153,7 @@ fn add_rows<const R: usize, const B: usize>(planes: &[[[u8; R]; B]], tables: &[T
 }
 
 /// Adds the entries of successive units to the sums of strips, whose weights are `stride` words apart.
-#[cfg(not(actq_armv7m))]
+#[cfg(not(actq_loops))]
 fn add_strips<const B: usize>(words: &[u32], stride: usize, tables: &[Table], strips: &mut [[i32; STRIP]]) {
     for (sums, words) in strips.iter_mut().zip(words.chunks(stride)) {
         add_rows::<STRIP, B>(planes(words, 0), tables, sums);
@@ -161,13 +161,13 @@ fn add_strips<const B: usize>(words: &[u32], stride: usize, tables: &[Table], st
 }
 
 /// Builds the tables of successive units.
-#[cfg(not(actq_armv7m))]
+#[cfg(not(actq_loops))]
 fn build(x: &[[u32; COLS / 2]], tables: &mut [[u32; TABLE_WORDS]]) {
     x.iter().zip(tables).for_each(|(x, table)| build_one(x, table));
 }
 
 /// Builds the table of eight columns, in pairs.
-#[cfg(not(actq_armv7m))]
+#[cfg(not(actq_loops))]
 #[inline(never)]
 fn build_one(x: &[u32; COLS / 2], table: &mut [u32; TABLE_WORDS]) {
     let mut columns = [0i32; COLS];

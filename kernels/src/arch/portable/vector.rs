@@ -26,22 +26,27 @@ pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) ->
 /// Computes `y[i] = start[i] + sum[i] * (scale[i] * x_scale)`, with two bf16 scales a word. If `sums` or `start` is
 /// `None`, `y` holds them, the sums as their bits.
 pub fn scale(sums: Option<&[i32]>, start: Option<&[u32]>, scales: &[u32], x_scale: f32, y: &mut [f32]) {
-    let (others, others_are_sums) = match (sums, start) {
-        (Some(sums), None) => (bytemuck::must_cast_slice(sums), true),
-        (Some(sums), Some(start)) => {
-            copy(bytemuck::must_cast_slice(sums), bytemuck::must_cast_slice_mut(y));
-            (start, false)
-        }
-        (None, start) => (start.unwrap_or(&[]), false),
-    };
-    for (i, (y, other)) in y.iter_mut().zip(others).enumerate() {
-        let sum = if others_are_sums {
-            *other as i32
-        } else {
-            let sum = y.to_bits() as i32;
-            *y = f32::from_bits(u32::from_le(*other));
-            sum
-        };
+    let others = start.map(<[_]>::len).or(sums.map(<[_]>::len)).unwrap_or(0);
+    for i in 0..y.len().min(others) {
+        scale_one(i, sums, start, scales, x_scale, y);
+    }
+}
+
+/// Computes a value of [`scale`]; none out of range.
+#[inline(always)]
+pub(crate) fn scale_one(
+    i: usize,
+    sums: Option<&[i32]>,
+    start: Option<&[u32]>,
+    scales: &[u32],
+    x_scale: f32,
+    y: &mut [f32],
+) {
+    let Some(y) = y.get_mut(i) else { return };
+    let sum = sums.map_or(Some(y.to_bits() as i32), |sums| sums.get(i).copied());
+    let start = start.map_or(Some(y.to_bits()), |start| start.get(i).copied().map(u32::from_le));
+    if let (Some(sum), Some(start)) = (sum, start) {
+        *y = f32::from_bits(start);
         Native::add_scaled(y, sum, bf16(half_word(scales, i)), x_scale);
     }
 }

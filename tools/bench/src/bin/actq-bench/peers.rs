@@ -8,7 +8,7 @@ use actq::graph::ops::{Linear, Pointwise};
 use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
-use actq_bench::firmware::{harness, harness_with, kernel_bytes};
+use actq_bench::firmware::{harness_for, kernel_bytes};
 use actq_bench::networks::Builder;
 use actq_bench::qemu::{self, Counter};
 use actq_cli::report::table::table;
@@ -66,11 +66,7 @@ pub(crate) fn run(ours: bool, json: Option<&Path>) -> Result<()> {
                 let buffer = ImageBuffer::new(&bytes);
                 let scratch = 4 * buffer.image(Path::new("mlp"))?.scratch_words();
                 let file = qemu::slot(&bytes)?;
-                // A board without a slot has the image built in.
-                let (elf, slot) = match target {
-                    Target::Riscv => (harness_with(target, file.path())?, None),
-                    _ => (harness(target)?, Some(file.path())),
-                };
+                let (elf, slot) = harness_for(target, file.path())?;
                 let (_, regions) = counter.run(target, &elf, slot, &[])?;
                 let instructions = regions.first().context("the harness has run no step")?.instructions;
                 let (code, stack) = (kernel_bytes(&elf)?, stack(target, &elf, slot)?);

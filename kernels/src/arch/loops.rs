@@ -1,14 +1,26 @@
-//! Loops of the scalar layouts in Thumb-2 assembler, for a Cortex-M3: the arithmetic of the portable backend, which calls
-//! them.
+//! Loops of the scalar layouts in assembler, for ARMv6-M, ARMv7-M and RV32IM: the arithmetic of the portable backend,
+//! which calls them.
 //!
-//! The compiler takes an instruction more for each lookup: it adds the base to an index before it loads the entry.
+//! The compiler takes more instructions for a lookup, and keeps fewer of the sums in registers.
 
-use super::tables::{TABLE_WORDS, TWO_COLUMNS, Table};
+use super::tables::{TABLE_WORDS, Table};
 use crate::layout::{QUAD, STRIP};
 
-core::arch::global_asm!(include_str!("planes.s"), options(raw));
-core::arch::global_asm!(include_str!("pairs.s"), options(raw));
-core::arch::global_asm!(include_str!("bytes.s"), options(raw));
+/// Assembles the files of an architecture.
+macro_rules! assembler {
+    ($folder:literal) => {
+        core::arch::global_asm!(include_str!(concat!($folder, "/planes.s")), options(raw));
+        core::arch::global_asm!(include_str!(concat!($folder, "/pairs.s")), options(raw));
+        core::arch::global_asm!(include_str!(concat!($folder, "/bytes.s")), options(raw));
+    };
+}
+
+#[cfg(actq_armv6m)]
+assembler!("armv6m");
+#[cfg(actq_armv7m)]
+assembler!("armv7m");
+#[cfg(actq_rv32im)]
+assembler!("rv32im");
 
 unsafe extern "C" {
     fn actq_bytes_w8(weights: *const u32, tile: *const i32, acc: *mut i32, end: *const i32, skip: usize, pairs: usize);
@@ -84,9 +96,10 @@ pub(super) fn add_pairs(weights: &[u32], stride: usize, chunk: &[u32], strips: &
     unsafe { actq_pairs_w4(weights.as_ptr(), chunk.as_ptr(), acc.start, acc.end, 4 * (stride - words), eights) }
 }
 
-/// Adds the products of a tile, whole fours of pairs of columns, to the sums of strips, whose weights are `stride` words
-/// apart.
-pub(super) fn add_bytes(weights: &[u32], stride: usize, tile: &[[i32; TWO_COLUMNS]], strips: &mut [[i32; QUAD]]) {
+/// Adds the products of a tile, whole fours of pairs of columns with `N` words each, to the sums of strips, whose weights
+/// are `stride` words apart.
+pub(super) fn add_bytes<const N: usize>(weights: &[u32], stride: usize, tile: &[[i32; N]], strips: &mut [[i32; QUAD]]) {
+    const { assert!(N == if cfg!(actq_armv6m) { 2 } else { 4 }) }
     let pairs = tile.len() & !3;
     let words = 2 * pairs;
     let needed = strips.len().saturating_sub(1) * stride + words;
@@ -95,7 +108,7 @@ pub(super) fn add_bytes(weights: &[u32], stride: usize, tile: &[[i32; TWO_COLUMN
     }
     let acc = strips.as_flattened_mut().as_mut_ptr_range();
     // SAFETY: both lengths are at least 1, and the pairs are a multiple of 4. For each strip it reads two words a pair,
-    // then skips to the next strip: `weights` has all of them. It reads four words of the tile a pair, and adds to four
+    // then skips to the next strip: `weights` has all of them. It reads N words of the tile a pair, and adds to four
     // sums for each strip, up to the end.
     unsafe { actq_bytes_w8(weights.as_ptr(), tile.as_ptr().cast(), acc.start, acc.end, 4 * (stride - words), pairs) }
 }
