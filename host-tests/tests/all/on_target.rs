@@ -18,5 +18,6 @@ mod logs;
 mod packages;
 mod portable;
 pub(crate) mod qemu;
+mod repacked;
 mod start;
 mod styles;
