@@ -1,12 +1,13 @@
 //! The commands for users and CI: `cargo demo`, `cargo verify`, `cargo xtask bench`, `cargo xtask budgets`,
 //! `cargo xtask fit`, `cargo xtask peers`, `cargo xtask compare`, `cargo xtask faults`, `cargo xtask firmware`, `cargo xtask stack`,
-//! `cargo xtask capi`, `cargo xtask python`, `cargo xtask wasm`, `cargo xtask gallery`, `cargo xtask
+//! `cargo xtask capi`, `cargo xtask python`, `cargo xtask exporters`, `cargo xtask wasm`, `cargo xtask gallery`, `cargo xtask
 //! doctor`.
 //!
 //! This crate has few dependencies, so that it builds fast and prints soon. The binaries of `actq-bench` and
 //! `actq-research` measure.
 #![forbid(unsafe_code)]
 
+mod exporters;
 mod firmware;
 mod limits;
 mod python;
@@ -52,6 +53,11 @@ enum Command {
     /// Runs its tests and checks its types. Needs Python 3.9 or later with venv: python3, or the interpreter that ACTQ_PYTHON
     /// names.
     Python(python::Options),
+    /// Import policies that released packages export, and compare them with the packages' own actions
+    ///
+    /// Installs pinned releases of each package in an environment below the target directory, several GB with torch. Not
+    /// part of CI.
+    Exporters(exporters::Options),
     /// Compile the kernels to the WebAssembly module of the report and of the npm package
     Wasm(wasm::Options),
     /// Build the gallery: a page in which simulated robots are driven by images of few bits, with --out DIR
@@ -102,6 +108,7 @@ fn main() -> ExitCode {
         Command::Doctor => setup::doctor(),
         Command::Firmware(options) => options.run(),
         Command::Python(options) => python::test(options),
+        Command::Exporters(options) => exporters::compare(options),
         Command::Wasm(options) => wasm::run(&options),
         Command::Gallery(options) => wasm::gallery(options),
         Command::Compare(options) => measuring("actq-research", "compare", options),
@@ -158,6 +165,7 @@ mod tests {
         assert_eq!(parse("xtask firmware --list"), Ok(()));
         assert_eq!(parse("xtask firmware --board stm32f405 --list"), Ok(()));
         assert_eq!(parse("xtask python --optional -- -k head"), Ok(()));
+        assert_eq!(parse("xtask exporters rsl_rl keras"), Ok(()));
         for (line, expected) in [
             ("xtask firmware --board microbit --out f.elf", "use one of mps2-an386, mps2-an505, mps2-an500, stm32f405"),
             ("xtask firmware --board stm32f4 --list", "use one of"),

@@ -107,7 +107,8 @@ fn environment(package: &Path, optional: bool) -> Result<PathBuf> {
     Ok(python)
 }
 
-fn run(command: &mut Command) -> Result<()> {
+/// Runs a command to its end; it must succeed.
+pub(crate) fn run(command: &mut Command) -> Result<()> {
     let words = [command.get_program()].into_iter().chain(command.get_args());
     let text = words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ");
     println!("$ {text}");
