@@ -33,9 +33,10 @@ fn main() {
     if target.starts_with("thumbv6m") {
         println!("cargo::rustc-cfg=actq_narrow");
     }
-    // Loops of the scalar layouts, and the scaling of sums.
+    // Loops of the scalar layouts, and the scaling of sums. Those of RISC-V are compressed code.
     let loops = [("thumbv6m", "actq_armv6m"), ("thumbv7m-", "actq_armv7m"), ("riscv32im", "actq_rv32im")];
-    if let Some((_, loops)) = loops.iter().find(|(prefix, _)| target.starts_with(prefix) && !portable) {
+    let fits = !portable && (!target.starts_with("riscv") || has_feature("c"));
+    if let Some((_, loops)) = loops.iter().find(|(prefix, _)| target.starts_with(prefix) && fits) {
         println!("cargo::rustc-cfg={loops}");
         println!("cargo::rustc-cfg=actq_loops");
         if !has_fpu(&target) {
@@ -55,12 +56,20 @@ fn main() {
     }
 }
 
-/// Returns `true` if the target's floats are not in software.
-fn has_fpu(target: &str) -> bool {
+/// Returns `true` if rustc reports a feature of the target.
+fn has_feature(name: &str) -> bool {
     let features = std::env::var("CARGO_CFG_TARGET_FEATURE").unwrap_or_default();
+    features.split(',').any(|feature| feature == name)
+}
+
+/// Returns `true` if the target's floats are not in software. Stable rustc does not report RISC-V's `f`; the letters of
+/// the architecture's name have it, or `g`, which includes it.
+fn has_fpu(target: &str) -> bool {
     match target.split_once('-').map_or(target, |(architecture, _)| architecture) {
         thumb if thumb.starts_with("thumb") => target.ends_with("eabihf"),
-        riscv if riscv.starts_with("riscv") => features.split(',').any(|feature| feature == "f"),
+        riscv if riscv.starts_with("riscv") => {
+            has_feature("f") || riscv.get("riscv32".len()..).is_some_and(|letters| letters.contains(['f', 'g']))
+        }
         _ => true,
     }
 }

@@ -12,7 +12,7 @@ use actq::runtime::ImageBuffer;
 use actq_bench::networks::Builder;
 use actq_bench::qemu::{self, Server};
 use actq_bench::{Target, bits, firmware};
-use actq_kernels::image::Kind;
+use actq_kernels::image::{Kind, checksum};
 use actq_kernels::{Head, SavedError, StepError, Width};
 use anyhow::{Result, ensure};
 use proptest::prelude::*;
@@ -400,6 +400,43 @@ fn a_restored_head_continues_with_the_same_bits() {
             }
         });
     }
+}
+
+/// A right checksum does not make a state possible.
+#[test]
+fn impossible_states_are_refused() {
+    const CHUNK: usize = 4;
+    let limits = |at: f32| Some(vec![at; ACT]);
+    let buffer = echo(CHUNK, 1, ActionContract { low: limits(-2.0), high: limits(2.0), ..memory(0.1) });
+    with_head(&buffer, |head| {
+        for i in 0..5 {
+            head.step(&wave(i)).expect("an action");
+        }
+        let state = saved(head);
+        let last = state.len() / 4 - 1;
+        let action = 10 + CHUNK * ACT;
+        let mut restore = |word: usize, value: u32| {
+            let mut bytes = state.clone();
+            bytes[4 * word..][..4].copy_from_slice(&value.to_le_bytes());
+            let sum = checksum(&bytes);
+            bytes[12..16].copy_from_slice(&sum.to_le_bytes());
+            head.restore(&bytes)
+        };
+        for (word, value) in [
+            (6, 4),
+            (8, CHUNK as u32 - 1),
+            (9, 3),
+            (action, f32::NAN.to_bits()),
+            (action + ACT - 1, 2.5f32.to_bits()),
+            (last, 4),
+            (last, u32::MAX),
+        ] {
+            assert_eq!(restore(word, value), Err(SavedError::Damaged), "word {word}: {value:#x}");
+        }
+        for (word, value) in [(4, 7), (9, 2), (action, (-2.0f32).to_bits()), (last, 3)] {
+            assert_eq!(restore(word, value), Ok(()), "word {word}: {value:#x}");
+        }
+    });
 }
 
 #[test]

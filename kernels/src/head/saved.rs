@@ -66,7 +66,10 @@ impl Head<'_, '_> {
             return Err(SavedError::Image);
         }
         let [next, old, slot] = [next, old, slot].map(|n| n as usize);
-        if sum != checksum(from) || flags > 3 || old > self.image.chunk() || slot >= self.image.horizon().max(1) {
+        // Without an overlap nothing remains of a previous chunk.
+        let remains = if self.image.overlap() > 0 { old <= self.image.chunk() } else { old == self.image.chunk() };
+        let is_possible = flags <= 3 && remains && slot < self.image.horizon().max(1);
+        if sum != checksum(from) || !is_possible || !self.has_valid_arena(words.clone(), flags & 1 != 0) {
             return Err(SavedError::Damaged);
         }
         for region in self.saved_regions() {
@@ -76,6 +79,24 @@ impl Head<'_, '_> {
         self.playback = Playback { ready: flags & 2 != 0, next, old, slot };
         (self.seed, self.draws, self.started) = (seed, draws, flags & 1 != 0);
         Ok(())
+    }
+
+    /// Returns `true` if the last action in the saved words of the arena is one that the contract allows, and no more
+    /// chunks predict a period than an ensemble has. A file's checksum does not tell who wrote it.
+    fn has_valid_arena(&self, words: impl Iterator<Item = u32> + Clone, started: bool) -> bool {
+        let [state, output, rest] = self.saved_regions();
+        let rest_of = |region: Region| {
+            let at = state.len + output.len + region.offset.saturating_sub(rest.offset);
+            words.clone().skip(at).take(region.len)
+        };
+        let is_allowed = |(i, word)| {
+            let ([_, _, low, high, ..], action) = (self.image.contract_of(i), f32::from_bits(word));
+            action.is_finite() && low <= action && action <= high
+        };
+        let (kept, horizon) = (self.image.kept(), self.image.horizon());
+        let counts = Region { offset: kept.end().saturating_sub(horizon), len: horizon };
+        (!started || rest_of(self.image.action()).enumerate().all(is_allowed))
+            && rest_of(counts).all(|count| count as usize <= horizon)
     }
 
     fn check_saved(&self, given: usize) -> Result<(), SavedError> {
