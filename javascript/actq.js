@@ -3,13 +3,21 @@
 const TEXTS = { error: 0, name: 1, ports: 2 };
 const NUMBERS = { observationLength: 0, actionLength: 1, rateHz: 2, scratchBytes: 3, crc32: 4 };
 
-/** Compiles the module from its gzip file. */
+/** Compiles the module from its gzip file, or from its content: some servers make a browser unpack it. */
 export async function compile(gzip) {
+  const [first] = new Uint8Array(gzip.buffer ?? gzip, gzip.byteOffset ?? 0, 1);
+  if (first !== 0x1f) return WebAssembly.compile(gzip);
   const stream = new Blob([gzip]).stream().pipeThrough(new DecompressionStream("gzip"));
   return WebAssembly.compile(await new Response(stream).arrayBuffer());
 }
 
 let compiled;
+
+/** Lets the next caller try again. */
+function again(error) {
+  compiled = undefined;
+  throw error;
+}
 
 /** Compiles the file beside this one, once. */
 async function own() {
@@ -43,7 +51,7 @@ export class Head {
 
   /** Opens an image of these bytes. `module` is a compiled module; by default, it is the file beside this one. */
   static async open(bytes, module) {
-    const { exports } = await WebAssembly.instantiate(module ?? (await (compiled ??= own())), {});
+    const { exports } = await WebAssembly.instantiate(module ?? (await (compiled ??= own().catch(again))), {});
     const address = exports.allocate(bytes.length);
     new Uint8Array(exports.memory.buffer, address, bytes.length).set(bytes);
     check(exports, exports.open(bytes.length));

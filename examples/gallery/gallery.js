@@ -1,6 +1,6 @@
 const ROBOTS = [
-  { title: "Balancer", hertz: 100, push: 4, unit: "m/s", error: "speed error", goals: [["speed, m/s", -0.6, 0.6, 0], ["turn rate, rad/s", -1.5, 1.5, 0]], draw: drawBalancer },
-  { title: "UR3 arm", hertz: 50, push: 12, unit: "mm", error: "distance to the goal", goals: [["x, m", -0.45, -0.15, -0.3], ["y, m", -0.3, 0.3, -0.1], ["z, m", 0.05, 0.45, 0.2]], draw: drawArm },
+  { title: "Balancer", hertz: 100, push: 4, unit: "m/s", error: "speed error", goals: [["speed, m/s", -0.6, 0.6], ["turn rate, rad/s", -1.5, 1.5]], draw: drawBalancer },
+  { title: "UR3 arm", hertz: 50, push: 12, unit: "mm", error: "distance to the goal", goals: [["x, m", -0.45, -0.15], ["y, m", -0.3, 0.3], ["z, m", 0.05, 0.45]], draw: drawArm },
 ];
 const data = JSON.parse(document.getElementById("data").textContent);
 const byId = (id) => document.getElementById(id);
@@ -18,6 +18,8 @@ let head;
 let seed = 1;
 let isPaused = false;
 let failed = "";
+/** The reader has set the goal; before, the sliders show the task's. */
+let isAimed = false;
 const opened = new Map();
 
 function weightsOf({ shapes, bits, weights }) {
@@ -42,16 +44,20 @@ async function headOf(which, level) {
 }
 
 async function begin() {
-  const { exports } = await WebAssembly.instantiate(simulation, {});
-  exports.begin(which, seed++);
-  robot = exports;
-  head = await headOf(which, level);
+  const [chosen, { exports }] = [which, await WebAssembly.instantiate(simulation, {})];
+  exports.begin(data[chosen].robot, seed++);
+  const first = await headOf(chosen, level);
+  if (chosen !== which) return;
+  [robot, head] = [exports, first];
   head.reset();
-  failed = "";
 }
 /** Switches the bits while the robot runs: the new head starts from its reset. */
 async function change() {
-  head = await headOf(which, level);
+  const [chosen, bits] = [which, level];
+  const next = await headOf(chosen, bits);
+  // Another choice may have been quicker.
+  if (chosen !== which || bits !== level) return;
+  head = next;
   head.reset();
 }
 const array = (Type, address, length) => new Type(robot.memory.buffer, address, length);
@@ -59,6 +65,7 @@ function step() {
   try {
     const action = head.step(array(Float32Array, robot.observation(), robot.number(0)));
     array(Float32Array, robot.action(), robot.number(1)).set(action);
+    failed = "";
   } catch (error) {
     failed = error.message;
     head.reset();
@@ -89,9 +96,12 @@ function controls() {
     controls();
   });
   const goals = ROBOTS[data[which].robot].goals;
-  const inputs = goals.map(([name, min, max, value], i) => Object.assign(document.createElement("input"), { type: "range", id: `goal${i}`, min, max, step: 0.01, value, oninput: aim }));
-  const aimAll = () => robot.aim(...[0, 1, 2].map((i) => inputs[i]?.valueAsNumber ?? 0));
-  function aim() { aimAll(); }
+  const inputs = goals.map(([, min, max], i) => Object.assign(document.createElement("input"), { type: "range", id: `goal${i}`, min, max, step: 0.01, oninput: aim }));
+  function aim() {
+    isAimed = true;
+    robot.aim(...[0, 1, 2].map((i) => inputs[i]?.valueAsNumber ?? 0));
+  }
+  isAimed = false;
   byId("goal").replaceChildren(...goals.flatMap(([name], i) => [Object.assign(document.createElement("label"), { htmlFor: `goal${i}`, textContent: name }), inputs[i]]));
 }
 byId("left").onclick = () => robot.push(-ROBOTS[data[which].robot].push);
@@ -175,6 +185,8 @@ function figures() {
   Object.assign(document.documentElement.dataset, { ready: "true", robot: title, episodes, successes, error: now });
 }
 
+/** The goal is at the end of what is drawn. */
+const goal = (view) => view.slice(-ROBOTS[data[which].robot].goals.length);
 let last = performance.now();
 let owed = 0;
 function frame(now) {
@@ -182,7 +194,9 @@ function frame(now) {
     const { hertz, draw } = ROBOTS[data[which].robot];
     owed = isPaused ? 0 : Math.min(owed + ((now - last) / 1000) * hertz, 12);
     for (; owed >= 1; owed--) step();
-    draw([...array(Float64Array, robot.view(), robot.number(2))], ...stage());
+    const view = [...array(Float64Array, robot.view(), robot.number(2))];
+    draw(view, ...stage());
+    if (!isAimed) goal(view).forEach((value, i) => (byId(`goal${i}`).value = value));
     figures();
   }
   last = now;

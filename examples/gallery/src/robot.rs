@@ -16,6 +16,8 @@ pub struct Robot {
     seed: u64,
     /// The balancer's distance along its track, m, which its task does not need.
     travelled: f64,
+    /// The goal that [`Self::aim`] has set.
+    aimed: Option<[f64; 3]>,
     /// Values that the policy observes.
     pub observation: Vec<f32>,
     /// The policy's action.
@@ -39,7 +41,8 @@ impl Robot {
         };
         let [observation, action] = lengths.map(|len| vec![0.0; len]);
         let (view, error) = (Vec::new(), 0.0);
-        let mut robot = Self { task, seed, travelled: 0.0, observation, action, view, error, episodes: [0; 2] };
+        let mut robot =
+            Self { task, seed, travelled: 0.0, aimed: None, observation, action, view, error, episodes: [0; 2] };
         robot.sense();
         robot
     }
@@ -67,6 +70,9 @@ impl Robot {
             self.travelled = 0.0;
             self.task = begin(u32::from(matches!(self.task, Task::Arm(_))), self.seed);
         }
+        if let Some(goal) = self.aimed {
+            self.aim(goal);
+        }
         self.sense();
         success.is_some()
     }
@@ -79,8 +85,9 @@ impl Robot {
         }
     }
 
-    /// Sets the goal: the balancer's speed and turn rate, or the position of the arm's tool.
+    /// Sets the goal from now on: the balancer's speed and turn rate, or the position of the arm's tool.
     pub fn aim(&mut self, goal: [f64; 3]) {
+        self.aimed = Some(goal);
         match &mut self.task {
             Task::Balancer(task) => task.command([goal[0], goal[1]]),
             Task::Arm(task) => task.move_goal(goal),

@@ -39,4 +39,4 @@ class Page(str):
         return f"Page({len(self)} characters)"
 
     def _repr_html_(self) -> str:
-        return f'<iframe srcdoc="{escape(self)}" title="actq report" style="width:100%;height:720px;border:0"></iframe>'
+        return f'<iframe sandbox="allow-scripts" srcdoc="{escape(self)}" title="actq report" style="width:100%;height:720px;border:0"></iframe>'

@@ -82,7 +82,7 @@ fn page(
         let most = (MAX_MACS / (macs * image.denoising_steps()).max(1)).max(200);
         let mut part = dataset.thinned(most, image.state().len > 0).into_owned();
         eval::fill_actions(&mut part, Some(policy))?;
-        nmse = Some(eval::evaluate(image, &part)?.nmse);
+        nmse = Some((eval::evaluate(image, &part)?.nmse, part.frames()));
     }
     let pair = dataset.as_ref().zip(reference.as_ref());
     let runs = pair.map(|(dataset, reference)| runs::compare(image, reference, dataset, nmse)).transpose()?;

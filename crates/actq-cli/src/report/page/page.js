@@ -21,7 +21,7 @@ function svg(tag, attributes = {}, ...children) {
 const integer = (n) => n.toString().replace(/\B(?=(\d{3})+$)/g, ",");
 const fixed = (n, digits) => (n < 0 ? "\u2212" : "") + Math.abs(n).toFixed(digits);
 const error = (n) => (n === null || n === undefined ? "-" : n === 0 ? "0" : n.toExponential(2));
-const value = (n) => (n === 0 ? "0" : Math.abs(n) >= 1e4 || Math.abs(n) < 1e-3 ? n.toExponential(2) : fixed(n, 4));
+const value = (n) => (n === null ? "-" : n === 0 ? "0" : Math.abs(n) >= 1e4 || Math.abs(n) < 1e-3 ? n.toExponential(2) : fixed(n, 4));
 const percent = (share) => `${(100 * share).toFixed(1)} %`;
 const milliseconds = (cycles, hertz) => `${((1e3 * cycles) / hertz).toFixed(3)} ms`;
 
@@ -54,12 +54,12 @@ function figures(entries) {
   return el("dl", { class: "figures" }, ...entries.filter(Boolean).map(([name, text]) => el("div", {}, el("dt", {}, name), el("dd", {}, text))));
 }
 const ownSweep = sweep?.images.find((image) => image.is_own);
-const nmse = runs?.nmse ?? null;
+const [nmse, measured] = runs?.nmse ?? [null, runs?.compared];
 function trust() {
   const sentences = [];
   if (runs) {
     const known = nmse ?? mean(runs.actions.map(([ratio]) => ratio));
-    sentences.push(`On ${integer(runs.recorded)} recorded observations the image's actions differ from the f32 policy's by an NMSE of ${error(known)} (mean squared error over variance; 1 is no better than a constant).`);
+    sentences.push(`On ${integer(measured)} of ${integer(runs.recorded)} recorded observations the image's actions differ from the f32 policy's by an NMSE of ${error(known)} (mean squared error over variance; 1 is no better than a constant).`);
   } else {
     sentences.push("No error is shown: the report was made without the policy and a recording.");
   }
@@ -78,7 +78,7 @@ document.getElementById("top").append(
     ["image", `${integer(facts.bytes)} B`],
     ["bits per weight", facts.bits_per_weight.toFixed(3)],
     ["a step, predicted", facts.time ? milliseconds(...facts.time) : "-"],
-    ["RAM", `${integer(facts.scratch)} B`],
+    ["scratch RAM", `${integer(facts.scratch)} B`],
     runs && ["action error (NMSE)", error(nmse ?? mean(runs.actions.map(([ratio]) => ratio)))],
     data.own_path && ["error on its own path", error(data.own_path[0])],
     ownSweep?.success && ["success", `${percent(ownSweep.success[0])} of ${ownSweep.success[1]}`],
@@ -241,11 +241,11 @@ if (runs) {
   trace();
   drawn.push(trace);
   const worst = table(["episode", "step", "error"], runs.worst.map((one) => {
-    const load = () => live.load?.(one.observation);
+    const load = () => live.load?.(one.observation, one.actions);
     const key = (event) => (event.key === "Enter" || event.key === " ") && (event.preventDefault(), load());
     return el("tr", { class: "pick", tabindex: "0", role: "button", "aria-label": `episode ${one.at[0]}, step ${one.at[1]}: run this observation`, onclick: load, onkeydown: key }, ...[one.at[0], one.at[1], error(one.error)].map((text) => el("td", { class: "n" }, String(text))));
   }), [0, 1, 2]);
-  section("errors", "Errors", el("p", {}, `Actions of the image against the f32 policy on ${integer(runs.compared)} of ${integer(runs.recorded)} observations of ${runs.recording}, after the action contract.`, nmse === null ? "" : ` The NMSE of the network's raw output, as actq eval prints it, is ${error(nmse)}.`),
+  section("errors", "Errors", el("p", {}, `Actions of the image against the f32 policy on ${integer(runs.compared)} of ${integer(runs.recorded)} observations of ${runs.recording}, after the action contract.`, nmse === null ? "" : ` The NMSE of the network's raw output on ${integer(measured)} of them is ${error(nmse)}.`),
     el("div", { class: "two" }, el("div", {}, el("h3", {}, "By action"), actions), el("div", {}, el("h3", {}, "By layer"), byLayer, el("p", { class: "soft" }, "Weights: the matrix's share of the error that its weights were predicted to cause, from the statistics. Rounding: the NMSE that rounding its input adds to its output, measured on the recording."))),
     el("h3", {}, "An episode"), el("div", { class: "row" }, el("label", { for: "dimension" }, "Action"), select), legend([["image", "var(--image)"], ["f32 policy (dashed)", "var(--exact)"]]), place,
     el("h3", {}, `The worst 1 % of the observations${runs.worst.length < Math.ceil(runs.compared / 100) ? `, the first ${runs.worst.length}` : ""}`), el("p", { class: "soft" }, "Choose one to run it in the page, below."), worst);
@@ -300,9 +300,10 @@ async function start() {
   head.reset();
   const current = Float32Array.from(data.head.start);
   const began = performance.now();
-  for (let i = 0; i < 1000; i++) head.step(current);
+  let count = 0;
+  do head.step(current); while (++count < 1000 && performance.now() - began < 300);
   const took = performance.now() - began;
-  speed.textContent = `1,000 steps took ${took.toFixed(0)} ms in this browser.`;
+  speed.textContent = `${integer(count)} steps took ${took.toFixed(0)} ms in this browser.`;
   speed.dataset.milliseconds = took;
   head.reset();
 
@@ -344,13 +345,18 @@ async function start() {
     sliders.append(el("div", { class: "slider" }, el("label", { for: `s${i}` }, name), input, shown));
     return { input, shown };
   });
-  live.load = (observation) => {
+  // The listed error is of a step of an episode; this is the observation's first after a reset.
+  live.load = (observation, recorded) => {
     current.set(observation);
     inputs.forEach(({ input, shown }, i) => {
       input.value = current[i];
       shown.textContent = value(current[i]);
     });
     live.reset();
+    if (recorded) {
+      const list = (actions) => actions.map((action) => fixed(action, 5)).join(", ");
+      message.textContent = `In its episode the image gave ${list(recorded[1])}; the f32 policy ${list(recorded[0])}.`;
+    }
     document.getElementById("live").scrollIntoView({ block: "nearest" });
   };
   live.reset = () => {
@@ -373,12 +379,13 @@ async function start() {
   const select = el("select", { id: "part", onchange: () => flash() }, ...parts.map(({ name, core }, i) => el("option", { value: i }, `${name} (${core})`)), el("option", { value: "custom" }, "another size"));
   const number = (id, initial) => el("input", { type: "number", id, value: initial, min: 1, oninput: () => flash(), style: "width: 96px" });
   const [flashSize, ramSize, clock] = [number("flash-size", 256), number("ram-size", 64), number("mhz", 64)];
+  const size = (input) => input.valueAsNumber || 0;
   const own = el("span", { class: "row", hidden: "" }, el("label", { for: "flash-size" }, "flash, KB"), flashSize, el("label", { for: "ram-size" }, "RAM, KB"), ramSize, el("label", { for: "mhz" }, "MHz"), clock);
   const place = el("div");
   function flash() {
     const isCustom = select.value === "custom";
     own.hidden = !isCustom;
-    const part = isCustom ? { ...custom, flash: 1024 * flashSize.valueAsNumber, ram: 1024 * ramSize.valueAsNumber, megahertz: clock.valueAsNumber } : parts[Number(select.value)];
+    const part = isCustom ? { ...custom, flash: 1024 * size(flashSize), ram: 1024 * size(ramSize), megahertz: size(clock) } : parts[Number(select.value)];
     const free = part.flash - facts.bytes - facts.runtime;
     const block = (bytes, colour) => el("i", { style: `--c: var(${colour}); flex: ${Math.max(bytes, 0)} 0 0` });
     const fits = free >= 0 && facts.scratch <= part.ram;
@@ -387,14 +394,14 @@ async function start() {
     if (free < 0) notes.push(`${integer(-free)} bytes of flash are missing.`);
     if (facts.scratch > part.ram) notes.push(`${integer(facts.scratch - part.ram)} bytes of RAM are missing.`);
     if (part.is_external) notes.push("The flash is a chip of its own; this is its usual size.");
-    if (part.has_dsp === isScalar) notes.push(`The image has the layouts of other cores and is slow on this one; actq repack converts it.`);
+    if (isScalar ? part.has_dsp : !part.has_dsp && facts.matrices.some((matrix) => matrix.x_max <= 127 && matrix.bytes > 0)) notes.push(`The image has the layouts of other cores and is slow on this one; actq repack converts it.`);
     if (facts.time && !part.is_modelled) notes.push("There is no model of this core's cycles.");
     if (facts.time && part.is_modelled) notes.push("Predicted for memory that never waits; flash with wait states takes longer.");
-    const time = facts.time && part.is_modelled ? `${milliseconds(facts.time[0], 1e6 * part.megahertz)} at ${part.megahertz} MHz, predicted` : "not predicted";
+    const time = facts.time && part.is_modelled && part.megahertz > 0 ? `${milliseconds(facts.time[0], 1e6 * part.megahertz)} at ${part.megahertz} MHz, predicted` : "not predicted";
     place.replaceChildren(
       el("div", { class: "flash", role: "img", "aria-label": `image ${facts.bytes} bytes, runtime ${facts.runtime} bytes, free ${Math.max(0, free)} bytes` }, block(facts.bytes, "--image"), block(facts.runtime, "--b4"), block(Math.max(0, free), "--card")),
       legend([["image", "var(--image)"], ["runtime", "var(--b4)"], ["free", "var(--card)"]]),
-      figures([["fits", fits ? "yes" : "no"], ["image", `${integer(facts.bytes)} B`], ["runtime", `${integer(facts.runtime)} B`], ["flash left", free < 0 ? "none" : `${integer(free)} B`], ["RAM left", facts.scratch > part.ram ? "none" : `${integer(part.ram - facts.scratch)} B`], ["a step", time]]),
+      figures([["fits", fits ? "yes" : "no"], ["image", `${integer(facts.bytes)} B`], ["runtime", `${integer(facts.runtime)} B`], ["flash left", free < 0 ? "none" : `${integer(free)} B`], ["RAM left for stack and program", facts.scratch > part.ram ? "none" : `${integer(part.ram - facts.scratch)} B`], ["a step", time]]),
       el("p", {}, notes.join(" ")));
   }
   flash();
@@ -415,7 +422,7 @@ if (facts.ports.length) {
 
 // g. The contract and the provenance.
 {
-  const rows = actionNames.map((name, i) => [name, ...facts.contract.map(([, values]) => value(values[i]))]);
+  const rows = actionNames.map((name, i) => [name, ...facts.contract.map(([, values]) => (Math.abs(values[i]) >= 3.4028234e38 ? "-" : value(values[i])))]);
   const contract = facts.contract.length ? table(["action", ...facts.contract.map(([name]) => name)], rows, facts.contract.map((_, i) => i + 1)) : el("p", {}, "No scales or limits of the action.");
   section("contract", "Contract", contract, el("p", {}, [`Control rate ${facts.rate_hz} Hz.`, ...facts.playback.map((text) => `${text[0].toUpperCase()}${text.slice(1)}.`), facts.self_test ? `A self-test of ${facts.self_test} steps is in the image.` : "No self-test is in the image."].join(" ")));
   section("provenance", "Provenance", table(["", ""], [["SHA-256 of the image", facts.sha256], ["CRC-32 in its header", facts.crc32], ["SHA-256 of its source", facts.source], ["features of the kernels", facts.features.join(" ")], ...facts.made, ["report by actq", facts.actq]].map(([name, text]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", { class: "mono" }, text)))));

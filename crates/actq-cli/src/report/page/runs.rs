@@ -44,7 +44,7 @@ pub struct Runs {
     /// Observations in it.
     pub recorded: usize,
     /// Error of the network's raw output on it, as `actq eval` prints it; `None` for images with raw inputs.
-    pub nmse: Option<f64>,
+    pub nmse: Option<(f64, usize)>,
     /// Compared observations, from its start.
     pub compared: usize,
     /// Errors of each action: over its variance, if it varies, and the largest.
@@ -237,7 +237,7 @@ impl Moments {
 /// # Errors
 ///
 /// If the recording is empty, or one of both cannot run on it.
-pub fn compare(image: Image<'_>, reference: &Reference, dataset: &Dataset, nmse: Option<f64>) -> Result<Runs> {
+pub fn compare(image: Image<'_>, reference: &Reference, dataset: &Dataset, nmse: Option<(f64, usize)>) -> Result<Runs> {
     let macs: usize = image.ops().filter_map(|op| op.matrix()).map(|matrix| matrix.rows * matrix.cols).sum();
     let macs = macs.max(reference.weights.len()) * image.denoising_steps();
     let steps = dataset.frames().min((MAX_MACS / macs.max(1)).max(MIN_STEPS));
@@ -353,10 +353,14 @@ impl HeadData {
         for row in dataset.into_iter().flat_map(Dataset::observations) {
             row.iter().take(image.obs_len()).enumerate().for_each(|(i, value)| see(*value, i));
         }
-        let ranges = seen
-            .into_iter()
-            .zip(accepted(&image))
-            .map(|(seen, own)| widened(if seen[0] < seen[1] { seen } else { own }));
+        let ranges = seen.into_iter().zip(accepted(&image)).map(|(seen, own)| {
+            widened(match seen {
+                [low, high] if low < high => seen,
+                // A constant stays within reach.
+                [low, high] if low == high => [own[0].max(low - 1.0), own[1].min(high + 1.0)],
+                _ => own,
+            })
+        });
         Ok(Self {
             image: encoded(bytes),
             ranges: ranges.collect(),
