@@ -176,6 +176,12 @@ impl Head {
                 rows.shape()
             ));
         };
+        let (needed, given) = (self.states(self.image.get(), 1)?.saved_len(), rows.shape()[1]);
+        if given != needed {
+            return Err(error!(
+                "a state has {given} bytes, and one of this image {needed}; pass the array of Head.state() of a head of the same image"
+            ));
+        }
         let bytes: Vec<u8> = rows.readonly().as_array().iter().copied().collect();
         py.detach(|| {
             let mut kept = self.batch.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,7 +1,8 @@
 //! Long work in a thread of its own, while the calling thread waits for signals, progress and questions.
 //!
 //! The work holds no lock of Python. Ctrl-C, or an exception of a callback, is raised at once, and the thread is
-//! abandoned: at its next report of progress it unwinds, and everything that it holds is dropped. It writes no files.
+//! abandoned: at its next report of progress it unwinds, and everything that it holds is dropped. It writes no files but
+//! temporary ones.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -194,7 +194,7 @@ def test_states_that_do_not_fit_change_nothing(image, mlp):
         (states[0], r"the states have the shape \[\d+\]; pass the array \[n, bytes\] of Head.state"),
         (states[:0], r"the states have the shape \[0, \d+\]"),
         (states.astype(float), "the states are of type float64"),
-        (states[:, :-1], "the states have .* bytes; the batch needs"),
+        (states[:, :-1], "a state has .* bytes, and one of this image"),
         ("x", "the states are of type <U1"),
     ]:
         with pytest.raises(actq.Error, match=text):

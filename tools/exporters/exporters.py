@@ -63,7 +63,9 @@ def row(kind, form, make, act=None, width=OBS, discrete=False, **options):
     found = policy(rows)
     expected = expected.reshape(len(expected), -1)
     found = found.argmax(axis=1)[:, None] if discrete else found
-    error = np.abs(found - expected).max() / np.abs(expected).max() if found.shape == expected.shape else np.inf
+    # A choice is right or wrong; its number has no size.
+    size = 1.0 if discrete else np.abs(expected).max()
+    error = np.abs(found - expected).max() / size if found.shape == expected.shape else np.inf
     outcome = f"imports, off by {error:.0e}" if error <= TOLERANCE else f"WRONG: off by {error:.0e} of the largest action"
     print(f"{kind} | {form} | {outcome}", flush=True)
 

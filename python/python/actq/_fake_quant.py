@@ -81,6 +81,8 @@ class FakeQuant(nn.Module):
         sums leave int32 all the same.
         """
         original = self.image.network()["tensors"]
+        if any(parameter.dtype not in (torch.float32, torch.float64) for parameter in self.parameters()):
+            raise Error("the module has parameters of fewer bits than float32; call float() first")
         levels, floats = {}, {}
         for name, tensor in [*self.named_parameters(), *self.named_buffers()]:
             if name not in original:
@@ -133,7 +135,8 @@ class FakeQuant(nn.Module):
 def rounded(x: torch.Tensor, x_max: int) -> torch.Tensor:
     """Rounds each row to whole multiples of its largest magnitude over `x_max`; gradients pass."""
     largest = x.detach().abs().amax(dim=-1, keepdim=True)
-    step = torch.where(largest > 0, largest / x_max, torch.ones_like(largest))
+    # As the image does: a smaller vector counts as zero.
+    step = torch.where(largest >= 2.0**-100, largest / x_max, torch.ones_like(largest))
     return x + (torch.round(x.detach() / step) * step - x.detach())
 
 
