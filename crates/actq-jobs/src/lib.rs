@@ -1,5 +1,5 @@
 //! Sweeps as jobs: a [`spec::Spec`] becomes a plan of [`job::Job`]s, [`run::run`] runs one, a [`store::Store`] holds
-//! the results, and [`merged`] has the results of a whole plan.
+//! the results, and [`results`] has the results of a whole plan.
 //!
 //! A job's result depends on its address alone, the SHA-256 of what goes into it: not on the machine, the number of
 //! threads, or the time. Nothing here starts processes or prints; what the caller has to provide is [`host::Host`].
