@@ -176,7 +176,8 @@ impl Head {
                 rows.shape()
             ));
         };
-        let (needed, given) = (self.states(self.image.get(), 1)?.saved_len(), rows.shape()[1]);
+        let one = self.states(self.image.get(), 1)?.save().map_err(raised)?;
+        let (needed, given) = (one.len(), rows.shape()[1]);
         if given != needed {
             return Err(error!(
                 "a state has {given} bytes, and one of this image {needed}; pass the array of Head.state() of a head of the same image"
