@@ -50,7 +50,9 @@ def of(source: Any, name: str) -> Optional[Model]:
             return _of_sb3(source, name)
         if _sb3.is_of(source, "OnPolicyRunner", "rsl_rl.runners") or _sb3.is_of(source, "DistillationRunner", "rsl_rl.runners"):
             return _of_rsl_rl(source, name)
-        return _of_clean_rl(source, name) if isinstance(source, torch.nn.Module) else None
+        # A compiled module's class has no `forward` to look at.
+    is_agent = isinstance(source, torch.nn.Module) and not isinstance(source, torch.jit.ScriptModule)
+    return _of_clean_rl(source, name) if is_agent else None
 
 
 def drawn(length: int) -> Array:
