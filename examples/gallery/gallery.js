@@ -4,8 +4,6 @@ const ROBOTS = [
 ];
 const data = JSON.parse(document.getElementById("data").textContent);
 const byId = (id) => document.getElementById(id);
-const bytes = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-const unpacked = async (base64) => new Uint8Array(await new Response(new Blob([bytes(base64)]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer());
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name);
 const integer = (n) => n.toString().replace(/\B(?=(\d{3})+$)/g, ",");
 
@@ -22,15 +20,6 @@ let failed = "";
 let isAimed = false;
 const opened = new Map();
 
-function weightsOf({ shapes, bits, weights }) {
-  const buffer = bytes(weights).buffer;
-  if (bits === 32) return new Float32Array(buffer);
-  const count = shapes.reduce((sum, [rows, cols]) => sum + rows * cols, 0);
-  const [levels, scales, all] = [new Int16Array(buffer, 0, count), new Float32Array(buffer, 4 * Math.ceil(count / 2)), new Float32Array(count)];
-  let [at, row] = [0, 0];
-  for (const [rows, cols] of shapes) for (let r = 0; r < rows; r++, row++) for (let c = 0; c < cols; c++, at++) all[at] = levels[at] * scales[row];
-  return all;
-}
 /** Opens the head of a level, once: 0 is f32, the others are images. */
 async function headOf(which, level) {
   const key = `${which} ${level}`;

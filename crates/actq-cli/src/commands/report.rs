@@ -78,8 +78,7 @@ fn page(
     let reference = policy.map(Reference::of).transpose()?;
     let mut nmse = None;
     if let (Some(dataset), Some(policy), false) = (&mut dataset, policy, image.has_around()) {
-        let macs: usize = image.ops().filter_map(|op| op.matrix()).map(|matrix| matrix.rows * matrix.cols).sum();
-        let most = (MAX_MACS / (macs * image.denoising_steps()).max(1)).max(200);
+        let most = (MAX_MACS / runs::macs(&image).max(1)).max(200);
         let mut part = dataset.thinned(most, image.state().len > 0).into_owned();
         eval::fill_actions(&mut part, Some(policy))?;
         nmse = Some((eval::evaluate(image, &part)?.nmse, part.frames()));

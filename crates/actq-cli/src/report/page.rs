@@ -89,6 +89,8 @@ const HTML: &str = include_str!("page/page.html");
 /// The style of the page.
 pub const CSS: &str = include_str!("page/page.css");
 const SCRIPT: &str = include_str!("page/page.js");
+/// Functions that read the data of a page.
+pub const UNPACK: &str = include_str!("page/unpack.js");
 
 /// Formats the file.
 ///
@@ -103,6 +105,7 @@ pub fn html(page: &Page) -> Result<String> {
         ("DATA", data),
         ("MODULE", Base64::encode_string(actq_wasm::MODULE)),
         ("FACE", actq_wasm::FACE.to_owned()),
+        ("UNPACK", UNPACK.to_owned()),
         ("SCRIPT", SCRIPT.to_owned()),
     ];
     Ok(filled(HTML, &parts))

@@ -65,7 +65,7 @@ pub struct Facts {
     pub is_trained: bool,
     /// Names of the action contract's arrays, and their values for each action.
     pub contract: Vec<(&'static str, Vec<f32>)>,
-    /// How the image was made, if its statistics are given: names and values.
+    /// Names and values of the options that made the image; empty without its statistics.
     pub made: Vec<(&'static str, String)>,
 }
 

@@ -232,14 +232,19 @@ impl Moments {
     }
 }
 
+/// Returns the MACs of a step of the network.
+pub(crate) fn macs(image: &Image<'_>) -> usize {
+    let of_ops = image.ops().filter_map(|op| op.matrix()).map(|matrix| matrix.rows * matrix.cols);
+    of_ops.sum::<usize>() * image.denoising_steps()
+}
+
 /// Compares the image with the f32 policy on a recording.
 ///
 /// # Errors
 ///
 /// If the recording is empty, or one of both cannot run on it.
 pub fn compare(image: Image<'_>, reference: &Reference, dataset: &Dataset, nmse: Option<(f64, usize)>) -> Result<Runs> {
-    let macs: usize = image.ops().filter_map(|op| op.matrix()).map(|matrix| matrix.rows * matrix.cols).sum();
-    let macs = macs.max(reference.weights.len()) * image.denoising_steps();
+    let macs = macs(&image).max(reference.weights.len() * image.denoising_steps());
     let steps = dataset.frames().min((MAX_MACS / macs.max(1)).max(MIN_STEPS));
     ensure!(steps > 0, "{}: the recording has no observation", dataset.path.display());
     let whole = reference.image()?;

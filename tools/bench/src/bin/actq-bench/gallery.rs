@@ -14,7 +14,7 @@ use actq_bench::ur3;
 use actq_cli::commands::report;
 use actq_cli::outputs::files;
 use actq_cli::report::page::runs::{HeadData, Reference, ReferenceData};
-use actq_cli::report::page::{CSS, encoded, filled, packed};
+use actq_cli::report::page::{CSS, UNPACK, encoded, filled, packed};
 use actq_deploy::Deployment;
 use actq_kernels::Width;
 use actq_ur3::policy_f32::PolicyF32;
@@ -70,6 +70,7 @@ pub(crate) fn build(folder: &Path, robots: &Path, quick: bool) -> Result<()> {
         ("MODULE", encoded(actq_wasm::MODULE)),
         ("ROBOTS", packed(&module)?),
         ("FACE", actq_wasm::FACE.to_owned()),
+        ("UNPACK", UNPACK.to_owned()),
         ("SCRIPT", SCRIPT.to_owned()),
     ];
     fs::create_dir_all(folder).with_context(|| format!("{}: cannot create the folder", folder.display()))?;
