@@ -48,7 +48,7 @@ Compare many:
   sweep      Compare methods at several budgets on held-out observations
   plan       Print the jobs of a sweep, one JSON object a line
   job        Run one job, and put its result into a store
-  merge      Print the results of a sweep: tables, the frontier and its plot
+  merge      Print the results of a sweep: tables and the frontier
 
 Options:
 {options}{after-help}";
@@ -109,7 +109,7 @@ pub(crate) enum Command {
     },
     /// Show an image: operations, matrices, bits, memory, predicted time on a Cortex-M4, action contract
     ///
-    /// Example: actq inspect ur3.actq --widths --stats ur3.json --svg ur3.svg
+    /// Example: actq inspect ur3.actq --widths --stats ur3.json
     Inspect(InspectArgs),
     /// Write an image's report as a web page, in which the image runs
     ///
@@ -204,9 +204,9 @@ pub(crate) enum Command {
     /// of `actq plan`), which may have more: other budgets, seeds, closed-loop episodes. docs/SCALE.md documents specs
     /// and stores.
     ///
-    /// Example: actq sweep policies/ur3 policies/go1 --bpw 2.5,3,4 --svg errors.svg
+    /// Example: actq sweep policies/ur3 policies/go1 --bpw 2.5,3,4
     ///
-    /// Example: actq sweep sweep.toml --store results --svg errors.svg
+    /// Example: actq sweep sweep.toml --store results
     Sweep {
         #[command(flatten)]
         args: SweepArgs,
@@ -231,12 +231,12 @@ pub(crate) enum Command {
     ///
     /// Example: sed -n 7p plan.jsonl | actq job - --store results
     Job(JobArgs),
-    /// Print the results of a sweep: tables, the frontier and its plot
+    /// Print the results of a sweep: tables and the frontier
     ///
     /// Counts of episodes add up over the jobs of an image. A star marks images of the frontier: no other image has
     /// fewer bytes and a smaller error, or with closed-loop episodes more success.
     ///
-    /// Example: actq merge sweep.toml --store results --svg frontier.svg
+    /// Example: actq merge sweep.toml --store results --json frontier.json
     Merge(MergeArgs),
     /// Run an image as a policy over standard input and output
     ///

@@ -1,16 +1,14 @@
-//! Human-readable tables, notes and plots.
+//! Human-readable tables and notes, and a page.
 
 pub mod constants;
 pub mod deployment;
 pub mod export;
-pub mod frontiers;
 pub mod imported;
 pub mod inspect;
 pub mod learned;
 pub mod memory;
 pub mod notes;
 pub mod page;
-pub mod plot;
 pub mod progress;
 pub mod quantized;
 pub mod sweep_table;

@@ -128,9 +128,9 @@ fn an_output_may_be_a_device() -> Result<()> {
     let image = fixture.image()?;
     ensure!(output.status.success() && output.stdout == image, "standard output is not exactly the image");
     ensure!(String::from_utf8_lossy(&output.stderr).contains("weights"), "no report on standard error");
-    let svg = fixture.run("inspect old.actq --widths --svg stdout")?;
-    let (picture, report) = (String::from_utf8(svg.stdout)?, String::from_utf8(svg.stderr)?);
-    ensure!(picture.trim_end().ends_with("</svg>") && !report.is_empty(), "{picture} and {report}");
+    let report = fixture.run("report old.actq --out stdout")?;
+    let (page, said) = (String::from_utf8(report.stdout)?, String::from_utf8(report.stderr)?);
+    ensure!(page.trim_end().ends_with("</html>") && !said.is_empty(), "{page} and {said}");
     // An open file already has a position at which others write.
     let log = fixture.path("log");
     fs::write(&log, "lines\n")?;

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use actq::measure::time::CLOCK;
 use actq::pipeline::driven::DriveOutcome;
 use actq_cli::outputs::files;
-use actq_cli::report::plot::{Plot, Series, Vertical, stacked};
 use actq_cli::report::time::conditions;
 use anyhow::Result;
 use serde::Deserialize as _;
@@ -20,9 +19,6 @@ use super::results::{Header, Results};
 
 /// Distance of the robot from its target, by the simulator's name for it, with its unit.
 const TRACKING: [(&str, &str); 3] = [("tracking_error_mm", "mm"), ("err_lin", "m/s"), ("dist", "m")];
-
-/// The file of plots beside the report.
-const PICTURE: &str = "compare.svg";
 
 const READING: &str = "\
 Bytes are those of the whole image in flash. ms, CMSIS-NN: the same step with products by that library's int8 kernel, 1.875 cycles \
@@ -51,7 +47,6 @@ is an estimate of its products alone, 3 cycles each; it is not driven.";
 pub(super) fn write(results: &Results, folder: &Path) -> Result<PathBuf> {
     let asked = Asked::of(&results.header)?;
     let path = folder.join("compare.md");
-    files::write(&folder.join(PICTURE), stacked(&plots(results, &asked)).as_bytes())?;
     files::write(&path, markdown(results, &asked)?.as_bytes())?;
     Ok(path)
 }
@@ -77,43 +72,8 @@ impl Asked {
     }
 }
 
-/// Returns the plots of success over bytes and over predicted milliseconds: one of each driven policy, a line for each
-/// method.
-fn plots(results: &Results, asked: &Asked) -> Vec<Plot> {
-    let percent = |cell: &Cell| cell.outcome()?.success().map(|success| 100.0 * success);
-    let find = |policy: &str, method, budget| results.find(&CellKey { policy: policy.to_owned(), method, budget });
-    let line = |policy: &str, method: Contender| -> Series {
-        let points = |x: fn(&Made) -> Option<f64>| {
-            let cells = asked.budgets.iter().filter_map(|&budget| find(policy, Some(method), Some(budget)));
-            let mut points: Vec<(f64, f64)> =
-                cells.filter_map(|cell| Some((x(cell.made.as_ref()?)?, percent(cell)?))).collect();
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            points
-        };
-        let points = vec![points(|made| Some(made.bytes as f64 / 1e3)), points(|made| made.milliseconds)];
-        Series { name: method.title().to_owned(), points }
-    };
-    let plot = |policy: &String| -> Option<Plot> {
-        let f32_success = percent(find(policy, None, None)?)?;
-        Some(Plot {
-            title: format!("{policy}: success over flash and over time (f32: {f32_success:.0}%)"),
-            x_labels: vec![
-                "flash of the image, kB (1000 bytes)".to_owned(),
-                format!("predicted ms of a step, Cortex-M4 at {} MHz", CLOCK / 1e6),
-            ],
-            y_label: "closed-loop success, %".to_owned(),
-            vertical: Vertical::Percent,
-            series: asked.methods.iter().map(|&method| line(policy, method)).collect(),
-            mark: None,
-            frontier: Vec::new(),
-        })
-    };
-    asked.policies.iter().filter_map(plot).collect()
-}
-
 fn markdown(results: &Results, asked: &Asked) -> Result<String> {
     let mut text = head(&results.header)?;
-    writeln!(text, "\n![Success over bytes and over predicted milliseconds, a plot a policy]({PICTURE})")?;
     if asked.methods.iter().any(|method| method.is_simulated()) {
         writeln!(text, "\n{K_QUANTS}")?;
     }

@@ -23,9 +23,6 @@ pub(crate) struct InspectArgs {
     /// The statistics that --save-stats wrote with this image: adds the reasons for the widths, and the removed rows
     #[arg(long, value_name = "FILE", requires = "widths")]
     pub(crate) stats: Option<PathBuf>,
-    /// Draw the widths as SVG
-    #[arg(long, value_name = "FILE", requires = "widths")]
-    pub(crate) svg: Option<PathBuf>,
 }
 
 #[derive(clap::Args)]
@@ -53,7 +50,8 @@ pub(crate) struct EvalArgs {
     /// The held-out recording: .npz, .npy or .safetensors [default: the one in POLICY_DIR]
     #[arg(long, value_name = "FILE")]
     pub(crate) heldout: Option<PathBuf>,
-    /// A recording of this image's own rollout, by actq serve --record, or a folder of them; may be repeated
+    /// A recording of this image's own rollout, by actq serve --record, or a folder of them; and as FILE.json the line
+    /// with success and episodes that the simulator printed; may be repeated
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) driven: Vec<PathBuf>,
     /// Show no progress
@@ -75,7 +73,8 @@ pub(crate) struct ReportArgs {
     /// recording]
     #[arg(long, value_name = "FILE|DIR", num_args = 1..)]
     pub(crate) recordings: Vec<PathBuf>,
-    /// A recording of this image's own rollout, by actq serve --record, or a folder of them; may be repeated
+    /// A recording of this image's own rollout, by actq serve --record, or a folder of them; and as FILE.json the line
+    /// with success and episodes that the simulator printed; may be repeated
     #[arg(long, value_name = "FILE|DIR")]
     pub(crate) driven: Vec<PathBuf>,
     /// The statistics that --save-stats wrote with this image: adds removed rows, names, and how the image was made

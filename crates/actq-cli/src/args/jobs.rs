@@ -43,9 +43,6 @@ pub(crate) struct MergeArgs {
     /// The folder of the results
     #[arg(long, value_name = "DIR")]
     pub(crate) store: PathBuf,
-    /// Draw errors, success and the frontiers over bytes and over predicted milliseconds as SVG
-    #[arg(long, value_name = "FILE")]
-    pub(crate) svg: Option<PathBuf>,
     /// Write all figures as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,

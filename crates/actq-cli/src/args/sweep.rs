@@ -27,10 +27,6 @@ pub struct SweepArgs {
     /// The processor's clock for predicted times, in Hz or as 168M [default: 168M]
     #[arg(long, value_name = "HZ", value_parser = clock)]
     pub(crate) clock: Option<f64>,
-    /// Draw errors, success and the frontiers over bytes and over predicted milliseconds as SVG, and mark the knee of
-    /// the best method
-    #[arg(long, value_name = "FILE")]
-    pub(crate) svg: Option<PathBuf>,
     /// Write bytes, cycles, errors, bits, allocations and scores as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,

@@ -8,11 +8,10 @@ use anyhow::Result;
 use crate::args::InspectArgs;
 use crate::report::widths::Widths;
 use crate::report::{inspect, time};
-use crate::terminal::{print, reserve};
+use crate::terminal::print;
 
 /// Prints the content of an image.
 pub(crate) fn run(args: &InspectArgs) -> Result<()> {
-    let outputs = reserve(&args.svg, [&args.image].into_iter().chain(&args.stats))?;
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     if !args.widths {
@@ -23,9 +22,5 @@ pub(crate) fn run(args: &InspectArgs) -> Result<()> {
         });
     }
     let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;
-    let widths = Widths::new(&image, stats.as_ref())?;
-    if args.svg.is_some() {
-        outputs.write(&[widths.svg()])?;
-    }
-    print(&widths.report())
+    print(&Widths::new(&image, stats.as_ref())?.report())
 }

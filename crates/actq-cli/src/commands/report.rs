@@ -1,5 +1,6 @@
 //! `actq report`
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use actq::data::{Dataset, Recording, Sizes, files_of, joined};
@@ -21,7 +22,7 @@ use crate::importers::{load, policy_files};
 use crate::report::page::facts::Facts;
 use crate::report::page::parts::PARTS;
 use crate::report::page::runs::{self, HeadData, Reference};
-use crate::report::page::{Page, Sweep, html};
+use crate::report::page::{Page, Success, Sweep, html, success_of};
 use crate::terminal::{Progress, print, reserve};
 
 /// Most MACs of the run that gives the printed error.
@@ -38,12 +39,17 @@ pub(crate) fn run(args: &ReportArgs) -> Result<()> {
     let image = buffer.image(&args.image)?;
     let policy = args.policy.as_deref().map(|dir| source_of(dir, &image)).transpose()?;
     let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;
+    let (outcomes, driven): (Vec<_>, Vec<_>) =
+        driven.into_iter().partition(|file| file.extension().is_some_and(|ending| ending == "json"));
+    ensure!(outcomes.len() <= 1, "--driven: more than one .json file; name the one with the outcome of all episodes");
+    let success = outcomes.first().map(|file| outcome_of(file)).transpose()?;
     let own = (!driven.is_empty()).then(|| own::own_path(image, &driven, policy.as_ref())).transpose()?;
     let dataset = dataset_of(&image, &recordings, args.policy.as_deref())?;
     let facts = Facts::new(&image, buffer.bytes(), stats.as_ref(), args.clock)?;
     let sweep = args.store.as_deref().map(|store| sweep_of(store, &facts)).transpose()?;
     let page = Page {
         own_path: own.map(|own| (own.nmse, own.steps)),
+        success: success.or_else(|| sweep.as_ref().and_then(|sweep| sweep.images.iter().find(|i| i.is_own)?.success)),
         sweep,
         ..page(image, buffer.bytes(), facts, policy.as_ref(), dataset)?
     };
@@ -86,7 +92,14 @@ fn page(
     let pair = dataset.as_ref().zip(reference.as_ref());
     let runs = pair.map(|(dataset, reference)| runs::compare(image, reference, dataset, nmse)).transpose()?;
     let head = HeadData::new(image, bytes, dataset.as_ref(), reference.as_ref())?;
-    Ok(Page { facts, own_path: None, sweep: None, runs, head, parts: PARTS })
+    Ok(Page { facts, own_path: None, success: None, sweep: None, runs, head, parts: PARTS })
+}
+
+/// Reads the success that a simulator printed.
+fn outcome_of(file: &Path) -> Result<Success> {
+    let name = || file.display().to_string();
+    let text = fs::read_to_string(file).context("cannot read the file").with_context(name)?;
+    success_of(&text).with_context(name)
 }
 
 /// Reads the policy of a folder; refuses another than that of the image.

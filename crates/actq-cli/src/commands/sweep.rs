@@ -44,13 +44,13 @@ pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> 
         }
     };
     if let Some(store) = &args.pool.store {
-        merge::refuse_inside(store, args.svg.iter().chain(&args.json).chain(&args.pool.log))?;
+        merge::refuse_inside(store, args.json.iter().chain(&args.pool.log))?;
     }
     if let Some(log) = &args.pool.log {
         files::refuse_input(log, &inputs)?;
     }
     // The log's lines stay: no output replaces it.
-    let outputs = reserve(args.svg.iter().chain(&args.json), inputs.iter().chain(&args.pool.log))?;
+    let outputs = reserve(&args.json, inputs.iter().chain(&args.pool.log))?;
     if let Some(log) = &args.pool.log {
         append(log, "")?;
     }
@@ -80,7 +80,7 @@ pub fn run(args: &SweepArgs, methods: &[String], host: &dyn Host) -> Result<()> 
         merge::report_finished(&jobs, &store)?;
         return Err(error);
     }
-    merge::report(&jobs, &|address| store.read_whole(address), outputs, args.svg.is_some(), args.json.is_some())
+    merge::report(&jobs, &|address| store.read_whole(address), outputs, args.json.is_some())
 }
 
 /// Returns the spec or plan that is given instead of policies.

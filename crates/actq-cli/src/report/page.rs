@@ -8,8 +8,10 @@ pub mod runs;
 
 use std::io::Write as _;
 
+use actq::measure::interval::wilson;
+use actq::pipeline::driven::DriveOutcome;
 use actq_jobs::results::MergedPolicy;
-use anyhow::Result;
+use anyhow::{Context as _, Result, ensure};
 use base64ct::{Base64, Encoding as _};
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -26,6 +28,8 @@ pub struct Page {
     pub facts: Facts,
     /// Error on the image's own path (NMSE), and its observations.
     pub own_path: Option<(f64, usize)>,
+    /// Success of the image's rollouts, if it was reported.
+    pub success: Option<Success>,
     /// The sweep that the image is of.
     pub sweep: Option<Sweep>,
     /// Actions of the image and of the f32 policy on recordings.
@@ -56,12 +60,35 @@ pub struct SweptImage {
     pub milliseconds: f64,
     /// Error on the held-out recording (NMSE).
     pub nmse: f64,
-    /// Share of successful episodes, their number, and the 95% interval of the share.
-    pub success: Option<(f64, u64, [f64; 2])>,
+    /// Success of its rollouts.
+    pub success: Option<Success>,
     /// `true` if no other image has fewer bytes and a smaller error.
     pub is_frontier: bool,
+    /// `true` if no other image has fewer bytes and more success.
+    pub is_success_frontier: bool,
     /// `true` for the image of the page.
     pub is_own: bool,
+}
+
+/// Share of successful episodes, their number, and the 95% interval of the share.
+pub type Success = (f64, u64, [f64; 2]);
+
+/// Reads the success that a robot or simulator reported of an image's rollouts: its last line that is a JSON object.
+///
+/// # Errors
+///
+/// If no object has `success` and `episodes` in range.
+pub fn success_of(text: &str) -> Result<Success> {
+    let outcome = text.lines().rev().find_map(|line| DriveOutcome::parse(line.trim()));
+    let reported =
+        outcome.as_ref().and_then(|outcome| Some((outcome, outcome.success()?, outcome.number("episodes")?)));
+    let (outcome, share, episodes) =
+        reported.context("it has no line of JSON with \"success\", a share, and \"episodes\", their number")?;
+    ensure!(
+        (0.0..=1.0).contains(&share) && episodes >= 1.0 && episodes.fract() == 0.0,
+        "success {share} of {episodes} episodes: give a share of 0 to 1 and a whole number"
+    );
+    Ok((share, episodes as u64, outcome.interval().unwrap_or_else(|| wilson(share * episodes, episodes))))
 }
 
 impl Sweep {
@@ -78,6 +105,7 @@ impl Sweep {
                 nmse: made.nmse,
                 success: success.map(|((share, episodes), interval)| (share, episodes, interval)),
                 is_frontier: policy.frontier.contains(&i),
+                is_success_frontier: policy.success_frontier.contains(&i),
                 is_own: made.image.image == sha256,
             })
         };
@@ -158,6 +186,24 @@ mod tests {
     fn values_of_a_template_are_not_searched() {
         let parts = [("A", "{{B}}".to_owned()), ("B", "b".to_owned())];
         assert_eq!(filled("<{{A}}|{{B}}|{{C}}>", &parts), "<{{B}}|b|>");
+    }
+
+    #[test]
+    fn success_is_read_from_the_last_object() {
+        let text =
+            "begins\n{\"success\": 0.1, \"episodes\": 2}\n{\"success\": 0.5, \"episodes\": 4, \"ci\": [0.2, 0.8]}\n";
+        assert_eq!(success_of(text).expect("an outcome"), (0.5, 4, [0.2, 0.8]));
+        let (share, episodes, [low, high]) = success_of("{\"success\": 1, \"episodes\": 10}").expect("an outcome");
+        assert!(share == 1.0 && episodes == 10 && (0.69..0.75).contains(&low) && high == 1.0, "{low} to {high}");
+        for text in [
+            "",
+            "3 of 4",
+            "{\"success\": 1}",
+            "{\"success\": 1.5, \"episodes\": 2}",
+            "{\"success\": 1, \"episodes\": 0}",
+        ] {
+            assert!(success_of(text).is_err(), "{text}");
+        }
     }
 
     #[test]

@@ -76,7 +76,6 @@ mod tests {
     use actq_jobs::figures::JobResult;
 
     use super::*;
-    use crate::report::frontiers;
 
     fn image(bits: f64, bytes: usize, nmse: f64) -> MergedImage {
         let image = JobResult {
@@ -115,8 +114,5 @@ mod tests {
         assert_eq!(words[4], ["distill", "4", "bits", "4000", "2.000", "2.00e-2", "4.000"]);
         assert!(text.contains("knee of arm: distill at 2500 bytes and 1.250 ms, NMSE 1.00e-2\n"), "{text}");
         assert!(text.contains("at 168 MHz on a Cortex-M4"), "{text}");
-        let svg = frontiers::svg(&merged);
-        assert!(svg.contains("flash of the image, kB") && svg.contains("knee: 2.5 kB, 1.250 ms"), "{svg}");
-        assert_eq!(svg.matches("stroke-width=\"20\" points").count(), 3, "a line in two panels and in the legend");
     }
 }

@@ -1,6 +1,4 @@
-//! The widths of an image's rows and the reasons for them: as a table, as text and as a picture.
-
-mod picture;
+//! The widths of an image's rows and the reasons for them: as a table and as text.
 
 use std::fmt::Write as _;
 
@@ -29,15 +27,7 @@ struct Row {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Reasons {
     energy: f64,
-    removal: f64,
     expected: f64,
-}
-
-impl Reasons {
-    /// Returns `true` if removing the row costs more than its own energy, as the columns that it feeds go with it.
-    fn is_removable(self) -> bool {
-        self.removal != self.energy
-    }
 }
 
 /// A matrix and its rows: with statistics, the rows of the trained matrix; without, those of the image, in the order of
@@ -54,7 +44,6 @@ struct Layer {
 /// The widths of all rows of an image.
 #[derive(Clone, Debug)]
 pub struct Widths {
-    policy: String,
     layers: Vec<Layer>,
     /// `true` if the rows are those of the trained matrices.
     trained: bool,
@@ -111,7 +100,7 @@ impl Widths {
             Ok(Layer { name: printable(&stats.name).into_owned(), shape: (stats.rows, stats.cols), rows, bytes })
         };
         let layers = matrices.iter().enumerate().map(layer).collect::<Result<_>>()?;
-        Ok(Self { policy: printable(image.name()).into_owned(), layers, trained: stats.is_some() })
+        Ok(Self { layers, trained: stats.is_some() })
     }
 
     /// Returns name and shape of a matrix, the bits of its rows, a digit each, and with statistics its share of the
@@ -206,9 +195,10 @@ fn row(stats: &MatrixRecord, r: usize) -> Result<Row> {
     let &bits = stats.widths.get(r).context("the statistics lack the width of a row")?;
     let width =
         if bits == 0 { None } else { Some(Width::from_bits(bits).context("the statistics hold an unknown width")?) };
-    let reasons = stats.allocation.as_ref().and_then(|a| {
-        Some(Reasons { energy: *a.energy.get(r)?, removal: *a.removal.get(r)?, expected: *a.expected.get(r)? })
-    });
+    let reasons = stats
+        .allocation
+        .as_ref()
+        .and_then(|a| Some(Reasons { energy: *a.energy.get(r)?, expected: *a.expected.get(r)? }));
     Ok(Row { width, reasons })
 }
 

@@ -85,6 +85,37 @@ impl Sweep {
     }
 }
 
+/// Checks the frontier in the report of an image of the store `whole`.
+fn report_shows_the_sweep(sweep: &Sweep, merged: &Value) -> Result<()> {
+    let folder = sweep.folder()?;
+    let images = merged["policies"][0]["images"].as_array().context("no images")?;
+    let own = images.iter().find(|image| !image["made"]["driven"].is_null()).context("no driven image")?;
+    let address = own["address"].as_str().context("no address")?;
+    succeeded(&sweep.run(&format!("report whole/{address}.actq --store whole --out report.html --quiet"), "")?)?;
+    let page = fs::read_to_string(folder.join("report.html"))?;
+    let data = page.split_once("id=\"data\">").and_then(|(_, rest)| rest.split_once("</script>")).context("no data")?;
+    let data: Value = serde_json::from_str(data.0)?;
+    let shown = data["sweep"]["images"].as_array().context("no sweep")?;
+    let made: Vec<&Value> = images.iter().map(|image| &image["made"]).filter(|made| !made.is_null()).collect();
+    let figures = |bytes: &Value, nmse: &Value| (bytes.as_u64(), nmse.as_f64());
+    let expected: Vec<_> = made.iter().map(|made| figures(&made["image"]["bytes"], &made["nmse"])).collect();
+    assert_eq!(shown.iter().map(|one| figures(&one["bytes"], &one["nmse"])).collect::<Vec<_>>(), expected);
+    let marked: Vec<&Value> = shown.iter().filter(|one| one["is_own"] == true).collect();
+    ensure!(!marked.is_empty() && marked.iter().all(|one| one["bytes"] == own["made"]["image"]["bytes"]), "{marked:?}");
+    assert_eq!(
+        (&data["success"][1], &data["success"][2]),
+        (&own["made"]["driven"]["episodes"], &own["made"]["interval"])
+    );
+    // A driven record of this image alone, and one that is none.
+    fs::write(folder.join("outcome.json"), "{\"success\": 0.25, \"episodes\": 8}\n")?;
+    fs::write(folder.join("none.json"), "{\"reward\": 1}\n")?;
+    let line = |file: &str| format!("report whole/{address}.actq --driven {file} --out driven.html --quiet");
+    failed(&sweep.run(&line("none.json"), "")?, 1, &["none.json", "episodes"])?;
+    succeeded(&sweep.run(&line("outcome.json"), "")?)?;
+    ensure!(fs::read_to_string(folder.join("driven.html"))?.contains("\"success\":[0.25,8,["), "no success");
+    Ok(())
+}
+
 /// Counts the results in a store.
 fn results(store: &Path) -> usize {
     let names = fs::read_dir(store).into_iter().flatten().flatten().map(|entry| entry.file_name());
@@ -137,11 +168,11 @@ fn interrupted_sweeps_resume_to_the_same_store() -> Result<()> {
     let table = succeeded(&sweep.run("sweep sweep.toml --store whole --threads 1 --quiet --json whole.json", "")?)?;
     ensure!(table.contains("distill, round 1") && table.contains("0.500"), "{table}");
     ensure!(results(&sweep.folder()?.join("whole")) == jobs, "one result a job");
-    let merged = succeeded(&sweep.run("merge sweep.toml --store whole --json merged.json --svg merged.svg", "")?)?;
+    let merged = succeeded(&sweep.run("merge sweep.toml --store whole --json merged.json", "")?)?;
     ensure!(merged == table, "{merged}");
     let read = |name: &str| -> Result<Vec<u8>> { Ok(fs::read(sweep.folder()?.join(name))?) };
     ensure!(read("merged.json")? == read("whole.json")?);
-    ensure!(String::from_utf8(read("merged.svg")?)?.contains("\nfrontier of all methods\n"));
+    report_shows_the_sweep(&sweep, &serde_json::from_slice(&read("merged.json")?)?)?;
     // `merge` only reads, also where the plan's last job has no result.
     let last: Value = serde_json::from_str(plan.lines().last().context("an empty plan")?)?;
     let address = last["address"].as_str().context("no address")?;

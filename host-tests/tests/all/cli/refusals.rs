@@ -30,8 +30,7 @@ fn outputs_are_refused_before_any_work() -> Result<()> {
             ["tune", &policy, "--drive", "true", "--out", bad].map(str::to_owned).to_vec(),
             ["tune", &policy, "--drive", "true", "--out", &good, "--json", bad].map(str::to_owned).to_vec(),
             ["tune", &policy, "--drive", "true", "--out", bad, "--keep", &kept].map(str::to_owned).to_vec(),
-            ["sweep", &policy, "--svg", bad].map(str::to_owned).to_vec(),
-            ["sweep", &policy, "--svg", &good, "--json", bad].map(str::to_owned).to_vec(),
+            ["sweep", &policy, "--json", bad].map(str::to_owned).to_vec(),
         ]
     };
     all(bad.iter().flat_map(|bad| commands(bad).map(|command| (bad, command))).map(|(bad, command)| {

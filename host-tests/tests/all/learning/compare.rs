@@ -65,8 +65,6 @@ fn a_comparison_runs_once_and_explains_impossible_cells() -> Result<()> {
         let row = format!("\n| {method} | {bytes} | {:.3} |\n", milliseconds.context("a time")?);
         ensure!(report.contains(&row), "{row:?} is not in\n{report}");
     }
-    let picture = fs::read_to_string(folder.join("compare.svg"))?;
-    ensure!(picture.contains("ur3: success over flash and over time (f32: 100%)"), "{picture}");
 
     // Nothing is left to do, and a missing result is the only one that runs again.
     let log = || fs::read_to_string(folder.join("log.jsonl"));

@@ -16,15 +16,15 @@ use super::host::Command;
 use super::plan;
 use crate::args::jobs::MergeArgs;
 use crate::outputs::files::Outputs;
-use crate::report::{frontiers, sweep_table};
+use crate::report::sweep_table;
 use crate::terminal::{note, print, reserve};
 
 /// Prints the results of a sweep.
 pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     let jobs = plan::read(&args.spec, &Command)?;
     let store = Store::open_existing(&args.store)?;
-    refuse_inside(&args.store, args.svg.iter().chain(&args.json))?;
-    let outputs = reserve(args.svg.iter().chain(&args.json), plan::inputs(&args.spec, &jobs))?;
+    refuse_inside(&args.store, &args.json)?;
+    let outputs = reserve(&args.json, plan::inputs(&args.spec, &jobs))?;
     let results = store.results(&jobs);
     let damaged = &results.damaged;
     note(damaged.iter().map(|damage| format!("{damage:#}")));
@@ -45,7 +45,7 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
         args.spec.display(),
         args.store.display()
     );
-    report(&jobs, &|address| results.get(address), outputs, args.svg.is_some(), args.json.is_some())
+    report(&jobs, &|address| results.get(address), outputs, args.json.is_some())
 }
 
 /// Prints the rows of a plan whose images and errors are in the store, after some jobs have failed.
@@ -72,13 +72,12 @@ pub(crate) fn refuse_inside<'a>(store: &Path, outputs: impl IntoIterator<Item = 
     Ok(())
 }
 
-/// Prints the results of a plan that are in the store, and writes the outputs: a plot, then figures as JSON.
-pub(crate) fn report(jobs: &[Job], read: Read<'_>, outputs: Outputs, svg: bool, json: bool) -> Result<()> {
+/// Prints the results of a plan that are in the store, and writes its figures as JSON.
+pub(crate) fn report(jobs: &[Job], read: Read<'_>, outputs: Outputs, json: bool) -> Result<()> {
     let merged = merged(jobs, read)?;
     print(&sweep_table::report(&merged))?;
-    let svg = svg.then(|| frontiers::svg(&merged));
     let json = if json { Some(serde_json::to_string_pretty(&merged)? + "\n") } else { None };
-    outputs.write(&svg.into_iter().chain(json).collect::<Vec<_>>())
+    outputs.write(&json.into_iter().collect::<Vec<_>>())
 }
 
 /// Returns the plan's job of kind merge.

@@ -53,7 +53,6 @@ const actionNames = names(facts.ports.filter((port) => !isInput(port)), facts.ac
 function figures(entries) {
   return el("dl", { class: "figures" }, ...entries.filter(Boolean).map(([name, text]) => el("div", {}, el("dt", {}, name), el("dd", {}, text))));
 }
-const ownSweep = sweep?.images.find((image) => image.is_own);
 const [nmse, measured] = runs?.nmse ?? [null, runs?.compared];
 function trust() {
   const sentences = [];
@@ -63,7 +62,7 @@ function trust() {
   } else {
     sentences.push("No error is shown: the report was made without the policy and a recording.");
   }
-  sentences.push(ownSweep?.success ? "Success was measured in closed loop." : "An error on recordings does not replace a test in closed loop.");
+  sentences.push(data.success ? "Success was measured in closed loop." : "An error on recordings does not replace a test in closed loop.");
   sentences.push(facts.time ? "Times are predicted by a model of a Cortex-M4F with memory that never waits; nothing here was measured on hardware." : "No time is predicted for these layouts.");
   return sentences.join(" ");
 }
@@ -81,8 +80,8 @@ document.getElementById("top").append(
     ["scratch RAM", `${integer(facts.scratch)} B`],
     runs && ["action error (NMSE)", error(nmse ?? mean(runs.actions.map(([ratio]) => ratio)))],
     data.own_path && ["error on its own path", error(data.own_path[0])],
-    ownSweep?.success && ["success", `${percent(ownSweep.success[0])} of ${ownSweep.success[1]}`],
-    ownSweep?.success && ["95 % interval", ownSweep.success[2].map(percent).join(" to ")],
+    data.success && ["success", `${percent(data.success[0])} of ${data.success[1]}`],
+    data.success && ["95 % interval", data.success[2].map(percent).join(" to ")],
   ]),
   el("p", { id: "trust" }, trust()),
   el("p", { class: "soft mono" }, `sha256 ${facts.sha256}`),
@@ -137,28 +136,32 @@ const PALETTE = ["var(--image)", "var(--b8)", "var(--b3)", "var(--b4)", "#cc79a7
 if (sweep?.images.length) {
   const curves = [...new Set(sweep.images.map(({ curve }) => curve))];
   const marks = ["M-5,0a5,5 0 1,0 10,0a5,5 0 1,0 -10,0", "M-5,-5h10v10h-10z", "M0,-6l6,10h-12z", "M0,-7l6,7l-6,7l-6,-7z", "M-6,-2h4v-4h4v4h4v4h-4v4h-4v-4h-4z"];
-  const panel = (key, name) => chart({
-    width: fitting(560), label: `Error over ${name}`, x: { ...range(sweep.images.map((image) => image[key])), name }, y: range(sweep.images.map((image) => Math.max(image.nmse, 1e-14)), true),
+  const errors = { name: "Error", of: (image) => Math.max(image.nmse, 1e-14), axis: range(sweep.images.map((image) => Math.max(image.nmse, 1e-14)), true), isOn: (image) => image.is_frontier };
+  const successes = { name: "Success in percent", of: (image) => 100 * image.success[0], axis: { min: 0, max: 105 }, isOn: (image) => image.is_success_frontier };
+  const driven = sweep.images.filter((image) => image.success);
+  const panel = (images, measure, key, name) => chart({
+    width: fitting(560), label: `${measure.name} over ${name}`, x: { ...range(sweep.images.map((image) => image[key])), name }, y: measure.axis,
     draw(root, sx, sy) {
-      const at = (image) => [sx(image[key]), sy(Math.max(image.nmse, 1e-14))];
-      const line = sweep.images.filter((image) => image.is_frontier).sort((a, b) => a[key] - b[key]).map((image) => at(image).join(",")).join(" ");
+      const at = (image) => [sx(image[key]), sy(measure.of(image))];
+      const line = images.filter(measure.isOn).sort((a, b) => a[key] - b[key]).map((image) => at(image).join(",")).join(" ");
       root.append(svg("polyline", { points: line, fill: "none", stroke: "var(--soft)", "stroke-width": 1.5 }));
-      for (const image of sweep.images) {
+      for (const image of images) {
         const [px, py] = at(image);
         const which = curves.indexOf(image.curve);
         const mark = svg("path", { d: marks[which % marks.length], transform: `translate(${px},${py})`, fill: PALETTE[which % PALETTE.length] });
-        mark.append(svg("title", {}, `${image.curve}: ${integer(image.bytes)} B, ${image.milliseconds.toFixed(3)} ms, NMSE ${error(image.nmse)}`));
+        mark.append(svg("title", {}, `${image.curve}: ${integer(image.bytes)} B, ${image.milliseconds.toFixed(3)} ms, NMSE ${error(image.nmse)}${image.success ? `, success ${percent(image.success[0])}` : ""}`));
         root.append(mark);
         if (image.is_own) root.append(svg("circle", { cx: px, cy: py, r: 10, fill: "none", stroke: "var(--focus)", "stroke-width": 2.5 }), svg("text", { x: px + 14, y: py + 4 }, "this image"));
       }
     },
   });
   const place = el("div", { class: "two" });
-  const draw = () => place.replaceChildren(panel("bytes", "bytes of flash"), panel("milliseconds", `predicted ms, Cortex-M4F at ${sweep.clock_hz / 1e6} MHz`));
+  const both = (images, measure) => [panel(images, measure, "bytes", "bytes of flash"), panel(images, measure, "milliseconds", `predicted ms, Cortex-M4F at ${sweep.clock_hz / 1e6} MHz`)];
+  const draw = () => place.replaceChildren(...both(sweep.images, errors), ...(driven.length ? both(driven, successes) : []));
   draw();
   drawn.push(draw);
   const rows = sweep.images.map((image) => [image.curve + (image.is_own ? " (this image)" : ""), integer(image.bytes), image.milliseconds.toFixed(3), error(image.nmse), image.success ? percent(image.success[0]) : "-"]);
-  section("frontier", "Frontier", el("p", {}, "Each mark is an image of the sweep; the line joins those that no other image beats in bytes and error. The vertical axis is the NMSE of the actions on held-out observations."),
+  section("frontier", "Frontier", el("p", {}, "Each mark is an image of the sweep; the line joins those that no other image beats in bytes and error. The vertical axis is the NMSE of the actions on held-out observations." + (driven.length ? " Below, it is the success in closed loop, in percent of the episodes." : "")),
     legend(curves.map((name, i) => [name, PALETTE[i % PALETTE.length]])),
     place,
     el("details", {}, el("summary", {}, "As a table"), table(["curve", "bytes", "ms", "NMSE", "success"], rows, [1, 2, 3, 4])));
