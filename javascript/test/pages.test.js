@@ -53,6 +53,20 @@ test("a report has its sections, the bits of the host, and no error", { skip }, 
   assert.deepEqual(problems, []);
 });
 
+test("the diagram of a bundle leads from its raw inputs to its targets", { skip }, async () => {
+  const { page, problems } = await open("bundle.html");
+  const facts = JSON.parse(await page.textContent("#data")).facts;
+  const texts = await page.locator("#around svg text").allTextContents();
+  for (const { name } of facts.ports) assert.ok(texts.some((text) => text.startsWith(name)), `${name} is not in ${texts}`);
+  assert.ok(texts.some((text) => text.startsWith("network")), texts.join());
+  // Every box but an input is the end of a line.
+  const [boxes, lines] = [await page.locator("#around svg rect").count(), await page.locator("#around svg path").count()];
+  assert.ok(boxes > facts.ports.length && lines >= boxes - facts.ports.length, `${boxes} boxes, ${lines} lines`);
+  assert.equal(await page.getAttribute("#bits", "data-equal"), "true", await page.textContent("#bits"));
+  assert.doesNotMatch(await page.innerText("main"), /NaN|undefined|\[object/);
+  assert.deepEqual(problems, []);
+});
+
 test("a slider moves the actions of both policies", { skip }, async () => {
   const { page, problems } = await open("report.html");
   const actions = () => page.locator("#live td.n").allTextContents();
@@ -76,7 +90,7 @@ test("names with markup stay text", { skip }, async () => {
 for (const width of [1400, 390]) {
   for (const colorScheme of ["light", "dark"]) {
     test(`pages fit ${width} pixels, ${colorScheme}`, { skip }, async () => {
-      for (const name of ["report.html", "index.html"]) {
+      for (const name of ["report.html", "bundle.html", "index.html"]) {
         const { page, problems } = await open(name, { width, colorScheme });
         const [wide, smallest] = await page.evaluate(() => [
           document.documentElement.scrollWidth - document.documentElement.clientWidth,

@@ -1,9 +1,12 @@
 //! An image's properties.
 
+use std::collections::BTreeSet;
+
 use actq::measure::size::{Beside, bits_per_weight, file_bits_per_weight, hex};
 use actq::measure::time::StepTime;
 use actq::pipeline::stats::Stats;
 use actq::text::printable;
+use actq_kernels::image::{Op, OpKind, Region};
 use actq_kernels::{Image, Port, PortKind};
 use anyhow::Result;
 use serde::Serialize;
@@ -82,6 +85,8 @@ pub struct PortFacts {
     pub len: usize,
     /// Lowest and highest value, if limited.
     pub range: [Option<f32>; 2],
+    /// Of targets: the operations that give their values. See [`OpFacts::from`].
+    pub from: Vec<usize>,
 }
 
 /// An operation.
@@ -97,6 +102,9 @@ pub struct OpFacts {
     pub cycles: u64,
     /// Index of its matrix.
     pub matrix: Option<usize>,
+    /// The raw inputs and operations that its values come from in the same step. Inputs have the first numbers,
+    /// operations those after.
+    pub from: Vec<usize>,
 }
 
 /// A matrix.
@@ -137,12 +145,22 @@ impl Facts {
             places.iter().position(|place| *place == own)
         };
         let is_timed = is_modelled(image);
+        let mut flow = Flow::new(image);
         let ops = image.ops().zip(&step.ops).map(|(op, time)| OpFacts {
             name: op.kind.name().to_owned(),
             detail: row(&op).swap_remove(3),
             output: op.dst().len,
             cycles: if is_timed { time.cycles } else { 0 },
             matrix: place(&op),
+            from: flow.next(&op),
+        });
+        let ops: Vec<OpFacts> = ops.collect();
+        let mut at = image.output().offset;
+        let ports = image.ports().map(|port| {
+            let is_target = port.kind != PortKind::Input;
+            let region = Region { offset: at, len: if is_target { port.len } else { 0 } };
+            at += region.len;
+            PortFacts::new(&port, flow.writers(region))
         });
         let Beside { biases, self_test, tables } = Beside::of(image);
         let contract = CONTRACT.into_iter().zip(image.contract_arrays());
@@ -167,8 +185,8 @@ impl Facts {
             features: image.features().collect(),
             playback: playback(image),
             self_test: image.self_test_steps(),
-            ports: image.ports().map(|port| PortFacts::new(&port)).collect(),
-            ops: ops.collect(),
+            ports: ports.collect(),
+            ops,
             matrices: distinct.iter().enumerate().map(|(i, matrix)| MatrixFacts::new(matrix, &widths, i)).collect(),
             is_trained: stats.is_some(),
             contract: contract
@@ -181,7 +199,7 @@ impl Facts {
 }
 
 impl PortFacts {
-    fn new(port: &Port<'_>) -> Self {
+    fn new(port: &Port<'_>, from: Vec<usize>) -> Self {
         let kind = match port.kind {
             PortKind::Input => "input",
             PortKind::Position => "positions",
@@ -195,7 +213,57 @@ impl PortFacts {
             names: port.names.lines().map(|name| printable(name).into_owned()).collect(),
             len: port.len,
             range: port.range.map(|limit| limit.is_finite().then_some(limit)),
+            from,
         }
+    }
+}
+
+/// Follows values through the arena: what wrote each word last.
+struct Flow {
+    last: Vec<Option<usize>>,
+    next: usize,
+}
+
+impl Flow {
+    /// Places the raw inputs.
+    fn new(image: &Image<'_>) -> Self {
+        let mut flow = Self { last: vec![None; image.scratch_words()], next: 0 };
+        let mut offset = image.observation().offset;
+        for port in image.ports().filter(|port| port.kind == PortKind::Input) {
+            flow.write(Region { offset, len: port.len });
+            offset += port.len;
+            flow.next += 1;
+        }
+        flow
+    }
+
+    fn write(&mut self, region: Region) {
+        self.last.get_mut(region.range()).into_iter().flatten().for_each(|word| *word = Some(self.next));
+    }
+
+    /// Returns what wrote the words of a region; words of an earlier step are left out.
+    fn writers(&self, region: Region) -> Vec<usize> {
+        let words = self.last.get(region.range()).unwrap_or_default();
+        words.iter().flatten().copied().collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
+    /// Follows the next operation, and returns what it reads.
+    fn next(&mut self, op: &Op<'_>) -> Vec<usize> {
+        let (dst, third) = (op.dst(), op.third());
+        let mut from: BTreeSet<usize> = self.writers(op.src()).into_iter().collect();
+        if op.reads_dst() {
+            from.extend(self.writers(dst));
+        }
+        // A linear operation works there.
+        if op.matrix().is_none() {
+            from.extend(self.writers(third));
+        }
+        self.write(dst);
+        if matches!(op.kind, OpKind::LstmCell | OpKind::Denoise | OpKind::Standstill) {
+            self.write(third);
+        }
+        self.next += 1;
+        from.into_iter().collect()
     }
 }
 

@@ -396,15 +396,81 @@ async function start() {
     el("p", { class: "soft" }, `The runtime is the code that checks and runs any image, ${integer(facts.runtime)} bytes on a Cortex-M4F; a build for this image alone is smaller, and other cores differ. The image has ${integer(facts.beside[0])} bytes of biases, ${integer(facts.beside[1])} of self-test and ${integer(facts.beside[2])} of header and tables.`));
 }
 
-// f. The operations around the network.
-if (facts.ports.length) {
+// f. Raw inputs to targets: a graph of what each value comes from, in columns by its distance from the inputs.
+function flow() {
+  const inputs = facts.ports.filter(isInput);
+  const targets = facts.ports.filter((port) => !isInput(port));
   const isNetwork = (op) => op.matrix !== null;
   const [first, last] = [facts.ops.findIndex(isNetwork), facts.ops.findLastIndex(isNetwork)];
-  const port = ({ kind, name, names, len, range: [low, high] }) => el("div", {}, el("strong", {}, name), ` (${kind}, ${len})`, low !== null || high !== null ? el("div", { class: "soft" }, `${low ?? "-"} to ${high ?? "-"}`) : "", names.length ? el("ol", { start: "0" }, ...names.map((joint) => el("li", {}, joint))) : "");
-  const ops = (list) => el("ol", {}, ...list.map((op) => el("li", {}, `${op.name} ${op.detail} \u2192 ${op.output}`)));
-  const column = (title, ...content) => el("div", {}, el("h3", { style: "margin-top:0" }, title), ...content);
-  section("around", "Raw inputs to targets", el("p", {}, "The values of the robot, the operations around the network, and its targets, read from the image."),
-    el("div", { class: "flow" }, column("Raw inputs", ...facts.ports.filter(isInput).map(port)), column("Before the network", ops(first < 0 ? facts.ops : facts.ops.slice(0, first))), column("Network", el("p", {}, `${facts.matrices.length} matrices`)), column("After the network", ops(first < 0 ? [] : facts.ops.slice(last + 1))), column("Targets", ...facts.ports.filter((p) => !isInput(p)).map(port))));
+  const length = (n) => `${n} value${n === 1 ? "" : "s"}`;
+  const nodes = [];
+  const node = (kind, lines, from) => nodes.push({ kind, lines, from: [...new Set(from)].filter((n) => n !== undefined), to: 0 }) - 1;
+  // The nodes that have the values of each input and operation; copies have those of what they copy.
+  const places = inputs.map(({ name, len, names }) => [node("port", [[name, length(len)], ...names.map((joint, i) => [`${i} ${joint}`])], [])]);
+  const network = { lines: [["network", `${facts.matrices.length} matrices`]], from: [], id: undefined };
+  const text = ({ name, detail, output }) => {
+    const clip = name === "normalize" ? detail.split(" ").slice(1, 3).filter((limit) => Number.isFinite(parseFloat(limit))) : [];
+    return [name === "normalize" ? `normalize${clip.length ? `, clip \u00b1${parseFloat(clip[0])}` : ""}` : `${name} ${name === "history" || name === "function" ? detail : ""}`, length(output)];
+  };
+  facts.ops.forEach((op, i) => {
+    const from = op.from.flatMap((n) => places[n] ?? []);
+    if (first >= 0 && i >= first && i <= last) {
+      network.id ??= node("network", network.lines, []);
+      nodes[network.id].from = [...new Set([...nodes[network.id].from, ...from])].filter((n) => n !== network.id);
+      places.push([network.id]);
+    } else if (op.name === "copy" || op.name === "select" || op.detail.endsWith("by the quantizer")) {
+      places.push(from);
+    } else if (from.length === 1 && nodes[from[0]].last !== undefined && op.from.every((n) => n === nodes[from[0]].last)) {
+      // The next operation on all values of a box is a line of the same box.
+      nodes[from[0]].lines.push(text(op));
+      nodes[from[0]].last = places.push(from) - 1;
+    } else {
+      const id = node("op", [text(op)], from);
+      nodes[id].last = places.push([id]) - 1;
+    }
+  });
+  targets.forEach(({ kind, name, len, names, from }) => node("port", [[`${name} (${kind})`, length(len)], ...names.map((joint, i) => [`${i} ${joint}`])], from.flatMap((n) => places[n] ?? [])));
+  // Columns and rows.
+  const depth = (n) => (nodes[n].depth ??= nodes[n].from.reduce((most, from) => Math.max(most, depth(from) + 1), 0));
+  nodes.forEach((_, n) => depth(n));
+  const columns = [];
+  nodes.forEach((one) => (columns[one.depth] ??= []).push(one));
+  const [line, pad, gap, wide, space] = [18, 8, 12, 176, 48];
+  let bottom = 0;
+  columns.filter(Boolean).forEach((column, c) => {
+    const middle = (one) => (one.from.length ? one.from.reduce((sum, n) => sum + nodes[n].y + nodes[n].height / 2, 0) / one.from.length : 0);
+    column.sort((a, b) => middle(a) - middle(b));
+    let y = 0;
+    for (const one of column) {
+      [one.x, one.height] = [c * (wide + space), one.lines.length * line + 2 * pad];
+      one.y = Math.max(y, c ? middle(one) - one.height / 2 : 0);
+      y = one.y + one.height + gap;
+    }
+    bottom = Math.max(bottom, y);
+  });
+  const width = columns.filter(Boolean).length * (wide + space) - space;
+  const root = svg("svg", { viewBox: `-1 -1 ${width + 2} ${bottom + 2}`, width: width + 2, height: bottom + 2, role: "img", "aria-label": "Raw inputs, operations around the network, and targets", style: "max-width:none" });
+  for (const one of nodes) for (const n of one.from) {
+    const from = nodes[n];
+    const [x0, y0, x1, y1] = [from.x + wide, from.y + from.height / 2, one.x, one.y + one.height / 2];
+    root.append(svg("path", { d: `M${x0},${y0}C${x0 + space / 2},${y0} ${x1 - space / 2},${y1} ${x1},${y1}`, fill: "none", stroke: "var(--soft)", "stroke-width": 1.2 }));
+  }
+  for (const { kind, lines, x, y, height } of nodes) {
+    root.append(svg("rect", { x, y, width: wide, height, rx: 6, fill: "var(--card)", stroke: kind === "op" ? "var(--line)" : kind === "network" ? "var(--image)" : "var(--focus)", "stroke-width": 1.5 }));
+    lines.forEach(([name, size], i) => {
+      const shown = name.length > 26 ? `${name.slice(0, 25)}\u2026` : name;
+      const label = svg("text", { x: x + 8, y: y + pad + 13 + i * line, class: i && kind !== "op" ? "soft" : "" }, size ? `${shown.trim()}` : shown);
+      label.append(svg("title", {}, size ? `${name}, ${size}` : name));
+      root.append(label);
+      if (size && shown.length < 20) root.append(svg("text", { x: x + wide - 8, y: y + pad + 13 + i * line, "text-anchor": "end", class: "soft" }, size.split(" ")[0]));
+    });
+  }
+  return el("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Diagram" }, root);
+}
+if (facts.ports.length) {
+  const list = ({ kind, name, len, names, range: [low, high] }) => [name, kind, integer(len), low !== null || high !== null ? `${low ?? "-"} to ${high ?? "-"}` : "-", names.join(", ")];
+  section("around", "Raw inputs to targets", el("p", {}, "The values of the robot, the operations around the network and its targets, read from the image; a number is that of values. Copies are lines. What a history keeps from earlier steps is not drawn."), flow(),
+    el("details", {}, el("summary", {}, "As tables"), table(["values", "kind", "count", "range", "names"], facts.ports.map(list), [2]), table(["operation", "detail", "values"], facts.ops.map((op) => [op.name, op.detail, integer(op.output)]), [2])));
 }
 
 // g. The contract and the provenance.

@@ -77,22 +77,25 @@ pub(crate) fn build(folder: &Path, robots: &Path, quick: bool) -> Result<()> {
     let path = folder.join("index.html");
     files::write(&path, filled(HTML, &parts).as_bytes())?;
     println!("{}: open it in a browser", path.display());
-    if quick { reports(folder) } else { Ok(()) }
+    if quick { reports(folder, &bundle) } else { Ok(()) }
 }
 
 /// A name that a page must show as it is.
 const MARKUP: &str = "</script><img src=x onerror=alert(1)>";
 
-/// Writes two reports, for the tests in a browser: of the arm's policy at 2 bits, and of one whose name is markup.
-fn reports(folder: &Path) -> Result<()> {
+/// Writes three reports, for the tests in a browser: of the arm's policy at 2 bits, of one whose name is markup, and of
+/// a bundle.
+fn reports(folder: &Path, bundle: &Policy) -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W2));
     let write = |name: &str, policy: &Policy, source: Option<&Policy>| -> Result<()> {
         let quantized = pipeline::quantize(policy, &Recordings::default(), &options, ())?;
-        let page = report::of_image(&quantized.buffer(), Path::new(name), source, &[])?;
+        let buffer = ImageBuffer::new(&quantized.whole_image()?);
+        let page = report::of_image(&buffer, Path::new(name), source, &[])?;
         files::write(&folder.join(name), page.as_bytes())
     };
     write("report.html", &policy, Some(&policy))?;
+    write("bundle.html", bundle, Some(bundle))?;
     write("markup.html", &Policy { name: MARKUP.to_owned(), ..policy.clone() }, None)
 }
 
