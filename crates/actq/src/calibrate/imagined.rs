@@ -25,7 +25,7 @@ use crate::random::Random;
 const STEPS: usize = 50;
 /// Most observations of all rollouts, and most multiplications for them.
 const MAX_FRAMES: usize = 32_768;
-const MAX_MULTIPLICATIONS: usize = 1 << 34;
+const MAX_MULTIPLICATIONS: u64 = 1 << 34;
 /// Most values of an observation and an answer together; the time of the fit grows with their cube.
 const MAX_VALUES: usize = 1_024;
 /// Share of the next observation's variance above which the model's rollouts are learned from. What it predicts beyond
@@ -136,7 +136,8 @@ impl Recorded<'_> {
         let longest = episodes.iter().map(Array2::nrows).max().unwrap_or(0);
         let steps = if is_recurrent { window } else { STEPS.min(longest) };
         let work = graph.obs_len * (model.observation.len() + model.answer.len()) + graph.weights();
-        let count = MAX_FRAMES.min(MAX_MULTIPLICATIONS / work.max(1)) / steps.max(1);
+        let affordable = usize::try_from(MAX_MULTIPLICATIONS / work.max(1) as u64).unwrap_or(usize::MAX);
+        let count = MAX_FRAMES.min(affordable) / steps.max(1);
         let mut branches: Vec<Branch> = (0..count).map(|_| Branch::draw(self, model, steps, random)).collect();
         let mut state = zero_state(graph, count);
         for (sample, branch) in branches.iter().enumerate().filter(|_| is_recurrent) {

@@ -12,11 +12,11 @@ use crate::policy::Policy;
 
 /// Most MACs of a run over the calibration recording, about half a second of the executor on a host; a longer recording
 /// is thinned.
-const MAX_MACS: usize = 600_000_000;
+const MAX_MACS: u64 = 600_000_000;
 
 /// Most MACs of a run over the held-out recording: all but the longest recordings then give the same error as `actq
 /// eval`.
-const MAX_HELDOUT_MACS: usize = 20_000_000_000;
+const MAX_HELDOUT_MACS: u64 = 20_000_000_000;
 
 /// Frames that are always kept: an iterative head runs its network many times for each.
 const MIN_FRAMES: usize = 200;
@@ -95,9 +95,10 @@ pub(crate) fn compared(graph: &Graph, dataset: &Dataset) -> Dataset {
     thinned(graph, dataset, MAX_MACS)
 }
 
-fn thinned(graph: &Graph, dataset: &Dataset, most: usize) -> Dataset {
-    let macs = graph.weights().max(1) * graph.denoising_steps();
-    let mut dataset = dataset.thinned((most / macs).max(MIN_FRAMES), graph.state_len() > 0).into_owned();
+fn thinned(graph: &Graph, dataset: &Dataset, most: u64) -> Dataset {
+    let macs = graph.weights().max(1) as u64 * graph.denoising_steps() as u64;
+    let frames = usize::try_from(most / macs).unwrap_or(usize::MAX);
+    let mut dataset = dataset.thinned(frames.max(MIN_FRAMES), graph.state_len() > 0).into_owned();
     dataset.fill_actions(graph);
     dataset
 }
@@ -111,7 +112,7 @@ pub fn check(
     method: &Method,
     held_out: Option<HeldOut>,
 ) -> Result<Option<Check>> {
-    let checked = |whole: Option<&Dataset>, most: usize| -> Result<Option<(Dataset, Checked)>> {
+    let checked = |whole: Option<&Dataset>, most: u64| -> Result<Option<(Dataset, Checked)>> {
         let Some(whole) = whole else { return Ok(None) };
         let compared = thinned(&source.graph, whole, most);
         let report = eval::evaluate(image, &compared)?;
