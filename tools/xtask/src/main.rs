@@ -87,7 +87,7 @@ enum Command {
     /// Measure the cost model's rates again (after every change of the kernels)
     #[command(disable_help_flag = true)]
     Fit(Words),
-    /// Measure an MLP on every core in QEMU
+    /// Measure our code and that of other projects on every core in QEMU
     #[command(disable_help_flag = true)]
     Peers(Words),
     /// Package the C interface for a core
@@ -118,7 +118,9 @@ fn main() -> ExitCode {
         Command::Bench(options) => measure(&[Target::Fpu], "bench", options),
         Command::Descriptions(options) => measure(&[Target::Fpu], "descriptions", options),
         Command::Faults(options) => measure(&[Target::Fpu], "faults", options),
-        Command::Peers(options) => measure(&[Target::Fpu, Target::NoDsp, Target::V6m, Target::Riscv], "peers", options),
+        Command::Peers(options) => {
+            measure(&[Target::Fpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M33], "peers", options)
+        }
         Command::Fit(options) => measure(&[Target::Fpu], "fit", options),
         Command::Budgets(options) => measure(&[Target::Fpu, Target::M33], "budgets", options),
     };

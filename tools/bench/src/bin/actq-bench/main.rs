@@ -90,11 +90,21 @@ enum Command {
         #[arg(long, conflicts_with = "board")]
         elf: Option<PathBuf>,
     },
-    /// Measure an MLP of 48-512-256-128-12 on every core in QEMU: instructions, scratch, stack, code
+    /// Measure networks on every core in QEMU, with our code and that of other projects
+    ///
+    /// Installs pinned public packages in a temporary folder, builds them and ours with gcc, clang and rustc, keeps each
+    /// one's fastest form, and checks its outputs against f64. Networks: a layer of 256x256; an MLP of 48-512-256-128-12
+    /// with ReLU and ELU; a GRU of 48 inputs and 128 units. Needs Python with pip, and names what else is missing.
     Peers {
-        /// Only our own rows, which need neither a C compiler nor a network
+        /// Only our own images, by the harness in Rust, which needs neither Python nor a C compiler nor a connection
         #[arg(long)]
         ours: bool,
+        /// Keep packages and programs in this folder, and use packages that are already there
+        #[arg(long, value_name = "DIR", conflicts_with = "ours")]
+        folder: Option<PathBuf>,
+        /// Only rows in whose core, network and peer all of these are, as: m4f CMSIS
+        #[arg(conflicts_with = "ours")]
+        words: Vec<String>,
         /// Write the rows as JSON: a list of objects
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
@@ -154,7 +164,7 @@ fn main() -> ExitCode {
         Command::Budgets { update } => budgets::run(update),
         Command::Fit => fit::run(),
         Command::Gallery { out, robots, quick } => gallery::build(&out, &robots, quick),
-        Command::Peers { ours, json } => peers::run(ours, json.as_deref()),
+        Command::Peers { ours, folder, words, json } => peers::run(ours, &words, folder.as_deref(), json.as_deref()),
         Command::Capi { target, out, image, compact } => capi(&target, &out, image.as_deref(), compact),
         Command::Stack { board: Some(board), .. } => stack::of_board(&board),
         Command::Stack { elf, .. } => stack::show(&elf.unwrap_or_default()),

@@ -1,24 +1,23 @@
-//! An MLP on every core: instructions, memory and code of our own rows.
+//! Networks on every core: instructions, memory and code of our own images, and of other projects' code.
+
+mod cases;
+mod compilers;
+mod others;
 
 use std::fs;
 use std::path::Path;
 
 use actq::emit::{Core, repack};
-use actq::graph::ops::{Linear, Pointwise};
-use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
 use actq_bench::firmware::{harness_for, kernel_bytes};
-use actq_bench::networks::Builder;
 use actq_bench::qemu::{self, Counter};
 use actq_cli::report::table::table;
 use actq_kernels::Width;
-use actq_kernels::math::Function;
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result};
 use serde::Serialize;
 
-/// Lengths of the values: those of a policy that walks a Go1.
-const LENGTHS: [usize; 5] = [48, 512, 256, 128, 12];
+use cases::CASES;
 
 /// Cores that run in QEMU, with the harness of a board.
 const CORES: [(&str, Core, Target); 4] = [
@@ -38,7 +37,7 @@ const SKIPPED: [(&str, &str); 2] = [
 #[derive(Debug, Serialize)]
 struct Row {
     core: &'static str,
-    function: &'static str,
+    network: &'static str,
     bits: u32,
     /// Instructions of a step.
     instructions: u64,
@@ -51,35 +50,50 @@ struct Row {
     code: u64,
 }
 
-/// Measures all rows, prints them, and writes them to `json`. Rows of other projects are not measured.
-pub(crate) fn run(ours: bool, json: Option<&Path>) -> Result<()> {
-    ensure!(ours, "only our own rows can be measured; pass --ours");
+/// Measures all rows, prints them, and writes them to `json`: `ours` alone, or all projects' in `folder`, which is a
+/// temporary one if it is not given.
+pub(crate) fn run(ours: bool, words: &[String], folder: Option<&Path>, json: Option<&Path>) -> Result<()> {
+    let rows = if ours {
+        serde_json::to_value(own()?)?
+    } else {
+        let temporary = tempfile::tempdir()?;
+        others::measure(folder.unwrap_or(temporary.path()), words)?
+    };
+    if let Some(path) = json {
+        let text = serde_json::to_string_pretty(&rows)? + "\n";
+        fs::write(path, text).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+/// Measures our own rows, and prints them.
+fn own() -> Result<Vec<Row>> {
     for (core, why) in SKIPPED {
         eprintln!("{core}: skipped: {why}");
     }
     let counter = Counter::build()?;
     let mut rows = Vec::new();
     for (name, core, target) in CORES {
-        for (function, kind) in [("relu", Function::Relu), ("elu", Function::Elu)] {
+        for case in &CASES {
             for width in Width::ALL {
-                let bytes = repack(&mlp(kind, width)?, core)?;
+                let bytes = repack(&case.quantized(width)?.0.image, core)?;
                 let buffer = ImageBuffer::new(&bytes);
-                let scratch = 4 * buffer.image(Path::new("mlp"))?.scratch_words();
+                let scratch = 4 * buffer.image(Path::new(case.name))?.scratch_words();
                 let file = qemu::slot(&bytes)?;
                 let (elf, slot) = harness_for(target, file.path())?;
                 let (_, regions) = counter.run(target, &elf, slot, &[])?;
                 let instructions = regions.first().context("the harness has run no step")?.instructions;
                 let (code, stack) = (kernel_bytes(&elf)?, stack(target, &elf, slot)?);
-                let macs = LENGTHS.windows(2).map(|pair| pair[0] * pair[1]).sum();
-                rows.push(Row { core: name, function, bits: width.bits(), instructions, macs, scratch, stack, code });
+                let (network, macs, bits) = (case.name, case.macs(), width.bits());
+                rows.push(Row { core: name, network, bits, instructions, macs, scratch, stack, code });
             }
         }
     }
-    let mut shown = table(&["core", "function", "bits", "instructions", "per MAC", "scratch", "stack", "code"]);
+    let mut shown = table(&["core", "network", "bits", "instructions", "per MAC", "scratch", "stack", "code"]);
     for row in &rows {
         shown.add_row([
             row.core.to_owned(),
-            row.function.to_owned(),
+            row.network.to_owned(),
             row.bits.to_string(),
             row.instructions.to_string(),
             format!("{:.3}", row.instructions as f64 / row.macs as f64),
@@ -89,27 +103,7 @@ pub(crate) fn run(ours: bool, json: Option<&Path>) -> Result<()> {
         ]);
     }
     println!("{shown}");
-    if let Some(path) = json {
-        let text = serde_json::to_string_pretty(&rows)? + "\n";
-        fs::write(path, text).with_context(|| path.display().to_string())?;
-    }
-    Ok(())
-}
-
-/// Returns the image of the network with random weights, row scales and int8 activations.
-fn mlp(function: Function, width: Width) -> Result<Vec<u8>> {
-    let mut builder = Builder::new(LENGTHS[0]);
-    let mut value = 0;
-    for (i, pair) in LENGTHS.windows(2).enumerate() {
-        let (rows, cols) = (pair[1], pair[0]);
-        let matrix = builder.matrix(rows, cols, Activations::Int8, &vec![Some(width); rows], 0)?;
-        let bias = builder.values(rows);
-        value = builder.node(Linear { matrix, bias }, &[value])?;
-        if i + 2 < LENGTHS.len() {
-            value = builder.node(Pointwise(function), &[value])?;
-        }
-    }
-    builder.image("mlp")
+    Ok(rows)
 }
 
 /// Returns the bytes of stack that a step takes, which the harness prints; `None` on cores whose stack it cannot read.
