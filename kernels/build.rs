@@ -1,11 +1,14 @@
 //! Detects the backends of the target; `src/arch/mod.rs` chooses one. Stable rustc does not report `target_feature =
 //! "dsp"`, so the target's name decides. For Armv8-M, where the extension is optional, the processor that the build
-//! names (`-C target-cpu=cortex-m33`) decides, unless it excludes the extension (`-C target-feature=-dsp`).
+//! names (`-C target-cpu=cortex-m33`) decides, unless it excludes the extension (`-C target-feature=-dsp`). A processor
+//! with Helium is refused unless rustc may not use Helium (`-C target-feature=-mve`).
 //! `actq_kernels::BACKEND` is the backend of the build. The environment variable `ACTQ_BACKEND=portable` excludes the
 //! assembler, for comparisons and for builds without assembler.
 
 /// Armv8-M processors with the DSP extension, by LLVM's defaults.
-const WITH_DSP: [&str; 5] = ["cortex-m33", "cortex-m35p", "cortex-m52", "cortex-m55", "cortex-m85"];
+const WITH_DSP: [&str; 6] = ["cortex-m33", "cortex-m35p", "cortex-m52", "cortex-m55", "cortex-m85", "star-mc3"];
+/// Those with Helium.
+const WITH_HELIUM: [&str; 4] = ["cortex-m52", "cortex-m55", "cortex-m85", "star-mc3"];
 
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(actq_armv7em)");
@@ -26,6 +29,10 @@ fn main() {
         Ok("") | Err(_) => false,
         Ok(other) => panic!("ACTQ_BACKEND is {other:?}; set it to `portable` or unset it"),
     };
+    let flags = Flags::read();
+    if target.starts_with("thumb") && flags.let_rustc_use_helium() {
+        println!("cargo::error={HELIUM_BY_RUSTC}");
+    }
     if !has_fpu(&target) {
         println!("cargo::rustc-cfg=actq_soft");
     }
@@ -43,7 +50,7 @@ fn main() {
             println!("cargo::rustc-cfg=actq_scaling");
         }
     }
-    let dsp = target.starts_with("thumbv7em") || target.starts_with("thumbv8m.main") && flags_have_dsp();
+    let dsp = target.starts_with("thumbv7em") || target.starts_with("thumbv8m.main") && flags.have_dsp();
     if dsp && !portable {
         println!("cargo::rustc-cfg=actq_armv7em");
         if target.starts_with("thumbv8m") {
@@ -74,11 +81,42 @@ fn has_fpu(target: &str) -> bool {
     }
 }
 
-/// Returns `true` if the last processor in the compiler's flags has the DSP extension, and no flag excludes it.
-fn flags_have_dsp() -> bool {
-    let flags = std::env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default();
-    let processor =
-        flags.split('\u{1f}').rev().find_map(|flag| flag.trim_start_matches("-C").strip_prefix("target-cpu="));
-    let is_excluded = flags.split(['\u{1f}', '=', ',']).any(|word| word == "-dsp");
-    !is_excluded && processor.is_some_and(|processor| WITH_DSP.contains(&processor))
+/// The refusal of a build whose numbers would have other bits.
+const HELIUM_BY_RUSTC: &str = "rustc would compute f32 with Helium, which flushes subnormal numbers: the results would have \
+    other bits than on every other machine. Add `-C target-feature=-mve` to the flags (rustc warns that it does not \
+    know this name, and passes it on), or compile for `-C target-cpu=cortex-m33`.";
+
+/// The compiler's flags.
+struct Flags(String);
+
+impl Flags {
+    fn read() -> Self {
+        Self(std::env::var("CARGO_ENCODED_RUSTFLAGS").unwrap_or_default())
+    }
+
+    /// Returns the processor: the last one counts.
+    fn processor(&self) -> &str {
+        let mut last = self.0.split('\u{1f}').rev().filter_map(|flag| flag.split_once("target-cpu="));
+        last.next().map_or("", |(_, processor)| processor.trim())
+    }
+
+    /// Returns `true` if a flag has this feature with its sign.
+    fn have(&self, feature: &str) -> bool {
+        self.0.split(['\u{1f}', '=', ',', ' ']).any(|word| word == feature)
+    }
+
+    /// Returns `true` if the processor has the DSP extension, and no flag excludes it.
+    fn have_dsp(&self) -> bool {
+        WITH_DSP.contains(&self.processor()) && !self.have("-dsp")
+    }
+
+    /// Returns `true` if the processor has Helium.
+    fn have_helium(&self) -> bool {
+        WITH_HELIUM.contains(&self.processor()) || self.have("+mve") || self.have("+mve.fp")
+    }
+
+    /// Returns `true` if the compiler may use Helium.
+    fn let_rustc_use_helium(&self) -> bool {
+        self.have_helium() && !self.have("-mve")
+    }
 }

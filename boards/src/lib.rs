@@ -32,6 +32,8 @@ mod target;
 mod microbit;
 #[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
 mod mps2;
+#[cfg(not(target_os = "none"))]
+mod mps3;
 #[cfg(any(not(target_os = "none"), feature = "stm32f405"))]
 pub mod stm32f405;
 #[cfg(not(target_os = "none"))]

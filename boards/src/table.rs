@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::board::Board;
-use crate::{microbit, mps2, stm32f405, virt};
+use crate::{microbit, mps2, mps3, stm32f405, virt};
 
 /// Clock of an emulated board. It never runs ahead of the host's clock, whose time is in the host's frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,6 +70,8 @@ targets! {
     M7: "thumbv7em-none-eabihf" on mps2::host::AN500;
     /// STM32F405: a Cortex-M4 with the memory of a motor controller.
     F405: "thumbv7em-none-eabihf" on stm32f405::host::BOARD;
+    /// Cortex-M55 with FPU and Helium.
+    M55: "thumbv8m.main-none-eabihf" on mps3::AN547;
 }
 
 impl Target {
@@ -92,6 +94,11 @@ impl Target {
     /// Returns `true` if the kernels are in assembler, unless `ACTQ_BACKEND` selects the portable ones.
     pub fn has_assembler(self) -> bool {
         ["thumbv7em", "thumbv8m.main"].iter().any(|core| self.triple().starts_with(core))
+    }
+
+    /// Returns the flags of rustc, if they are not those of the triple in cargo's configuration.
+    pub fn rustflags(self) -> Option<&'static str> {
+        (self == Self::M55).then_some("-C target-cpu=cortex-m55 -C target-feature=-mve")
     }
 
     /// Returns the profile of a build (`Cargo.toml`).
@@ -189,6 +196,6 @@ mod tests {
     #[test]
     fn features_select_boards_that_triples_do_not() {
         let chosen: Vec<_> = Target::ALL.into_iter().filter_map(Target::feature).collect();
-        assert_eq!(chosen, ["mps2-an385", "mps2-an500", "stm32f405"]);
+        assert_eq!(chosen, ["mps2-an385", "mps2-an500", "stm32f405", "mps3-an547"]);
     }
 }

@@ -188,7 +188,7 @@ impl Image {
         #[pyo3(from_py_with = given)] clock: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
         let image = self.image()?;
-        let known = Target::ALL.into_iter().filter(|target| target.has_assembler());
+        let known = Target::ALL.into_iter().filter(|target| target.has_assembler() && *target != Target::M55);
         let Some(target) = known.clone().find(|target| target.board().name == board) else {
             let mut names: Vec<&str> = known.map(|target| target.board().name).collect();
             names.dedup();

@@ -5,6 +5,9 @@ use core::hint::black_box;
 
 #[cfg(target_os = "none")]
 use actq_firmware_support::count::region;
+use actq_kernels::activations::{Plan, Scale};
+use actq_kernels::image::RowBlock;
+use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
 use actq_kernels::math::Function;
 use actq_kernels::ops::denoise::{Coefficients, denoise};
 use actq_kernels::ops::noise::normal;
@@ -69,6 +72,43 @@ fn region<T>(work: impl FnOnce() -> T) -> T {
     work()
 }
 
+/// Columns of a product.
+const COLS: usize = 16;
+
+/// Computes a product of rows whose biases and scales have every combination of magnitudes, with activations up to
+/// `largest`, and adds it to itself. It is counted for 1.
+fn product(largest: f32, y: &mut [f32; LEN]) -> Option<()> {
+    // The results do not depend on the layout: it is the one for Helium in builds that have it.
+    let lanes = Lanes::from_code(3).unwrap_or(Lanes::Paired);
+    let shape = BlockShape { width: Width::W8, lanes, rows: LEN, cols: COLS, group: 0 };
+    let mut words = [0; LEN * COLS / 4];
+    let mut codes = [0; LEN * COLS];
+    codes.iter_mut().zip(0u32..).for_each(|(code, i)| *code = (i.wrapping_mul(0x9e37_79b9) >> 24) as u8);
+    // Sums of 0.
+    codes.iter_mut().step_by(7 * COLS).for_each(|code| *code = 0);
+    pack(shape, &codes, &[], &mut words).ok()?;
+    let block = Block::new(shape, &words)?;
+    // Zero, subnormal, normal and almost infinite.
+    const SCALES: [u16; 8] = [0, 1, 0x7f, 0x80, 0x0d00, 0x3b83, 0x3f80, 0x7f7f];
+    let scales: [u32; LEN / 2] =
+        core::array::from_fn(|i| u32::from(SCALES[2 * i % 8]) | u32::from(SCALES[(2 * i + 1) % 8]) << 16);
+    let start: [u32; LEN] = core::array::from_fn(|i| EXTREMES[(i / 8) % EXTREMES.len()].to_bits());
+    let rows = RowBlock { block, scales: &scales, steps: &[], first_row: 0 };
+    let x: [f32; COLS] = core::array::from_fn(|i| match i {
+        0..4 => [largest, -largest, 1e-40, -0.0][i],
+        _ => largest * (i as f32 / COLS as f32 - 0.5),
+    });
+    let mut work = [0; 2 * COLS];
+    let plan = Plan::of(&block);
+    let mut apply = || {
+        let scale = Scale::new(black_box(&x), 127).ok()?;
+        let prepared = scale.quantize(&x, &plan, &mut work)?;
+        rows.apply(&prepared, scale, Some(&start), y).ok()?;
+        rows.apply(&prepared, scale, None, y).ok()
+    };
+    if largest == 1.0 { region(apply) } else { apply() }
+}
+
 /// Calls every function in a counted region, and reports its name and the hash of its results: the counted ones and, for
 /// functions and cells, those for values of all magnitudes. Stops when `report` returns `None`.
 pub fn each(mut report: impl FnMut(&'static str, u32) -> Option<()>) -> Option<()> {
@@ -115,6 +155,11 @@ pub fn each(mut report: impl FnMut(&'static str, u32) -> Option<()>) -> Option<(
         region(|| denoise(black_box(&by), limit, black_box(&x), noise, black_box(&mut next), black_box(&mut y)));
         line(case.name, &[&next, &y[1..], extremes.as_flattened()])?;
     }
+    let mut y = [[0.0; LEN]; 6];
+    for (y, largest) in y.iter_mut().zip([1.0, f32::MAX, 1e-29, 8e-31, 1e-31, 1e-40]) {
+        product(largest, y)?;
+    }
+    line("linear", &[y.as_flattened()])?;
     let mut z = [0.0; LEN];
     region(|| black_box(&mut z).iter_mut().zip(0..).for_each(|(z, i)| *z = normal(1, 2, i)));
     line("noise", &[&z])?;

@@ -180,7 +180,8 @@ fn build(
     let mut arguments = vec!["--package", package, "--target", target.triple(), "--profile", profile];
     arguments.extend(["--features", features]);
     arguments.extend(binaries.iter().flat_map(|binary| ["--bin", binary]));
-    cargo_build(&format!("{package} for {}", target.board().name), &arguments, environment)?;
+    let environment: Vec<_> = environment.iter().copied().chain(target.rustflags().map(|f| ("RUSTFLAGS", f))).collect();
+    cargo_build(&format!("{package} for {}", target.board().name), &arguments, &environment)?;
     let built = target_dir().join(target.triple()).join(profile);
     let own = built.join(if features.is_empty() { target.board().name } else { features });
     fs::create_dir_all(&own).with_context(|| format!("cannot create {}", own.display()))?;

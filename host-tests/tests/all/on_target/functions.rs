@@ -20,6 +20,8 @@ fn limit(name: &str) -> u64 {
         "exp" => 34,
         "cos" => 33,
         "noise" => 176,
+        // Two products of 16 columns.
+        "linear" => 80,
         _ => 30 * functions(name),
     }
 }
@@ -42,6 +44,46 @@ fn expected() -> Vec<(&'static str, u32)> {
         Some(())
     });
     all
+}
+
+/// rustc would compute the loops of a Cortex-M55 with Helium, whose floats have other bits.
+#[test]
+fn functions_keep_their_bits_beside_helium() -> Result<()> {
+    let elf = firmware::binary("functions", Target::M55)?;
+    let output = qemu::run(qemu::command_on(Target::M55, &elf, None, "")?, &[])?;
+    let text = String::from_utf8(output.stdout)?;
+    let expected = expected().into_iter().map(|(name, hash)| format!("{name} {LEN} {hash:08x}\n"));
+    assert_eq!(text, expected.collect::<String>());
+    Ok(())
+}
+
+/// Whatever names the processor or the feature; the last processor counts.
+#[test]
+fn helium_by_rustc_is_refused() {
+    let build = |flags| {
+        let arguments = [
+            "check",
+            "--package",
+            "actq-kernels",
+            "--target",
+            Target::M55.triple(),
+            "--profile",
+            Target::M55.profile(),
+        ];
+        firmware::cargo("the kernels", &arguments, &[("RUSTFLAGS", flags)])
+    };
+    let refused = [
+        "-Ctarget-cpu=cortex-m85",
+        "-C target-cpu=cortex-m33 --codegen target-cpu=cortex-m55",
+        "-C target-cpu=cortex-m55 -C target-feature=-mve.fp",
+        "-C target-feature=+mve.fp",
+    ];
+    for flags in refused {
+        let error = build(flags).expect_err(flags).to_string();
+        assert!(error.contains("flushes subnormal numbers"), "{flags}: {error}");
+    }
+    let accepted = build("-C target-cpu=cortex-m55 -C target-cpu=cortex-m33");
+    assert!(accepted.is_ok(), "{accepted:?}");
 }
 
 #[test]

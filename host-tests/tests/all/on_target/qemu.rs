@@ -177,7 +177,7 @@ fn policy_has_the_same_bits(dir: &Path) -> Result<()> {
         }
     }
     let image = rtn(&policy, Width::W3, 0, Activations::Int8)?;
-    for target in [Target::NoFpu, Target::M33, Target::M7, Target::F405] {
+    for target in [Target::NoFpu, Target::M33, Target::M7, Target::F405, Target::M55] {
         same_bits(target, &image, &observations).with_context(|| format!("{target:?}"))?;
     }
     Ok(())

@@ -182,7 +182,8 @@ impl Steps {
             arguments.extend(target.board().binaries.iter().flat_map(|binary| ["--bin", binary]));
             arguments.extend(["--features", target.feature().unwrap_or_default()]);
             arguments.extend(DENY);
-            self.add_of_firmware(&format!("lints of the firmware, {target:?}"), &arguments, &[]);
+            let flags = target.rustflags().map(|flags| ("RUSTFLAGS", flags));
+            self.add_of_firmware(&format!("lints of the firmware, {target:?}"), &arguments, flags.as_slice());
         }
     }
 
