@@ -18,6 +18,7 @@ fn main() {
     println!("cargo::rustc-check-cfg=cfg(actq_loops)");
     println!("cargo::rustc-check-cfg=cfg(actq_scaling)");
     println!("cargo::rustc-check-cfg=cfg(actq_armv8m)");
+    println!("cargo::rustc-check-cfg=cfg(actq_helium)");
     println!("cargo::rustc-check-cfg=cfg(actq_fpu)");
     println!("cargo::rustc-check-cfg=cfg(actq_soft)");
     println!("cargo::rustc-check-cfg=cfg(actq_narrow)");
@@ -59,6 +60,9 @@ fn main() {
         // The kernels that convert from and to f32 need the registers of the hard-float target.
         if target.ends_with("eabihf") {
             println!("cargo::rustc-cfg=actq_fpu");
+            if flags.have_helium() && std::env::var_os("CARGO_FEATURE_HELIUM").is_some() {
+                println!("cargo::rustc-cfg=actq_helium");
+            }
         }
     }
 }
@@ -84,7 +88,8 @@ fn has_fpu(target: &str) -> bool {
 /// The refusal of a build whose numbers would have other bits.
 const HELIUM_BY_RUSTC: &str = "rustc would compute f32 with Helium, which flushes subnormal numbers: the results would have \
     other bits than on every other machine. Add `-C target-feature=-mve` to the flags (rustc warns that it does not \
-    know this name, and passes it on), or compile for `-C target-cpu=cortex-m33`.";
+    know this name, and passes it on; the feature `helium` has kernels in assembler), or compile for \
+    `-C target-cpu=cortex-m33`.";
 
 /// The compiler's flags.
 struct Flags(String);

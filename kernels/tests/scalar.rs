@@ -1,4 +1,4 @@
-//! The kernels of the scalar layouts against the reference, with memory for any number of tables.
+//! The kernels of the scalar layouts, and those of the layouts for Helium, against the reference, with memory for any number of tables.
 #![expect(clippy::expect_used, reason = "a test")]
 
 use actq_kernels::activations::{Plan, prepare};
@@ -6,6 +6,9 @@ use actq_kernels::arch::{Product, Tables, gemv_with, reference};
 use actq_kernels::image::worst_case;
 use actq_kernels::layout::{Block, BlockShape, Lanes, Width, pack};
 use actq_testkit::Random;
+
+/// Lanes of other cores than those with the DSP extension.
+const LANES: [Lanes; 2] = [Lanes::Scalar, Lanes::Helium];
 
 /// Draws values at the ends of their range in every third case, and all at one end in every other third.
 fn check(random: &mut Random, shape: BlockShape, case: usize) {
@@ -47,10 +50,10 @@ fn check(random: &mut Random, shape: BlockShape, case: usize) {
 #[test]
 fn sums_are_those_of_the_reference() {
     let mut random = Random::new(1);
-    for case in 0..1500 {
+    for case in 0..3000 {
         let width = Width::ALL[random.below(4)];
         let (rows, cols) = (1 + random.below(21), 1 + random.below([70, 300][case % 2]));
         let group = [0, 0, 32, 64, 128][random.below(5)];
-        check(&mut random, BlockShape { width, lanes: Lanes::Scalar, rows, cols, group }, case);
+        check(&mut random, BlockShape { width, lanes: LANES[case / 2 % LANES.len()], rows, cols, group }, case);
     }
 }

@@ -145,8 +145,10 @@ pub(crate) fn quantize(
         return Err(error!("{}", notes::how_to_record(&policy.policy)));
     }
     let core = request.core()?;
-    if request.ms.is_some() && core.is_some_and(|core| !core.has_dsp()) {
-        return Err(error!("ms with core: no time is predicted for cores without the DSP extension; use bpw or flash"));
+    if request.ms.is_some() && core.is_some_and(|core| !core.has_default_layouts()) {
+        return Err(error!(
+            "ms with core: no time is predicted for cores with other layouts than the Cortex-M4; use bpw or flash"
+        ));
     }
     let options = request.options(method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }))?;
     let (mut options, policy, in_folder) = (options, policy.policy.clone(), folder.is_some());

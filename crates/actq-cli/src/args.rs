@@ -121,8 +121,8 @@ pub(crate) enum Command {
     Report(ReportArgs),
     /// Convert an image to the layouts of another core: the same weights, the same actions
     ///
-    /// Cores with the DSP extension (m4, m4f, m7, m33, m55) and without it (m0, m3, rv32imac, rv32zb) have layouts of
-    /// their own. A core runs images of the others slowly, or refuses them if its build lacks their layouts.
+    /// Cores with the DSP extension (m4, m4f, m7, m33), with Helium (m55, also for Cortex-M85) and without both (m0, m3,
+    /// rv32imac, rv32zb) have layouts of their own. A core runs images of the others slowly, or refuses them if its build lacks their layouts.
     ///
     /// Example: actq repack ur3.actq --core m3 --out ur3-m3.actq
     Repack(RepackArgs),

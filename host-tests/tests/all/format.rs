@@ -167,6 +167,7 @@ fn lanes(cell: &str) -> Lanes {
         "single" => Lanes::Single,
         "paired" => Lanes::Paired,
         "scalar" => Lanes::Scalar,
+        "helium" => Lanes::Helium,
         _ => panic!("{cell:?} are no lanes"),
     }
 }
@@ -252,16 +253,23 @@ impl Documented {
         let padded_cols = shape.cols.next_multiple_of(self.pad[usize::from(shape.group != 0)]);
         let group = if shape.group == 0 { padded_cols } else { shape.group };
         let groups = if shape.group == 0 { 0 } else { shape.cols.div_ceil(group) };
-        let mut next = 0;
+        // Units that are taken together.
+        let units = if self.lanes == Lanes::Helium { 4 } else { 1 };
+        let (mut next, mut together) = (0, 0..0);
         let mut first_row = 0;
         while first_row < padded_rows {
             let height = self.strip.min(padded_rows - first_row);
             let cells = height / self.cell_rows;
-            for first_col in (0..padded_cols).step_by(self.cell_cols) {
-                let unit = &packed[next..][..cells * self.cell_words];
-                next += unit.len();
+            for (unit, first_col) in (0..padded_cols).step_by(self.cell_cols).enumerate() {
+                if unit.is_multiple_of(units) {
+                    together = next..next + units * cells * self.cell_words;
+                    next = together.end;
+                }
+                let place = |word, cell| units * (word * cells + cell) + unit % units;
                 for (row, col) in (0..height).flat_map(|r| (0..self.cell_cols).map(move |c| (r, c))) {
-                    let stored = |(word, bit): (usize, usize)| unit[word * cells + row / self.cell_rows] >> bit & 1;
+                    let stored = |(word, bit): (usize, usize)| {
+                        packed[together.clone()][place(word, row / self.cell_rows)] >> bit & 1
+                    };
                     let places = self.places[row % self.cell_rows][col].iter().flatten();
                     let code: u32 = places
                         .enumerate()
@@ -336,7 +344,7 @@ fn layouts_and_bit_diagrams_match_the_packer() {
 
 #[test]
 fn lanes_follow_from_the_matrix_as_documented() {
-    assert_eq!(Lanes::ALL.map(Lanes::code), [0, 1, 2]);
+    assert_eq!(Lanes::ALL.map(Lanes::code), [0, 1, 2, 3]);
     for (x_max, group) in [1, 126, 127, 128, 32767].into_iter().flat_map(|x| [0, 32, 64, 128].map(|g| (x, g))) {
         let expected = if x_max <= 127 && group <= 32 { Lanes::Paired } else { Lanes::Single };
         assert_eq!(Lanes::of(x_max, group), expected, "x_max {x_max}, group {group}");
@@ -385,7 +393,7 @@ fn the_table_of_sizes_matches_the_blocks() {
             "{row:?}"
         );
     }
-    assert_eq!(rows.len(), 14);
+    assert_eq!(rows.len(), 15);
     // The text repeats these figures, wherever its lines break.
     let text = document.split_whitespace().collect::<Vec<_>>().join(" ");
     let example = "Example, 256 x 256 at 3 bits with paired lanes and one scale a row: 64 strips * 32 units * 3 words + \

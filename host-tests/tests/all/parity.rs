@@ -21,7 +21,7 @@ fn cases() -> impl Strategy<Value = Case> {
     (shapes(), any::<u64>(), 1..=i16::MAX, draw).prop_map(|(shape, seed, x_max, draw)| {
         let x_max = match shape.lanes {
             Lanes::Single => x_max,
-            Lanes::Paired | Lanes::Scalar => 1 + x_max % 127,
+            Lanes::Paired | Lanes::Scalar | Lanes::Helium => 1 + x_max % 127,
         };
         Case::draw(&mut Random::new(seed), shape, x_max, draw)
     })
@@ -183,11 +183,13 @@ fn lanes_must_follow_from_the_activations() {
         image.check().map(|_| ())
     };
     assert_eq!(check(1), Ok(()));
-    for lanes in [0, 3, 255] {
+    for lanes in [0, 4, 255] {
         assert_eq!(check(lanes), Err(actq_kernels::ImageError::Lanes), "{lanes}");
     }
     // The scalar layout has the same words, but its tables need a longer work area.
     assert_eq!(check(2), Err(actq_kernels::ImageError::Arena));
+    // The layout for Helium has more columns of padding.
+    assert_eq!(check(3), Err(actq_kernels::ImageError::Section));
 }
 
 /// Row blocks compute `start + acc * (row_scale * x_scale)` in this order, with biases in one pass or already in y.

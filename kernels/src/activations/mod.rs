@@ -4,7 +4,7 @@
 //! chunks of each group (of the whole row without group scales). If the layout needs it, a sum follows: that of the
 //! row's values, or that of the group's in both halves of a word. If the layout pairs groups, a pair is prepared as a
 //! group of two chunks, and the halves of its word are their sums. A chunk is its start words and its int16 pairs,
-//! column `2j` in the low half. Zeros fill the last group and, in a pair, a missing second group. Without groups they
+//! column `2j` in the low half; or, for Helium, bytes, the first in the lowest. Zeros fill the last group and, in a pair, a missing second group. Without groups they
 //! fill a kernel's step ([`PAD_COLS`](crate::layout::PAD_COLS) with single lanes). A [`Plan`] has all lengths.
 
 mod plan;
@@ -16,7 +16,7 @@ pub(crate) use plan::Extent;
 pub use plan::KernelArguments;
 pub use plan::{Plan, max_prepared_words};
 pub use prepared::Prepared;
-#[cfg(any(not(actq_fpu), feature = "scalar"))]
+#[cfg(any(not(actq_fpu), feature = "scalar", feature = "helium"))]
 pub(crate) use prepared::lay_out;
 pub use prepared::prepare;
 pub use scale::Scale;

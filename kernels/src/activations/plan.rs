@@ -67,7 +67,7 @@ impl Plan {
         let before = (group - 1) >> layout.chunk_log;
         let (chunks, first) = (before + 1, group - (before << layout.chunk_log));
         let starts = format.start_words;
-        let words = padded / 2 + groups * (chunks * starts + format.sum as usize);
+        let words = format.words(padded) + groups * (chunks * starts + format.sum as usize);
         Self {
             shape,
             layout,
@@ -77,12 +77,14 @@ impl Plan {
             first,
             words,
             arguments: KernelArguments {
-                end: words - (padded - read) / 2 - (format.sum && shape.group == 0) as usize,
+                end: words - format.words(padded - read) - (format.sum && shape.group == 0) as usize,
                 extra: match shape.lanes {
                     _ if format.sum => 0usize.wrapping_sub(chunks * format.starts[0].bias as usize),
                     Lanes::Single if shape.group == 0 => 0,
                     #[cfg(feature = "scalar")]
                     Lanes::Scalar => 0,
+                    #[cfg(feature = "helium")]
+                    Lanes::Helium => 0,
                     _ => 4 * starts + 2 * first,
                 },
                 // Passes and steps are powers of two, and a chunk that is longer than a pass is whole passes.
@@ -104,9 +106,11 @@ impl Plan {
     }
 
     /// Returns the words that preparing a vector of `len` values needs. A vector that does not fill its groups is first
-    /// copied to the end of these words and filled with zeros, while the prepared words grow from their start.
+    /// copied to the end of these words and filled with zeros, while the prepared words grow from their start; bytes need
+    /// no copy.
     pub const fn room(&self, len: usize) -> usize {
-        if len == self.padded { self.words } else { self.words + self.padded / 2 }
+        let copies = len != self.padded && !self.layout.x.has_bytes();
+        if copies { self.words + self.padded / 2 } else { self.words }
     }
 
     /// Returns the words of the work area that a product of a vector of `len` values needs: [`Self::room`], or the
@@ -134,19 +138,19 @@ impl Plan {
 
     /// Returns the words of a group.
     pub(super) const fn group_words(&self) -> usize {
-        self.group() / 2 + self.chunks * self.layout.x.start_words + self.layout.x.sum as usize
+        self.layout.x.words(self.group()) + self.chunks * self.layout.x.start_words + self.layout.x.sum as usize
     }
 
     /// Returns the words of a chunk of `columns` columns.
     pub(super) const fn chunk_words(&self, columns: usize) -> usize {
-        self.layout.x.start_words + columns / 2
+        self.layout.x.start_words + self.layout.x.words(columns)
     }
 
-    /// Returns the words before the pair of column `col`.
+    /// Returns the words before that of column `col`.
     pub(super) const fn words_before(&self, col: usize) -> usize {
         let (group, col) = (col / self.group(), col % self.group());
         let full_before = (col + self.layout.x.chunk - self.first) / self.layout.x.chunk;
-        group * self.group_words() + (full_before + 1) * self.layout.x.start_words + col / 2
+        group * self.group_words() + (full_before + 1) * self.layout.x.start_words + self.layout.x.words(col)
     }
 
     /// Returns the lengths that the cost of preparing and of reading a vector depends on.

@@ -47,6 +47,9 @@ impl<'a> Prepared<'a> {
             return 0;
         }
         let word = self.words.get(self.plan.words_before(col)).copied().unwrap_or(0);
+        if self.plan.layout.x.has_bytes() {
+            return (word >> (8 * (col % 4))) as i8 as i16;
+        }
         ((word >> (16 * (col % 2))) as i16) >> self.plan.layout.x.shift
     }
 }
@@ -85,6 +88,19 @@ pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: i
 /// Writes a chunk of `x`, filled with zeros, and returns the sum of its integers.
 fn chunk<V: Copy>(x: &[V], format: &XLayout, out: &mut [u32], integer: &impl Fn(V) -> u32) -> i32 {
     let (starts, pairs) = out.split_at_mut(format.start_words.min(out.len()));
+    if format.has_bytes() {
+        let mut sum = 0i32;
+        pairs.fill(0);
+        for (i, value) in x.iter().enumerate() {
+            let byte = integer(*value) as u8;
+            sum = sum.wrapping_add(byte as i8 as i32);
+            if let Some(word) = pairs.get_mut(i / 4) {
+                *word |= u32::from(byte) << (8 * (i % 4));
+            }
+        }
+        starts.iter_mut().for_each(|word| *word = sum as u32);
+        return sum;
+    }
     let (whole, rest) = x.as_chunks::<2>();
     let odd = rest.first().map(|low| (integer(*low), 0));
     let values = whole.iter().map(|[low, high]| (integer(*low), integer(*high))).chain(odd);

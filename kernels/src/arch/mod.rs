@@ -1,7 +1,8 @@
 //! Kernels with more than one backend, and the one place that chooses the backend.
 //!
 //! `reference` is the standard that tests compare all others with, `portable` is Rust for every target, `armv7em`
-//! assembler for Cortex-M4, M7 and M33, and `armv7em_fpu` assembler that also needs their FPU's registers. All of them
+//! assembler for Cortex-M4, M7 and M33, and `armv7em_fpu` assembler that also needs their FPU's registers. `helium` adds
+//! what Cortex-M55 and M85 do with vectors. All of them
 //! compute the same bits; the tests run them on the same data. On cores without the DSP extension, `portable` has its
 //! innermost loops in assembler: `loops` for the scalar layouts, `scaling` for the results. The build script detects the backends of a target.
 
@@ -48,6 +49,9 @@ mod armv7em;
 #[cfg(actq_fpu)]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
 mod armv7em_fpu;
+#[cfg(actq_helium)]
+#[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
+mod helium;
 #[cfg(all(actq_loops, feature = "scalar"))]
 #[allow(unsafe_code, reason = "the assembler backend; every block carries its proof")]
 mod loops;
@@ -63,14 +67,20 @@ mod tables;
 use armv7em as integers;
 #[cfg(actq_fpu)]
 use armv7em_fpu as floats;
+#[cfg(actq_helium)]
+use helium as bytes;
 #[cfg(not(actq_fpu))]
 use portable as floats;
+#[cfg(all(feature = "helium", not(actq_helium)))]
+use portable as bytes;
 #[cfg(not(actq_armv7em))]
 use portable as integers;
 
-#[cfg(not(actq_scaling))]
+#[cfg(not(any(actq_scaling, actq_helium)))]
 pub(crate) use floats::scale;
 pub(crate) use floats::{denoise, gru_elements, lstm_elements, normalize, sqrt, standardize, sum, sum_squares};
+#[cfg(actq_helium)]
+pub(crate) use helium::{elu, relu, scale};
 pub(crate) use integers::copy;
 pub use product::{Mismatch, Product};
 #[cfg(actq_scaling)]
@@ -80,7 +90,7 @@ pub use tables::Tables;
 use crate::activations::{Plan, Prepared, Scale};
 use crate::error::NotFinite;
 use crate::layout::Block;
-#[cfg(feature = "scalar")]
+#[cfg(any(feature = "scalar", feature = "helium"))]
 use crate::layout::Lanes;
 
 /// A backend that can be compiled in.
@@ -91,10 +101,16 @@ pub enum Backend {
     Portable,
     /// Assembler for Cortex-M4, M7 and M33.
     Armv7em,
+    /// The same, and assembler for the Helium of Cortex-M55 and M85.
+    Helium,
 }
 
 /// The backend of this build.
-pub const BACKEND: Backend = if cfg!(actq_armv7em) { Backend::Armv7em } else { Backend::Portable };
+pub const BACKEND: Backend = match (cfg!(actq_helium), cfg!(actq_armv7em)) {
+    (true, _) => Backend::Helium,
+    (false, true) => Backend::Armv7em,
+    (false, false) => Backend::Portable,
+};
 
 /// Multiplies a run of a block's rows ([`Product::new`]) with a prepared vector.
 ///
@@ -136,6 +152,9 @@ impl Scale {
     ///
     /// [`NotFinite`] if a value of `x` is NaN or infinite.
     pub fn new(x: &[f32], x_max: u16) -> Result<Self, NotFinite> {
+        #[cfg(actq_helium)]
+        return Self::of_magnitude(helium::magnitude(x), x_max);
+        #[cfg(not(actq_helium))]
         Self::of_magnitude(integers::magnitude(x), x_max)
     }
 
@@ -149,6 +168,11 @@ impl Scale {
         #[cfg(feature = "scalar")]
         if plan.shape.lanes == Lanes::Scalar {
             portable::quantize(x, self.inverse(), plan, out)?;
+            return Prepared::new(out, plan);
+        }
+        #[cfg(feature = "helium")]
+        if plan.shape.lanes == Lanes::Helium {
+            bytes::quantize(x, self.inverse(), plan, out)?;
             return Prepared::new(out, plan);
         }
         floats::quantize(x, self.inverse(), plan, out)?;

@@ -375,12 +375,12 @@ fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), Ima
     let mut seen = [0u32; h::MAX_ROWS / 32];
     let mut first_row = 0;
     // An input is prepared once for all blocks of a width, so they have one layout.
-    #[cfg(feature = "scalar")]
+    #[cfg(any(feature = "scalar", feature = "helium"))]
     let mut lanes = [None; 16];
     for record in matrix.records.as_chunks().0 {
         let rows = row_block(matrix, record, first_row);
         let rows = rows.as_ref().map_err(|e| *e)?;
-        #[cfg(feature = "scalar")]
+        #[cfg(any(feature = "scalar", feature = "helium"))]
         {
             let shape = rows.block.shape();
             let known = lanes.get_mut(shape.width.bits() as usize).ok_or(ImageError::Width)?;

@@ -29,13 +29,15 @@ macro_rules! features {
         }),*]
     };
 }
-/// The code of blocks without lanes, which a build without them knows, too.
+/// The codes of blocks without lanes and for Helium, which a build without them knows, too.
 const SCALAR: u8 = 2;
+const HELIUM: u8 = 3;
 
 /// The features in the order of Cargo.toml.
-const FEATURES: [Feature; 16] = features! {
+const FEATURES: [Feature; 17] = features! {
     "w2" "w3" "w4" "w8" "single" "paired" "groups" "elu" "silu" "functions" "norm" "recurrent" "flow" "chunks" "around"
     "scalar" or "convert the image to the layouts of this core with `actq repack`"
+    "helium" or "convert the image to the layouts of this core with `actq repack`"
 };
 
 /// The features of this build, each a bit.
@@ -130,6 +132,7 @@ const fn of_matrix(bytes: &[u8], at: usize) -> u32 {
         let head = word(bytes, (blocks as usize).wrapping_add(i * h::BLOCK_WORDS));
         needed |= match (head >> 8) as u8 {
             SCALAR => bit("scalar"),
+            HELIUM => bit("helium"),
             _ => bit(Lanes::of(high(levels) as u16, group).feature()),
         };
         if let Some(width) = Width::from_bits(head & 0xff) {
@@ -165,7 +168,7 @@ mod tests {
         }
         assert_eq!(refusal_of(needed(VALID), all), None);
         assert_eq!(refusal_of(all, all & !bit("around")), Some(FEATURES[14].refusal));
-        assert!(FEATURES[15].refusal.contains("actq repack"));
+        assert!(FEATURES[15..].iter().all(|feature| feature.refusal.contains("actq repack")));
     }
 
     #[test]

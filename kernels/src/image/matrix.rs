@@ -85,7 +85,12 @@ impl BlockRecord {
             Some(Lanes::Scalar) if x_max <= Lanes::PAIRED_X_MAX => Lanes::Scalar,
             _ => lanes,
         };
-        #[cfg(not(feature = "scalar"))]
+        #[cfg(feature = "helium")]
+        let lanes = match Lanes::from_code((head >> 8) as u8) {
+            Some(Lanes::Helium) if x_max <= Lanes::PAIRED_X_MAX => Lanes::Helium,
+            _ => lanes,
+        };
+        #[cfg(not(any(feature = "scalar", feature = "helium")))]
         let _ = x_max;
         let width = Width::from_bits(head & 0xff).ok_or(ImageError::Width)?;
         if !width.is_built() || !lanes.is_built() {

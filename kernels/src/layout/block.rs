@@ -32,6 +32,8 @@ impl BlockShape {
             Lanes::Paired => (self.group == 0 || self.group == PAIRED_GROUP, MAX_PAIRED_GROUPED),
             #[cfg(feature = "scalar")]
             Lanes::Scalar => (is_group(self.group), 0xffff),
+            #[cfg(feature = "helium")]
+            Lanes::Helium => (is_group(self.group), 0xffff),
         };
         let cols = if self.group == 0 { 0xffff } else { cols };
         self.rows >= 1 && self.rows <= 0xffff && self.cols >= 1 && self.cols <= cols && group
@@ -65,6 +67,12 @@ impl BlockShape {
             (Lanes::Paired, 1..) => self.group,
             _ => layout.step,
         }
+    }
+
+    /// Returns the columns with padding.
+    #[cfg(actq_helium)]
+    pub(crate) const fn padded_cols(self) -> usize {
+        round_up(self.cols, self.layout().step)
     }
 
     /// Returns the units of a row.
@@ -119,6 +127,9 @@ impl BlockShape {
     pub(super) const fn cell_at(self, row: usize, unit: usize) -> (usize, usize) {
         let (first, height) = self.strip(row);
         let Cell { rows, words, .. } = self.layout().cell;
+        // The words of four units of a cell, one of each, are a vector: the others follow in its place.
+        let vector = if self.layout().x.has_bytes() { 4 } else { 1 };
+        let (units_before, in_vector) = (unit & !(vector - 1), unit & (vector - 1));
         let groups_before = match self.group {
             0 => 0,
             _ => div_down(unit, self.units_per_group()),
@@ -128,7 +139,8 @@ impl BlockShape {
         let scales_before = groups_before * (height / QUAD);
         let step = div_down(height, rows);
         let strip = first / QUAD * self.quad_words();
-        (strip + unit * words * step + scales_before + div_down(row - first, rows), step)
+        let cell = div_down(row - first, rows);
+        (strip + units_before * words * step + scales_before + vector * cell + in_vector, vector * step)
     }
 
     /// Returns `true` if the scales of a strip of `height` rows follow pairs of groups.

@@ -52,6 +52,8 @@ pub struct XLayout {
     /// `true` if the sum of the row's x follows its chunks, and the sum of a group's x follows the group's chunks, in
     /// both halves of a word.
     pub sum: bool,
+    /// `true` if the activations are bytes, four a word, and the weights vectors of bytes.
+    pub bytes: bool,
     /// `true` if groups are paired: two are prepared as one, with their sums in the halves of the word, and in strips
     /// of eight the scales follow the units of both groups.
     pub pairs: bool,
@@ -82,7 +84,32 @@ impl XLayout {
     /// Returns the form for single lanes: one start value a group.
     pub(super) const fn single(factor: i32) -> Self {
         let starts = [Start { bias: 0, factor }, Start::NONE];
-        Self { shift: 0, chunk: Self::ALL, run: PAD_COLS, start_words: 1, starts, sum: false, pairs: false }
+        Self {
+            shift: 0,
+            chunk: Self::ALL,
+            run: PAD_COLS,
+            start_words: 1,
+            starts,
+            sum: false,
+            bytes: false,
+            pairs: false,
+        }
+    }
+
+    /// Bytes, and before them their sum.
+    #[cfg(feature = "helium")]
+    pub(super) const BYTES: Self = Self { bytes: true, ..Self::single(1) };
+
+    /// Returns `true` if the activations are bytes: in a build without such layouts, at compile time.
+    #[inline(always)]
+    pub(crate) const fn has_bytes(&self) -> bool {
+        cfg!(feature = "helium") && self.bytes
+    }
+
+    /// Returns the words of a number of columns.
+    #[inline(always)]
+    pub(crate) const fn words(&self, columns: usize) -> usize {
+        if self.has_bytes() { columns / 4 } else { columns / 2 }
     }
 }
 
@@ -100,6 +127,8 @@ pub enum Kernel {
     Pairs,
     /// It multiplies pairs of rows, two columns by two.
     Bytes,
+    /// It takes four units at a time, as vectors.
+    Vectors,
 }
 
 /// A layout. Each layout file implements it.

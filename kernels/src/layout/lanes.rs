@@ -31,20 +31,26 @@ pub enum Lanes {
     /// No lanes: layouts for cores without the DSP extension; activations are at most 127.
     #[cfg(feature = "scalar")]
     Scalar,
+    /// Vectors of bytes: layouts for cores with Helium; activations are at most 127.
+    #[cfg(feature = "helium")]
+    Helium,
 }
 
 impl Lanes {
     /// All of them.
-    #[cfg(feature = "scalar")]
-    pub const ALL: [Self; 3] = [Self::Single, Self::Paired, Self::Scalar];
-    /// All of them.
-    #[cfg(not(feature = "scalar"))]
-    pub const ALL: [Self; 2] = Self::DSP;
+    pub const ALL: [Self; 2 + cfg!(feature = "scalar") as usize + cfg!(feature = "helium") as usize] = [
+        Self::Single,
+        Self::Paired,
+        #[cfg(feature = "scalar")]
+        Self::Scalar,
+        #[cfg(feature = "helium")]
+        Self::Helium,
+    ];
 
     /// Those of the DSP extension.
     pub const DSP: [Self; 2] = [Self::Single, Self::Paired];
 
-    /// Largest activation of paired lanes, and without lanes.
+    /// Largest activation of all lanes but single ones.
     pub const PAIRED_X_MAX: u16 = 127;
 
     /// Returns the DSP extension's lanes of a matrix with activations up to `x_max` and group size `group`: paired for int8 activations
@@ -60,6 +66,8 @@ impl Lanes {
             Self::Paired => "paired",
             #[cfg(feature = "scalar")]
             Self::Scalar => "scalar",
+            #[cfg(feature = "helium")]
+            Self::Helium => "helium",
         }
     }
 
@@ -70,15 +78,19 @@ impl Lanes {
             Self::Paired => cfg!(feature = "paired"),
             #[cfg(feature = "scalar")]
             Self::Scalar => true,
+            #[cfg(feature = "helium")]
+            Self::Helium => true,
         }
     }
 
     /// The lanes with entries in tables: the only ones of this build, otherwise all. (A writer packs others, too.)
     pub(crate) const IN_TABLES: &'static [Self] = match (Self::Single.is_built(), Self::Paired.is_built()) {
         _ if cfg!(feature = "writer") => &Self::ALL,
-        #[cfg(feature = "scalar")]
+        #[cfg(all(feature = "scalar", not(feature = "helium")))]
         (false, false) => &[Self::Scalar],
-        _ if cfg!(feature = "scalar") => &Self::ALL,
+        #[cfg(all(feature = "helium", not(feature = "scalar")))]
+        (false, false) => &[Self::Helium],
+        _ if cfg!(any(feature = "scalar", feature = "helium")) => &Self::ALL,
         (true, false) => &[Self::Single],
         (false, true) => &[Self::Paired],
         _ => &Self::ALL,
@@ -97,6 +109,8 @@ impl Lanes {
             Self::Paired => 1,
             #[cfg(feature = "scalar")]
             Self::Scalar => 2,
+            #[cfg(feature = "helium")]
+            Self::Helium => 3,
         }
     }
 
@@ -107,6 +121,8 @@ impl Lanes {
             1 => Some(Self::Paired),
             #[cfg(feature = "scalar")]
             2 => Some(Self::Scalar),
+            #[cfg(feature = "helium")]
+            3 => Some(Self::Helium),
             _ => None,
         }
     }

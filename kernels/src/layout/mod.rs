@@ -16,11 +16,12 @@
 //! one, up to the strip's end, and columns after the last, up to a multiple of the kernel's step, are padding with code
 //! 0.
 //!
-//! Every width has three layouts. Two are for the DSP extension. In **single** lanes, each signed 16-bit lane of an SMLAD operand holds one weight, and
+//! Every width has four layouts. Two are for the DSP extension. In **single** lanes, each signed 16-bit lane of an SMLAD operand holds one weight, and
 //! the activations may have 16 bits. In **paired** lanes a lane holds the weights of two rows, one SMLAD computes four
 //! MACs, and the sums are separated when they are full; that needs `|x| <= 127`. The **scalar** layouts, of the feature
 //! `scalar`, are for cores without that extension: bit planes that index tables of sums at 2 and 3 bits, two rows in one
-//! product at 4 and 8. They need `|x| <= 127`, too.
+//! product at 4 and 8. The layouts of the feature `helium` have the bytes of four units of a cell next to each other, which
+//! are a vector. Both need `|x| <= 127`, too.
 //!
 //! | layout | levels (weight / scale) | cell: rows x columns in words | strip | bits per weight before scales |
 //! |---|---|---|---|---|
@@ -36,6 +37,10 @@
 //! | `w3_scalar` | as w3 | 4 x 8 in 3 | 8 | 3 |
 //! | `w4_scalar` | as w4 | 4 x 2 in 1 | 8 | 4 |
 //! | `w8_scalar` | as w8 | 4 x 2 in 2 | 4 | 8 |
+//! | `w2_helium` | as w2 | 4 x 4 in 1 | 8 | 2 |
+//! | `w3_helium` | as w3 | 4 x 8 in 3 | 4 | 3 |
+//! | `w4_helium` | as w4 | 2 x 4 in 1 | 8 | 4 |
+//! | `w8_helium` | as w8 | 1 x 4 in 1 | 8 | 8 |
 //!
 //! Narrow widths use the mid-rise grid of odd levels: for bell-shaped weights four levels at ±1, ±3 lose about a third
 //! less than -2 .. 1 do. A level is `2*code - (2^b - 1)`. The kernels multiply with the codes, and the start values in
@@ -45,19 +50,19 @@
 //! in `arch/armv7em/table.rs`, and another [`LAYOUT_STAMP`].
 
 /// The registry: a line for every width, with its bits, its feature, the grid of its levels (`Grid`), and its layouts
-/// of single lanes, of paired lanes and without lanes. It passes all lines to another macro, after a first argument for that.
+/// of single lanes, of paired lanes, without lanes and for Helium. It passes all lines to another macro, after a first argument for that.
 macro_rules! registry {
     ($for_all:ident $first:tt) => {
         $for_all! {
             $first
             /// 2 bits: levels -3, -1, 1, 3.
-            W2 = 2 if "w2", Odd: crate::layout::w2::W2, crate::layout::w2_paired::W2Paired, crate::layout::w2_scalar::W2Scalar;
+            W2 = 2 if "w2", Odd: crate::layout::w2::W2, crate::layout::w2_paired::W2Paired, crate::layout::w2_scalar::W2Scalar, crate::layout::w2_helium::W2Helium;
             /// 3 bits: odd levels -7 to 7.
-            W3 = 3 if "w3", Odd: crate::layout::w3::W3, crate::layout::w3_paired::W3Paired, crate::layout::w3_scalar::W3Scalar;
+            W3 = 3 if "w3", Odd: crate::layout::w3::W3, crate::layout::w3_paired::W3Paired, crate::layout::w3_scalar::W3Scalar, crate::layout::w3_helium::W3Helium;
             /// 4 bits: odd levels -15 to 15.
-            W4 = 4 if "w4", Odd: crate::layout::w4::W4, crate::layout::w4_paired::W4Paired, crate::layout::w4_scalar::W4Scalar;
+            W4 = 4 if "w4", Odd: crate::layout::w4::W4, crate::layout::w4_paired::W4Paired, crate::layout::w4_scalar::W4Scalar, crate::layout::w4_helium::W4Helium;
             /// 8 bits: levels -128 to 127.
-            W8 = 8 if "w8", Whole: crate::layout::w8::W8, crate::layout::w8_paired::W8Paired, crate::layout::w8_scalar::W8Scalar;
+            W8 = 8 if "w8", Whole: crate::layout::w8::W8, crate::layout::w8_paired::W8Paired, crate::layout::w8_scalar::W8Scalar, crate::layout::w8_helium::W8Helium;
         }
     };
 }
@@ -70,18 +75,26 @@ mod pack;
 mod pow2;
 mod table;
 pub mod w2;
+#[cfg(feature = "helium")]
+pub mod w2_helium;
 pub mod w2_paired;
 #[cfg(feature = "scalar")]
 pub mod w2_scalar;
 pub mod w3;
+#[cfg(feature = "helium")]
+pub mod w3_helium;
 pub mod w3_paired;
 #[cfg(feature = "scalar")]
 pub mod w3_scalar;
 pub mod w4;
+#[cfg(feature = "helium")]
+pub mod w4_helium;
 pub mod w4_paired;
 #[cfg(feature = "scalar")]
 pub mod w4_scalar;
 pub mod w8;
+#[cfg(feature = "helium")]
+pub mod w8_helium;
 pub mod w8_paired;
 #[cfg(feature = "scalar")]
 pub mod w8_scalar;

@@ -51,7 +51,7 @@ impl Layout {
             strip: F::STRIP,
             step: F::STEP,
             x: F::X,
-            pad: if F::X.chunk == XLayout::ALL { PAD_COLS } else { F::STEP },
+            pad: if F::X.chunk == XLayout::ALL && !F::X.has_bytes() { PAD_COLS } else { F::STEP },
             chunk_log: F::X.chunk.trailing_zeros() as u8,
             unit_log: F::CELL.cols.trailing_zeros() as u8,
             strip_log: if F::STRIP == QUAD { StripLog::Quad } else { StripLog::Strip },
@@ -61,14 +61,16 @@ impl Layout {
 }
 
 macro_rules! table {
-    (() $($(#[$doc:meta])* $width:ident = $bits:literal if $feature:literal, $grid:ident: $single:path, $paired:path, $scalar:path;)*) => {
+    (() $($(#[$doc:meta])* $width:ident = $bits:literal if $feature:literal, $grid:ident: $single:path, $paired:path, $scalar:path, $helium:path;)*) => {
         /// Returns the layout of a width and lanes.
         pub(crate) const fn layout(width: Width, lanes: Lanes) -> Layout {
             match (width, lanes) {
                 $((Width::$width, Lanes::Single) => Layout::of::<$single>(),
                 (Width::$width, Lanes::Paired) => Layout::of::<$paired>(),
                 #[cfg(feature = "scalar")]
-                (Width::$width, Lanes::Scalar) => Layout::of::<$scalar>(),)*
+                (Width::$width, Lanes::Scalar) => Layout::of::<$scalar>(),
+                #[cfg(feature = "helium")]
+                (Width::$width, Lanes::Helium) => Layout::of::<$helium>(),)*
             }
         }
 
@@ -81,7 +83,9 @@ macro_rules! table {
                     $((Width::$width, Lanes::Single) => $call::<$single>$arguments,
                     (Width::$width, Lanes::Paired) => $call::<$paired>$arguments,
                     #[cfg(feature = "scalar")]
-                    (Width::$width, Lanes::Scalar) => $call::<$scalar>$arguments,)*
+                    (Width::$width, Lanes::Scalar) => $call::<$scalar>$arguments,
+                    #[cfg(feature = "helium")]
+                    (Width::$width, Lanes::Helium) => $call::<$helium>$arguments,)*
                 }
             }};
         }

@@ -48,6 +48,7 @@ impl Format for W2Paired {
         start_words: 1,
         starts: [Start { bias: 0x8000, factor: -6 }, Start::NONE],
         sum: true,
+        bytes: false,
         pairs: true,
     };
 

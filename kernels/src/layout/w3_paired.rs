@@ -61,6 +61,7 @@ impl Format for W3Paired {
         start_words: 1,
         starts: [Start { bias: 0x8000, factor: -28 }, Start::NONE],
         sum: true,
+        bytes: false,
         pairs: false,
     };
 

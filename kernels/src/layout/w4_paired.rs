@@ -47,6 +47,7 @@ impl Format for W4Paired {
         start_words: 2,
         starts: [Start { bias: 0, factor: -15 + (1 << 12) }, Start { bias: 0, factor: -15 - (15 << 8) }],
         sum: false,
+        bytes: false,
         pairs: false,
     };
 

@@ -36,6 +36,7 @@ impl Format for W8Paired {
         start_words: 1,
         starts: [Start { bias: 0, factor: -128 }, Start::NONE],
         sum: false,
+        bytes: false,
         pairs: false,
     };
 

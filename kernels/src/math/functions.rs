@@ -78,9 +78,15 @@ impl Function {
     /// Applies the function to every element.
     pub fn apply(self, x: &mut [f32]) {
         match self {
+            #[cfg(actq_helium)]
+            Self::Relu => crate::arch::relu(x),
+            #[cfg(not(actq_helium))]
             Self::Relu => in_pairs(x, |pairs| each(pairs, |[a, b]| [relu(a), relu(b)])),
             // A checked image has no function that the build leaves out.
             Self::Elu | Self::Tanh | Self::Sigmoid if !cfg!(feature = "elu") => {}
+            #[cfg(actq_helium)]
+            Self::Elu => crate::arch::elu(x),
+            #[cfg(not(actq_helium))]
             Self::Elu => each_ratio(x, &ELU),
             Self::Tanh => each_ratio(x, &TANH),
             Self::Sigmoid => each_ratio(x, &SIGMOID),

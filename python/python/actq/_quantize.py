@@ -107,7 +107,7 @@ def quantize(
     group: columns that share a scale: 0, 32, 64 or 128.
     activations: bits of the activations: 8 or 16.
     core: the core to pack the image for: "m0", "m3", "rv32imac", "rv32zb", "m4", "m4f", "m7", "m33" or "m55". The default is
-        the layouts of those with the DSP extension, from "m4" on.
+        the layouts of those with the DSP extension, "m4" to "m33".
     widths: bits of single matrices, by their names.
     steps, minutes: most steps or minutes of learning; steps=0 for error feedback instead.
     effort: how long to learn: "quick", "default" or "thorough".

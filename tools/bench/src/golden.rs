@@ -140,7 +140,7 @@ pub fn cases(seed: u64) -> Vec<Case> {
                 let rows = 1 + random.below(17);
                 let x_max = match lanes {
                     Lanes::Single => [127, i16::MAX][random.below(2)],
-                    Lanes::Paired | Lanes::Scalar => 127,
+                    Lanes::Paired | Lanes::Scalar | Lanes::Helium => 127,
                 };
                 cases.push(Case::draw(&mut random, BlockShape { width, lanes, rows, cols, group }, x_max, draw));
             }

@@ -95,7 +95,7 @@ pub(crate) struct DeployArgs {
     #[command(flatten)]
     pub(crate) budget: BudgetArgs,
     /// The core to pack the image for: m0, m3, rv32imac, rv32zb, m4, m4f, m7, m33 or m55 [default: those with the DSP
-    /// extension, from m4 on]
+    /// extension, m4 to m33]
     #[arg(long, value_name = "CORE", value_parser = core)]
     pub(crate) core: Option<Core>,
     #[command(flatten)]

@@ -47,8 +47,8 @@ pub fn run(
     options.check_length()?;
     let is_timed = matches!(options.budget, Budget::Time(_));
     ensure!(
-        !is_timed || args.core.is_none_or(Core::has_dsp),
-        "--ms with --core: no time is predicted for cores without the DSP extension; use --bpw or --flash"
+        !is_timed || args.core.is_none_or(Core::has_default_layouts),
+        "--ms with --core: no time is predicted for cores with other layouts than the Cortex-M4; use --bpw or --flash"
     );
     check_budget(&source, &options)?;
     let (calib, shares) = learned_from(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();

@@ -85,9 +85,10 @@ pub fn report(image: &Image<'_>) -> String {
     let _ = writeln!(text, "self-test     {}", count(image.self_test_steps(), "step"));
     let features: Vec<_> = image.features().collect();
     let _ = writeln!(text, "features      {}, of the kernels on the target", features.join(" "));
-    if features.contains(&"scalar") {
-        let _ =
-            writeln!(text, "layouts       of cores without the DSP extension; slow on others: `actq repack` converts");
+    for (feature, cores) in [("scalar", "without the DSP extension"), ("helium", "with Helium")] {
+        if features.contains(&feature) {
+            let _ = writeln!(text, "layouts       of cores {cores}; slow on others: `actq repack` converts");
+        }
     }
     let _ = writeln!(text);
     let mut ops = table(&["op", "output", "input", "detail", "bits", "group", "x max", "bytes"]);

@@ -34,12 +34,11 @@ pub fn report(image: &Image<'_>, step: &StepTime) -> String {
 }
 
 /// Says why there is no time.
-pub const NOT_MODELLED: &str =
-    "No time is predicted: the weights are in the layouts of a core without the DSP extension.\n";
+pub const NOT_MODELLED: &str = "No time is predicted: the weights are in other layouts than those of the Cortex-M4.\n";
 
 /// Returns `true` if the model of the Cortex-M4 has the image's layouts.
 pub fn is_modelled(image: &Image<'_>) -> bool {
-    image.features().all(|feature| feature != "scalar")
+    image.features().all(|feature| !["scalar", "helium"].contains(&feature))
 }
 
 /// Formats the time of the step as a sentence.

@@ -27,7 +27,7 @@ pub enum Core {
     M7,
     /// Cortex-M33 with the DSP extension.
     M33,
-    /// Cortex-M55.
+    /// Cortex-M55 and M85, with Helium.
     M55,
 }
 
@@ -50,16 +50,18 @@ impl Core {
         Self::ALL.into_iter().find_map(|(known, core)| (known == name).then_some(core))
     }
 
-    /// Returns `true` if the core has the DSP extension, whose layouts are the default.
-    pub fn has_dsp(self) -> bool {
-        !matches!(self, Self::M0 | Self::M3 | Self::Rv32imac | Self::Rv32zb)
+    /// Returns `true` if the core's layouts are the default, those of the DSP extension.
+    pub fn has_default_layouts(self) -> bool {
+        self.lanes(Lanes::PAIRED_X_MAX, 0) == Lanes::Paired
     }
 
     /// Returns the lanes of a matrix for the core. Activations of more than 8 bits have only the DSP extension's.
     fn lanes(self, x_max: u16, group: usize) -> Lanes {
-        match self.has_dsp() || x_max > Lanes::PAIRED_X_MAX {
-            true => Lanes::of(x_max, group),
-            false => Lanes::Scalar,
+        match self {
+            _ if x_max > Lanes::PAIRED_X_MAX => Lanes::of(x_max, group),
+            Self::M55 => Lanes::Helium,
+            Self::M0 | Self::M3 | Self::Rv32imac | Self::Rv32zb => Lanes::Scalar,
+            Self::M4 | Self::M4f | Self::M7 | Self::M33 => Lanes::of(x_max, group),
         }
     }
 }
@@ -118,7 +120,7 @@ impl Repacked {
                 blocks.extend(record.emit()?);
                 let plan = Plan::new(shape).context("a block has no plan")?;
                 work = work.max(match lanes {
-                    Lanes::Scalar => plan.work(shape.cols),
+                    Lanes::Scalar | Lanes::Helium => plan.work(shape.cols),
                     Lanes::Single | Lanes::Paired => max_prepared_words(shape.cols, shape.group),
                 });
             }
@@ -212,7 +214,7 @@ mod tests {
     fn there_and_back_are_the_same_bytes() -> Result<()> {
         for (_, core) in Core::ALL {
             let packed = repack(VALID, core)?;
-            assert_eq!(packed == VALID, core.has_dsp(), "{core:?}");
+            assert_eq!(packed == VALID, core.has_default_layouts(), "{core:?}");
             assert_eq!(repack(&packed, core)?, packed, "{core:?}");
             assert_eq!(repack(&packed, Core::M4f)?, VALID, "{core:?}");
         }
@@ -221,15 +223,22 @@ mod tests {
 
     #[test]
     fn codes_scales_and_outputs_stay() -> Result<()> {
-        let packed = repack(VALID, Core::M3)?;
+        for (core, lanes, feature) in [(Core::M3, Lanes::Scalar, "scalar"), (Core::M55, Lanes::Helium, "helium")] {
+            stay_on(core, lanes, feature)?;
+        }
+        Ok(())
+    }
+
+    fn stay_on(core: Core, lanes: Lanes, feature: &str) -> Result<()> {
+        let packed = repack(VALID, core)?;
         let buffers = [ImageBuffer::new(VALID), ImageBuffer::new(&packed)];
         let [old, new] = [0, 1].map(|i| Image::new_checked(buffers[i].bytes()).expect("the image is valid"));
-        assert!(new.features().any(|feature| feature == "scalar"));
+        assert!(new.features().any(|needed| needed == feature));
         let mut rows = 0;
         for (old, new) in old.matrices().zip(new.matrices()) {
             for (old, new) in old.blocks().zip(new.blocks()) {
                 let shape = old.block.shape();
-                let is_int8 = new.block.shape().lanes == Lanes::Scalar;
+                let is_int8 = new.block.shape().lanes == lanes;
                 assert_eq!(BlockShape { lanes: shape.lanes, ..new.block.shape() }, shape);
                 assert!(is_int8 || new.block.words() == old.block.words());
                 let at = |block: &actq_kernels::Block<'_>, i: usize| {

@@ -1,4 +1,4 @@
-//! Whole images in the layouts of cores without the DSP extension, on these cores.
+//! Whole images in the layouts of other cores than those with the DSP extension, on these cores.
 
 use actq::emit::{Core, repack};
 use actq::graph::ops::{Concat, Gru, Linear, Lstm, Pointwise, Span};
@@ -52,7 +52,8 @@ fn repacked_images_act_like_the_host_on_every_core() -> Result<()> {
         (0..12).map(|_| (0..OBSERVATION).map(|_| random.normal()).collect()).collect();
     observations.push(vec![0.0; OBSERVATION]);
     // Each image of RV32IMAC is built in.
-    let cores: [(_, _, &[usize]); 3] = [
+    let cores: [(_, _, &[usize]); 4] = [
+        (Core::M55, Target::M55, &[0, 32, 64, 128]),
         (Core::M3, Target::NoDsp, &[0, 32, 64, 128]),
         (Core::M0, Target::V6m, &[0, 32, 64, 128]),
         (Core::Rv32imac, Target::Riscv, &[32]),
@@ -64,8 +65,9 @@ fn repacked_images_act_like_the_host_on_every_core() -> Result<()> {
             let matrices = buffer.image("repacked".as_ref())?.matrices();
             let blocks =
                 matrices.flat_map(|matrix| matrix.blocks().map(|rows| rows.block.shape().lanes).collect::<Vec<_>>());
-            let scalar = blocks.filter(|lanes| *lanes == Lanes::Scalar).count();
-            ensure!(scalar > 15, "{core:?}: {scalar} scalar blocks");
+            let lanes = if core == Core::M55 { Lanes::Helium } else { Lanes::Scalar };
+            let count = blocks.filter(|of_block| *of_block == lanes).count();
+            ensure!(count > 15, "{core:?}: {count} blocks of its layouts");
             same_bits(target, &bytes, &observations)?;
         }
     }

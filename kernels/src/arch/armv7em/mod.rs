@@ -27,6 +27,13 @@ pub(crate) fn gemv(product: Product<'_>) {
     if product.block.shape().lanes == crate::layout::Lanes::Scalar {
         return super::portable::gemv(product);
     }
+    #[cfg(feature = "helium")]
+    if product.block.shape().lanes == crate::layout::Lanes::Helium {
+        #[cfg(actq_helium)]
+        return super::helium::gemv(product);
+        #[cfg(not(actq_helium))]
+        return super::portable::gemv(product);
+    }
     let Product { block, x, first_row, acc, .. } = product;
     let [kernel, four] = kernels(block.shape());
     let layout = x.plan().layout;
@@ -56,6 +63,7 @@ pub(crate) fn gemv(product: Product<'_>) {
 }
 
 unsafe extern "C" {
+    #[cfg(not(actq_helium))]
     fn actq_magnitude(x: *const f32, len: usize) -> u32;
     fn actq_copy(from: *const u32, to: *mut u32, len: usize);
 }
@@ -71,6 +79,7 @@ pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
 }
 
 /// Returns the bits of the largest magnitude.
+#[cfg(not(actq_helium))]
 pub(crate) fn magnitude(x: &[f32]) -> u32 {
     let (eights, rest) = x.split_at(x.len() & !7);
     let largest = if eights.is_empty() {

@@ -66,6 +66,9 @@ const fn built(width: Width, lanes: Lanes) -> Both {
         // In Rust.
         #[cfg(feature = "scalar")]
         (_, Lanes::Scalar) => [[left_out; 2]; 2],
+        // In Rust, or for Helium.
+        #[cfg(feature = "helium")]
+        (_, Lanes::Helium) => [[left_out; 2]; 2],
     };
     if cfg!(feature = "groups") { both } else { [both[0], [left_out; 2]] }
 }

@@ -4,7 +4,7 @@
 //! that one load of an activation serves all of them. Lengths that the layout determines are constants.
 
 use crate::arch::product::Product;
-#[cfg(feature = "scalar")]
+#[cfg(any(feature = "scalar", feature = "helium"))]
 use crate::layout::Kernel;
 use crate::layout::{Format, QUAD, Sums, XLayout, with_format};
 
@@ -35,7 +35,11 @@ fn strips<F: Format>(product: Product<'_>) {
         Kernel::Planes => return super::planes::gemv::<F>(product),
         Kernel::Pairs => return super::pairs::gemv(product),
         Kernel::Bytes => return super::bytes::gemv(product),
-        Kernel::Strips => {}
+        Kernel::Strips | Kernel::Vectors => {}
+    }
+    #[cfg(feature = "helium")]
+    if F::KERNEL == Kernel::Vectors {
+        return super::vectors::gemv::<F>(product);
     }
     let Product { block, x, first_row, acc, .. } = product;
     let shape = block.shape();

@@ -11,12 +11,14 @@ mod pairs;
 #[cfg(feature = "scalar")]
 mod planes;
 mod vector;
+#[cfg(feature = "helium")]
+mod vectors;
 
 pub use cells::{gru_elements, lstm_elements};
 pub use elementwise::{denoise, normalize};
 pub use gemv::gemv;
 pub use norm::{standardize, sum, sum_squares};
-#[cfg(any(not(actq_fpu), feature = "scalar"))]
+#[cfg(any(not(actq_fpu), feature = "scalar", feature = "helium"))]
 pub(crate) use vector::quantize;
 #[cfg(actq_scaling)]
 pub(crate) use vector::scale_one;

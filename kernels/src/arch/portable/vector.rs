@@ -1,6 +1,6 @@
 //! Conversion of vectors between f32 and integers.
 
-#[cfg(any(not(actq_fpu), feature = "scalar"))]
+#[cfg(any(not(actq_fpu), feature = "scalar", feature = "helium"))]
 use crate::activations::{Plan, lay_out};
 use crate::layout::half::{bf16, half_word};
 use crate::math::{Native, Real};
@@ -17,7 +17,7 @@ pub fn copy(from: &[u32], to: &mut [u32]) {
 
 /// Quantizes `x` with the plan to the first words of `out`; `None`, with nothing written, if `out` is shorter than
 /// [`Plan::room`].
-#[cfg(any(not(actq_fpu), feature = "scalar"))]
+#[cfg(any(not(actq_fpu), feature = "scalar", feature = "helium"))]
 pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
     lay_out(x, plan, out.get_mut(..plan.room(x.len()))?, |value: f32| Native::of(value).rounded(inverse));
     Some(())

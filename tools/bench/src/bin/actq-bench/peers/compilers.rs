@@ -15,7 +15,7 @@ use super::cases::{Case, STEPS};
 #[derive(Debug)]
 pub(crate) struct Core {
     pub(crate) name: &'static str,
-    /// Board of the program; `None` for the Cortex-M55, for which the table of boards has none.
+    /// Board of the program; `None` for the Cortex-M55, whose programs have a linker script here.
     pub(crate) target: Option<Target>,
     /// Name of our package.
     pub(crate) package: Option<&'static str>,
