@@ -13,7 +13,7 @@ use actq_cli::importers::load;
 use actq_cli::outputs::unfinished::Scratch;
 use actq_cli::probes::probes;
 use actq_cli::report::deployment;
-use actq_deploy::{Answers, Bundle, DESCRIPTION, DeployFolder, read};
+use actq_deploy::{Answers, Bundle, DESCRIPTION, DeployFolder, read, targets};
 use actq_onnx::{ImportOptions, Onnx, import, import_bytes};
 use anyhow::anyhow;
 use numpy::{
@@ -106,23 +106,24 @@ impl Policy {
 
     /// Returns the actions at observations [step, value], one after the other from the start of an episode, or at one
     /// observation [value]; with scale, offset and limits, before what acts on executed actions: step limits, smoothing,
-    /// two-state actions, playback. A chunk is one row; a head that denoises takes its noise after the observation.
+    /// two-state actions, playback. A chunk is one row; a head that denoises takes its noise after the observation. The
+    /// policy of a deploy bundle takes raw values and gives its targets.
     fn __call__<'py>(
         &self,
         py: Python<'py>,
         #[pyo3(from_py_with = given)] observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
-        if self.policy.around.is_some() {
-            return Err(error!(
-                "a policy of a deploy bundle cannot be called; quantize it, and call a Head of its image"
-            ));
-        }
-        let (given, len) = (observations.shape().to_vec(), self.policy.graph.input_len());
+        let is_bundle = self.policy.around.is_some();
+        let (len, values_of) = match is_bundle {
+            true => (self.obs_len(), self.act_len()),
+            false => (self.policy.graph.input_len(), self.policy.chunk * self.policy.act_len),
+        };
+        let given = observations.shape().to_vec();
         let shape = match given[..] {
-            [values] if values == len => vec![self.policy.chunk * self.policy.act_len],
-            [steps, values] if values == len => vec![steps, self.policy.chunk * self.policy.act_len],
+            [values] if values == len => vec![values_of],
+            [steps, values] if values == len => vec![steps, values_of],
             _ => {
-                let noise = len - self.policy.graph.obs_len;
+                let noise = if is_bundle { 0 } else { len - self.policy.graph.obs_len };
                 let of = if noise > 0 { format!(" ({noise} of them noise)") } else { String::new() };
                 return Err(error!(
                     "the observations have the shape {given:?}; use [{len}]{of} for one, or [steps, {len}]"
@@ -132,8 +133,9 @@ impl Policy {
         let observations: Vec<f32> = observations.as_array().iter().copied().collect();
         let rows: Vec<Vec<f32>> = observations.chunks(len).map(<[f32]>::to_vec).collect();
         let policy = Arc::clone(&self.policy);
-        let actions = work::interruptible(py, None, move |_| Ok(actions(&policy, &rows).concat()))?;
-        actions.into_pyarray(py).reshape(shape)
+        let run = move || if is_bundle { targets(&policy.dir, &rows) } else { Ok(actions(&policy, &rows)) };
+        let actions = work::interruptible(py, None, move |_| Ok(run().or_raise()))??;
+        actions.concat().into_pyarray(py).reshape(shape)
     }
 
     /// Returns the policy itself, because it never changes.

@@ -140,22 +140,25 @@ def test_runners_of_rsl_rl_give_their_policy(tmp_path):
         num_envs, num_actions, max_episode_length, device, cfg = 2, 2, 10, "cpu", {}
         episode_length_buf = torch.zeros(2)
 
-        def get_observations(self):
-            return tensordict.TensorDict({"policy": torch.randn(2, 3), "height": torch.randn(2, 4)}, batch_size=[2])
+        def __init__(self, height):
+            self.height = height
 
-    def runner(kind):
+        def get_observations(self):
+            return tensordict.TensorDict({"policy": torch.randn(2, 3), "height": torch.randn(2, *self.height)}, batch_size=[2])
+
+    cnn = {"output_channels": [2], "kernel_size": [3], "stride": [2], "activation": "elu"}
+    cell = {"rnn_hidden_dim": 6, "rnn_num_layers": 1}
+
+    def runner(name, env, more):
         torch.manual_seed(2)
         network = {"hidden_dims": [8], "activation": "elu", "obs_normalization": True}
-        if kind != "MLPModel":
-            network |= {"rnn_type": kind, "rnn_hidden_dim": 6, "rnn_num_layers": 1}
-        name = "MLPModel" if kind == "MLPModel" else "RNNModel"
         distribution = {"class_name": "GaussianDistribution", "init_std": 1.0, "std_type": "scalar"}
         made = runners.OnPolicyRunner(
-            Env(),
+            env,
             {
                 "algorithm": {"class_name": "PPO", "rnd_cfg": None, "symmetry_cfg": None},
-                "actor": {"class_name": name, "distribution_cfg": distribution, **network},
-                "critic": {"class_name": name, **network},
+                "actor": {"class_name": name, "distribution_cfg": distribution, **network, **more},
+                "critic": {"class_name": "MLPModel", **network},
                 "obs_groups": {"actor": ["policy", "height"], "critic": ["policy"]},
                 "num_steps_per_env": 4,
                 "save_interval": 10,
@@ -163,19 +166,26 @@ def test_runners_of_rsl_rl_give_their_policy(tmp_path):
             log_dir=None,
         )
         for _ in range(5):
-            made.alg.get_policy().update_normalization(Env().get_observations() * 3 + 2)
+            made.alg.get_policy().update_normalization(env.get_observations() * 3 + 2)
         return made
 
-    for kind in ("MLPModel", "lstm", "gru"):
-        made = runner(kind)
+    for name, height, more in [
+        ("MLPModel", (4,), {}),
+        ("RNNModel", (4,), {"rnn_type": "lstm", **cell}),
+        ("RNNModel", (4,), {"rnn_type": "gru", **cell}),
+        ("CNNModel", (1, 5, 5), {"cnn_cfg": cnn}),
+    ]:
+        env, values = Env(height), 3 + int(np.prod(height))
+        made = runner(name, env, more)
         # As after training.
-        made.alg.get_policy()(Env().get_observations(), stochastic_output=True)
+        made.alg.get_policy()(env.get_observations(), stochastic_output=True)
         policy = actq.import_policy(made)
-        assert (policy.obs_len, policy.act_len) == (7, 2)
+        assert (policy.obs_len, policy.act_len) == (values, 2)
         own = made.get_inference_policy(device="cpu")
         own.reset()
-        rows = np.random.default_rng(1).normal(size=(9, 7)).astype(np.float32)
+        rows = np.random.default_rng(1).normal(size=(9, values)).astype(np.float32)
         with torch.no_grad():
-            given = [tensordict.TensorDict({"policy": x[:, :3], "height": x[:, 3:]}, [1]) for x in torch.from_numpy(rows)[:, None]]
+            steps = [(x[:, :3], x[:, 3:].reshape(1, *height)) for x in torch.from_numpy(rows)[:, None]]
+            given = [tensordict.TensorDict({"policy": proprioception, "height": scan}, [1]) for proprioception, scan in steps]
             expected = np.concatenate([own(x).numpy() for x in given])
         np.testing.assert_allclose(policy(rows), expected, rtol=1e-4, atol=1e-5)

@@ -167,6 +167,15 @@ def test_a_profile_describes_a_stack_of_ones_own(mlp, tmp_path):
     profile.write_text(PROFILE)
     policy = actq.import_policy(bundle, profile=profile)
     assert (policy.obs_len, policy.act_len, policy.rate_hz) == (8, 4, 50.0)
+    # Raw values in, targets out; the network's last action is fed back.
+    raw, home, last = np.random.default_rng(0).normal(size=(3, 8)).astype(np.float32), np.array([0.1, 0.2, 0.3, 0.4]), np.zeros(4)
+    network, expected = actq.import_policy(mlp), []
+    for joints, gyro in zip(raw[:, :4], raw[:, 4:]):
+        last = network(np.concatenate([gyro, joints - home, last]))
+        expected.append(home + 0.25 * last)
+    np.testing.assert_allclose(policy(raw), expected, rtol=1e-4, atol=1e-5)
+    with pytest.raises(actq.Error, match=r"the shape \[7\]; use \[8\] for one"):
+        policy(raw[0, :7])
     with pytest.raises(actq.Error, match="profile: .*no.toml: "):
         actq.import_policy(bundle, profile=tmp_path / "no.toml")
     with pytest.raises(actq.Error, match="mlp.onnx: only a deploy bundle takes accept_profile, answers and profile"):

@@ -106,3 +106,23 @@ pub fn observed(folder: &Path, raw: &Dataset) -> Result<Dataset> {
     }
     Ok(Dataset { path: raw.path.clone(), obs, action: None, length: raw.length.clone(), state: None })
 }
+
+/// Returns the targets of a folder's description for raw values [tick][value], one tick after the other from a reset.
+///
+/// # Errors
+///
+/// If the folder cannot be read, a tick has another number of values, or a quaternion is not an orientation.
+pub fn targets(folder: &Path, raw: &[Vec<f32>]) -> Result<Vec<Vec<f32>>> {
+    let bundle = Bundle::open(folder)?;
+    let description = Description::parse(&bundle.text(DESCRIPTION)?).context(DESCRIPTION)?;
+    let plan = Plan::new(&description, &bundle).context(DESCRIPTION)?;
+    let len: usize = plan.inputs().iter().map(|(_, len)| len).sum();
+    let mut runner = Runner::new(plan);
+    let tick = |(tick, values): (usize, &Vec<f32>)| {
+        ensure!(values.len() == len, "tick {tick} has {} values, and the raw inputs {len}", values.len());
+        let inputs = runner.plan().split(values);
+        let found = runner.step(&inputs).with_context(|| format!("tick {tick}"))?;
+        Ok(found.targets.iter().flat_map(|(_, values)| values.iter().map(|value| *value as f32)).collect())
+    };
+    raw.iter().enumerate().map(tick).collect()
+}

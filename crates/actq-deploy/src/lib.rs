@@ -32,7 +32,7 @@ pub use bundle::Bundle;
 pub use compile::Deployment;
 pub use conventions::{Variant, variants};
 pub use facts::{Answers, Question};
-pub use importer::{DeployFolder, observed};
+pub use importer::{DeployFolder, observed, targets};
 pub use label::Label;
 pub use orders::orders;
 pub use plan::Plan;

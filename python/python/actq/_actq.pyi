@@ -54,7 +54,8 @@ class Policy:
     def __call__(self, observations: npt.ArrayLike) -> _Floats:
         """Returns the actions in f32 at observations [steps, obs_len] of one episode, from its start, or at one observation
         [obs_len]: the network's outputs with scale, offset and limits, before step limits, smoothing, two-state actions and
-        playback. A chunk is one row; a head that denoises takes its noise after the observation."""
+        playback. A chunk is one row; a head that denoises takes its noise after the observation. The policy of a deploy bundle
+        takes raw values and gives its targets."""
 
 class Cost(TypedDict):
     """The predicted cost of a step that evaluates the network, and the memory that it needs."""

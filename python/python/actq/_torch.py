@@ -75,11 +75,15 @@ def import_module(
 class Memory(Error):
     """A module keeps values from step to step."""
 
-    def __init__(self, name: str, changed: Sequence[str]) -> None:
-        super().__init__(
-            f"{name}: the action depends on values that forward keeps from step to step: {', '.join(changed)}; take them as "
-            "inputs. States of LSTM and GRU layers are kept, as tensors of a module or with states="
+    def __init__(self, name: str, changed: Sequence[str], is_script: bool) -> None:
+        remedy = (
+            "of TorchScript they cannot be taken; pass the runner or module that it was made of, or an ONNX file that has them as "
+            "inputs and outputs"
+            if is_script
+            else "take them as inputs. States of LSTM and GRU layers are kept, as tensors of a module or with states="
         )
+        kept = ", ".join(changed)
+        super().__init__(f"{name}: the action depends on values that forward keeps from step to step: {kept}; {remedy}")
         self.changed = changed
 
 
@@ -98,7 +102,8 @@ class Source:
     ) -> None:
         self.module, self.inputs, self.name, self.rate_hz = module, inputs, name, rate_hz
         step = self.copied()
-        self.limits = limits if isinstance(step, torch.jit.ScriptModule) else _sb3.limited(step, limits, name)
+        self.is_script = isinstance(step, torch.jit.ScriptModule)
+        self.limits = limits if self.is_script else _sb3.limited(step, limits, name)
         try:
             outputs = step(*inputs)
         except Exception as error:
@@ -144,7 +149,7 @@ class Source:
             )  # fmt: skip
         except Error as error:
             changed = self.kept_values()
-            raise (Memory(self.name, changed) if changed else error) from error.__cause__
+            raise (Memory(self.name, changed, self.is_script) if changed else error) from error.__cause__
         self.compare(self.plan, branches)
         return policy
 
@@ -155,7 +160,7 @@ class Source:
         used = self.copied()
         found = list(tensors(used(*self.inputs), "output", self.name))
         kept = kept_tensors(used, changed)
-        if not kept or isinstance(used, (_sb3.Deterministic, torch.jit.ScriptModule)):
+        if not kept or self.is_script or isinstance(used, _sb3.Deterministic):
             return None
         held = tuple(torch.zeros_like(value) for values in kept.values() for value in values)
         inputs = self.input_names or ["input_0"]
@@ -183,7 +188,6 @@ class Source:
         """Exports by the tracing exporter, which needs only torch, else by that of torch.export, which knows more
         operators."""
         module: Any = self.copied()
-        is_script = isinstance(module, torch.jit.ScriptModule)
         module = module if len(self.output_names) < 2 else Flat(module, self.name)
         names: Dict[str, Any] = {"input_names": self.input_names or None, "output_names": self.output_names or None}
         file = io.BytesIO()
@@ -191,7 +195,7 @@ class Source:
             torch.onnx.export(module, self.inputs, file, opset_version=OPSET, dynamo=False, **names)  # type: ignore[arg-type]
             return file.getvalue()
         except Exception as error:
-            if not is_script and find_spec("onnxscript") is not None:
+            if not self.is_script and find_spec("onnxscript") is not None:
                 with contextlib.suppress(Exception):
                     program = torch.onnx.export(module, self.inputs, dynamo=True, verbose=False, **names)
                     assert program is not None, "without a file torch returns the program"
@@ -240,9 +244,9 @@ class Source:
         error = share(actions - found, found)
         traced = [warning for warning in branches if f"{torch.__path__[0]}/" not in warning.filename]
         if error > TOLERANCE and not self._is_rounding(plan, found):
-            raise Memory(self.name, changed) if changed else Error(f"{self.name}: {self._cause(plan, found, error, traced)}")
+            raise Memory(self.name, changed, self.is_script) if changed else Error(f"{self.name}: {self._cause(plan, found, error, traced)}")
         if changed and depends_on(used, changed, lambda: self.run(used, plan, probes[:1]), found[:1], share):
-            raise Memory(self.name, changed)
+            raise Memory(self.name, changed, self.is_script)
         for text in dict.fromkeys(map(branch, traced)):
             log.warning("%s: %s; no drawn observation shows a difference", self.name, text)
         still = [i for i in range(found.shape[-1]) if np.ptp(found[..., i]) == 0]

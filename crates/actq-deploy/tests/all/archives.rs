@@ -81,6 +81,24 @@ fn archives_carry_what_they_begin_with() -> Result<()> {
 }
 
 #[test]
+fn archives_without_memory_have_no_state() -> Result<()> {
+    let [_, init] = step_and_init();
+    let step = onnx::shaped(
+        &[("MatMul", &["joint_angles", "weight"], &["action"], &[]), ("Identity", &["carry"], &["next"], &[])],
+        &[("weight", &[2, 2], onnx::weights(2, 2))],
+        &[("joint_angles", &[2]), ("carry", &[2])],
+        &[("action", &[2]), ("next", &[2])],
+        &[],
+    );
+    let files = packed(&[("init_fn.onnx", &init), ("step_fn.onnx", &step), ("metadata.json", JSON.as_bytes())])?;
+    let description = files.reading(true, "packed.rate_hz = 50\npacked.target = \"position\"\n")?.description;
+    assert!(description.states.is_empty());
+    let target = Runner::new(files.plan(&description)?).step(&[vec![1.0, 2.0]])?.targets.remove(0).1;
+    assert!(target.iter().zip([0.07, 0.10]).all(|(own, expected)| (own - expected).abs() < 1e-6), "{target:?}");
+    Ok(())
+}
+
+#[test]
 fn damaged_archives_are_refused() -> Result<()> {
     let [step, init] = step_and_init();
     let with =

@@ -1,6 +1,7 @@
 //! Files of kinfer 0.6: archives of two graphs and their metadata.
 
 use std::collections::BTreeMap;
+use std::slice;
 
 use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
@@ -56,8 +57,14 @@ pub(super) fn read(bundle: &Bundle, found: &Recognized, facts: &mut Facts) -> Re
     parts.joints("robot", joints);
     let mut network =
         Network { name: "policy".to_owned(), file: file.clone(), inputs: BTreeMap::new(), states: BTreeMap::new() };
-    let outputs = [action.clone(), next.clone()];
-    let used = bundle.network(&network, &outputs).with_context(|| file.clone())?.inputs().to_vec();
+    let read_by = |outputs: &[String]| -> Result<Vec<(String, usize)>> {
+        Ok(bundle.network(&network, outputs).with_context(|| file.clone())?.inputs().to_vec())
+    };
+    let mut used = read_by(slice::from_ref(action))?;
+    // A network without memory returns its carry as it is.
+    if used.iter().any(|(name, _)| name == "carry") {
+        used = read_by(&[action.clone(), next.clone()])?;
+    }
     for (input, len) in &inputs {
         let expected = expected(meta, input, *n)?;
         if *len != expected {
