@@ -170,7 +170,7 @@ def test_a_profile_describes_a_stack_of_ones_own(mlp, tmp_path):
     # Raw values in, targets out; the network's last action is fed back.
     raw, home, last = np.random.default_rng(0).normal(size=(3, 8)).astype(np.float32), np.array([0.1, 0.2, 0.3, 0.4]), np.zeros(4)
     network, expected = actq.import_policy(mlp), []
-    for joints, gyro in zip(raw[:, :4], raw[:, 4:]):
+    for gyro, joints in zip(raw[:, :4], raw[:, 4:]):
         last = network(np.concatenate([gyro, joints - home, last]))
         expected.append(home + 0.25 * last)
     np.testing.assert_allclose(policy(raw), expected, rtol=1e-4, atol=1e-5)

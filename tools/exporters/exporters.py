@@ -3,14 +3,16 @@
     python exporters.py NAME
 
 in an environment with actq, torch 2.15.0, onnxruntime, onnxscript and the package. One function for each package has its cases;
-each prints a row: kind | form | outcome. Releases that were read are in docs/records/2026-11-28-exporters.md.
+each prints rows: kind | form | outcome | error of the actions. Releases that were read are in docs/records/2026-11-29-exporters.md;
+expected.txt has the outcomes that `cargo xtask exporters` expects.
 """
 
 import contextlib
-import copy
 import io
 import logging
 import os
+import re
+import shutil
 import sys
 import tempfile
 import warnings
@@ -37,51 +39,63 @@ def observations(length=OBS):
     return (np.random.default_rng(1).normal(size=(STEPS, length)) * 2 + 0.3).astype(np.float32)
 
 
-def row(kind, form, make, act=None, width=OBS, discrete=False, **options):
+def row(kind, form, make, act=None, width=OBS, discrete=False, episode=None, tolerance=TOLERANCE, **options):
     """Exports by `make`, imports what it returns, and prints the outcome.
 
     act: the package's own actions at observations [step, value] of one episode; without it, onnxruntime runs the file.
     discrete: the policy gives scores, and the action is the largest.
+    episode: gives the observations or raw values of a run of the package, and its actions, instead of `act`.
     """
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             source = make()
-            expected = None if act is None else np.asarray(act(observations(width)), np.float64)
+            rows, expected = episode() if episode else (None, None if act is None else act(observations(width)))
+            expected = None if expected is None else np.asarray(expected, np.float64)
     except Exception as error:
-        return print(f"{kind} | {form} | export fails: {short(error)}", flush=True)
+        return outcome(kind, form, f"export fails: {short(error)}")
     import actq
 
     try:
         policy = actq.import_policy(source, **options)
     except actq.Error as error:
-        return print(f"{kind} | {form} | refused: {short(error)}", flush=True)
-    rows = observations(policy.obs_len)
+        return outcome(kind, form, f"{'asks' if 'says profile' in str(error) else 'refused'}: {short(error)}")
+    rows = observations(policy.obs_len) if rows is None else np.asarray(rows, np.float32)
     try:
         expected = run_file(source, rows, policy) if expected is None else expected
     except Exception as error:
-        return print(f"{kind} | {form} | onnxruntime fails: {short(error)}", flush=True)
+        return outcome(kind, form, f"onnxruntime fails: {short(error)}")
     found = policy(rows)
     expected = expected.reshape(len(expected), -1)
     found = found.argmax(axis=1)[:, None] if discrete else found
     # A choice is right or wrong; its number has no size.
     size = 1.0 if discrete else np.abs(expected).max()
     error = np.abs(found - expected).max() / size if found.shape == expected.shape else np.inf
-    outcome = f"imports, off by {error:.0e}" if error <= TOLERANCE else f"WRONG: off by {error:.0e} of the largest action"
-    print(f"{kind} | {form} | {outcome}", flush=True)
+    outcome(kind, form, "imports" if error <= tolerance else "WRONG", f"{error:.0e}")
+
+
+def outcome(kind, form, text, error=""):
+    print(f"{kind} | {form} | {text} | {error}", flush=True)
 
 
 def short(error):
+    """The first cause in one line, without what differs from run to run."""
+    while error.__cause__ is not None:
+        error = error.__cause__
     text = " ".join(str(error).split()) or type(error).__name__
-    for folder in (tempfile.gettempdir(), os.getcwd(), sys.prefix):
-        text = text.replace(folder + "/", "")
-    return text if len(text) < 240 else text[:240] + " .."
+    for place in (tempfile.gettempdir(), os.getcwd(), sys.prefix):
+        text = text.replace(place + "/", "")
+    text = re.sub(r"\.tmp\w+/|\x1b\[\d*m", "", re.sub(r"0x[0-9a-f]+", "0x..", text))
+    return text if len(text) < 160 else text[:160] + " .."
 
 
 def run_file(path, rows, policy):
     """Runs an ONNX file over an episode: outputs that are no action go back into the inputs that the policy does not read."""
     import onnxruntime
 
-    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    options = onnxruntime.SessionOptions()
+    # Its optimizer rounds the observation of a layer with quantized weights to 8 bits.
+    options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_DISABLE_ALL
+    session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     inputs = session.get_inputs()
     sizes = {i.name: [n if isinstance(n, int) else 1 for n in i.shape] for i in inputs}
     observed, states, total = [], [], 0
@@ -90,7 +104,7 @@ def run_file(path, rows, policy):
         (observed if total + length <= policy.obs_len else states).append(i.name)
         total += length if total + length <= policy.obs_len else 0
     values = {name: np.zeros(sizes[name], np.float32) for name in sizes}
-    names, actions = [o.name for o in session.get_outputs()], []
+    actions = []
     for obs in rows:
         at = 0
         for name in observed:
@@ -246,7 +260,8 @@ def stable_baselines3():
     import gymnasium
     import torch
     from gymnasium import spaces
-    from stable_baselines3 import DQN, PPO, SAC, TD3
+    from sb3_contrib import QRDQN, TQC, TRPO, CrossQ, RecurrentPPO
+    from stable_baselines3 import A2C, DDPG, DQN, PPO, SAC, TD3
     from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
     box = spaces.Box(-np.inf, np.inf, (OBS,), np.float32)
@@ -266,18 +281,36 @@ def stable_baselines3():
     def vec(**options):
         return VecNormalize(DummyVecEnv([lambda: Env(**options)]))
 
-    # SAC writes into its policy_kwargs.
-    short_ppo = {"n_steps": 16, "batch_size": 16, "policy_kwargs": {"net_arch": [16, 16]}}
-    small = {"buffer_size": 10, "policy_kwargs": {"net_arch": [16, 16]}}
-    for kind, make in [
-        ("PPO", lambda: PPO("MlpPolicy", Env(), **short_ppo)),
-        ("PPO, VecNormalize", lambda: PPO("MlpPolicy", vec(), **short_ppo).learn(64)),
-        ("PPO, Dict", lambda: PPO("MultiInputPolicy", Env(observed=parts), **short_ppo)),
-        ("PPO, Discrete", lambda: PPO("MlpPolicy", Env(discrete=True), **short_ppo)),
-        ("SAC, squashed", lambda: SAC("MlpPolicy", Env(), **copy.deepcopy(small))),
-        ("TD3, squashed", lambda: TD3("MlpPolicy", Env(), **small)),
-        ("DQN, Discrete", lambda: DQN("MlpPolicy", Env(discrete=True), **small)),
+    short_ppo = {"n_steps": 16, "batch_size": 16}
+    small = {"buffer_size": 10}
+
+    def policy_kwargs():
+        # SAC writes into the dict that it is given.
+        return {"net_arch": [16, 16]}
+
+    for kind, algorithm, env, more in [
+        ("PPO", PPO, Env, short_ppo),
+        ("PPO, VecNormalize", PPO, vec, short_ppo),
+        ("PPO, Dict", PPO, lambda: Env(observed=parts), short_ppo),
+        ("PPO, Discrete", PPO, lambda: Env(discrete=True), short_ppo),
+        ("PPO, state-dependent noise", PPO, Env, {**short_ppo, "use_sde": True}),
+        ("A2C", A2C, Env, {}),
+        ("SAC, squashed", SAC, Env, small),
+        ("TD3, squashed", TD3, Env, small),
+        ("DDPG, squashed", DDPG, Env, small),
+        ("DQN, Discrete", DQN, lambda: Env(discrete=True), small),
+        ("TQC, squashed", TQC, Env, small),
+        ("CrossQ, batch renormalization", CrossQ, Env, small),
+        ("TRPO", TRPO, Env, short_ppo),
+        ("QR-DQN, Discrete", QRDQN, lambda: Env(discrete=True), small),
+        ("RecurrentPPO", RecurrentPPO, Env, {"n_steps": 16, "batch_size": 16}),
     ]:
+        kind_of = "MultiInputPolicy" if "Dict" in kind else "MlpLstmPolicy" if "Recurrent" in kind else "MlpPolicy"
+
+        def make(algorithm=algorithm, env=env, more=more, kind_of=kind_of):
+            made = algorithm(kind_of, env(), policy_kwargs=policy_kwargs(), device="cpu", **more)
+            return made.learn(64) if env is vec or algorithm is CrossQ else made
+
         made = []
 
         def model(make=make, made=made):
@@ -390,10 +423,21 @@ def rsl_rl():
             own().export_policy_to_onnx(str(path.parent), path.name)
             return str(path)
 
+        def script(own=own):
+            own().export_policy_to_jit(tempfile.gettempdir(), "rsl_rl.pt")
+            return str(Path(tempfile.gettempdir(), "rsl_rl.pt"))
+
         width = sum(int(np.prod(shape)) for shape in groups.values())
+        example = tuple(torch.zeros(1, *shape) for shape in groups.values())
+        if actor.get("class_name") != "CNNModel":
+            example = (torch.cat([part.flatten(1) for part in example], 1),)
         row(kind, "runner", own, act, width)
-        made.clear()
-        row(kind, "export_policy_to_onnx", onnx, act, width)
+        for form, export, options in [
+            ("export_policy_to_onnx", onnx, {}),
+            ("export_policy_to_jit", script, {"example": example if len(example) > 1 else example[0]}),
+        ]:
+            made.clear()
+            row(kind, form, export, act, width, **options)
 
 
 @package
@@ -437,6 +481,30 @@ def skrl():
             action, outputs = self.model.act({"observations": obs}, role="policy")
             return outputs.get("mean_actions", action)
 
+    class Cell(GaussianMixin, Model):
+        def __init__(self, cell):
+            Model.__init__(self, observation_space=space, action_space=actions, device="cpu")
+            GaussianMixin.__init__(self)
+            self.cell, self.net = cell(OBS, 16, batch_first=True), nn.Linear(16, ACT)
+            self.log_std_parameter = nn.Parameter(torch.zeros(ACT))
+
+        def compute(self, inputs, role=""):
+            states = inputs["rnn"]
+            y, states = self.cell(inputs["observations"][:, None], states if len(states) > 1 else states[0])
+            states = states if isinstance(states, tuple) else (states,)
+            return self.net(y[:, 0]), {"log_std": self.log_std_parameter, "rnn": list(states)}
+
+    class Recurrent(nn.Module):
+        def __init__(self, model):
+            super().__init__()
+            self.model = model
+
+        def forward(self, obs, *states):
+            _, outputs = self.model.act({"observations": obs, "rnn": states}, role="policy")
+            return (outputs["mean_actions"], *outputs["rnn"])
+
+    for name, cell, count in (("LSTM", nn.LSTM, 2), ("GRU", nn.GRU, 1)):
+        recurrent(name, Recurrent(Cell(cell)), count)
     scaler = RunningStandardScaler(size=OBS, device="cpu")
     scaler(torch.randn(200, OBS) * 3 + 1, train=True)
     for kind, module in [
@@ -592,6 +660,125 @@ def torchao():
 
 
 @package
+def onnxruntime():
+    import torch
+    from onnxruntime import quantization as q
+    from onnxruntime.quantization import matmul_nbits_quantizer as nbits
+    from torch import nn
+
+    import onnxruntime
+
+    torch.manual_seed(0)
+    module = nn.Sequential(nn.Linear(OBS, 32), nn.ELU(), nn.Linear(32, 32), nn.ELU(), nn.Linear(32, ACT))
+    # The quantizers do not know Gemm.
+    base = by_torch(module, "ort", False, (torch.zeros(1, 1, OBS),), input_names=["input"])()
+
+    class Reader(q.CalibrationDataReader):
+        def __init__(self):
+            self.rows = iter(observations())
+
+        def get_next(self):
+            row = next(self.rows, None)
+            return None if row is None else {"input": row[None, None]}
+
+    def made(write):
+        def make():
+            path = file("ort_quantized")
+            write(path)
+            return path
+
+        return make
+
+    def blocks(bits, form, symmetric):
+        def write(path):
+            config = nbits.DefaultWeightOnlyQuantConfig(
+                block_size=16, is_symmetric=symmetric, bits=bits, quant_format=form, op_types_to_quantize=("MatMul",)
+            )
+            import onnx
+
+            quantizer = nbits.MatMulNBitsQuantizer(onnx.load(base), algo_config=config)
+            quantizer.process()
+            quantizer.model.save_model_to_file(path, False)
+
+        return write
+
+    def optimized(level):
+        def write(path):
+            options = onnxruntime.SessionOptions()
+            options.graph_optimization_level, options.optimized_model_filepath = level, path
+            onnxruntime.InferenceSession(base, options, providers=["CPUExecutionProvider"])
+
+        return write
+
+    qdq, operator = q.QuantFormat.QDQ, q.QuantFormat.QOperator
+    levels = onnxruntime.GraphOptimizationLevel
+    for kind, form, write in [
+        ("int8 weights", "quantize_dynamic", lambda path: q.quantize_dynamic(base, path)),
+        ("int8 weights and activations", "quantize_static, QDQ", lambda path: q.quantize_static(base, path, Reader(), quant_format=qdq)),
+        ("int8 weights and activations", "quantize_static, QOperator", lambda path: q.quantize_static(base, path, Reader(), quant_format=operator)),
+        ("int4 blocks, symmetric", "MatMulNBits, QDQ", blocks(4, qdq, True)),
+        ("int4 blocks, zero points", "MatMulNBits, QDQ", blocks(4, qdq, False)),
+        ("int8 blocks: stays float32", "MatMulNBits, QDQ", blocks(8, qdq, False)),
+        ("int4 blocks, symmetric", "MatMulNBits, QOperator", blocks(4, operator, True)),
+        ("MLP", "optimized file, BASIC", optimized(levels.ORT_ENABLE_BASIC)),
+        ("MLP", "optimized file, EXTENDED", optimized(levels.ORT_ENABLE_EXTENDED)),
+    ]:  # fmt: skip
+        row(kind, form, made(write))
+
+
+@package
+def optimizers():
+    import onnx
+    import onnxoptimizer
+    import onnxsim
+    import onnxslim
+    import torch
+    from torch import nn
+
+    class Recurrent(nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.cell, self.out = nn.LSTM(OBS, 16), nn.Linear(16, ACT)
+
+        def forward(self, x, h, c):
+            y, (h, c) = self.cell(x[None], (h, c))
+            return self.out(y[0]), h, c
+
+    torch.manual_seed(0)
+    mean, deviation = torch.linspace(-1, 1, OBS), torch.linspace(0.5, 2, OBS)
+
+    class Normalized(nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.net = nn.Sequential(nn.Linear(OBS, 24), nn.LayerNorm(24), nn.SiLU(), nn.Linear(24, ACT))
+
+        def forward(self, x):
+            return torch.tanh(self.net(((x - mean) / deviation).clamp(-5, 5)))
+
+    zeros = [torch.zeros(1, 1, 16)] * 2
+    names = {"input_names": ["obs", "h", "c"], "output_names": ["action", "h_next", "c_next"]}
+    for kind, module, inputs, options in [
+        ("normalizer, layer norm, SiLU, tanh", Normalized(), (torch.zeros(1, OBS),), {}),
+        ("LSTM, one tensor for h and c", Recurrent(), (torch.zeros(1, OBS), *zeros), names),
+    ]:
+        for dynamo in (False, True):
+            base = by_torch(module, "optimized", dynamo, inputs, **options)()
+            for tool, run in [
+                ("onnxslim", onnxslim.slim),
+                ("onnxsim", lambda model: onnxsim.simplify(model)[0]),
+                ("onnxoptimizer", onnxoptimizer.optimize),
+            ]:
+
+                def make(run=run, base=base):
+                    onnx.save(run(onnx.load(base)), file("optimized_after"))
+                    return file("optimized_after")
+
+                zero = [torch.zeros(1, 1, 16)] * 2
+                act = acts(module.eval(), zero if options else ())
+                row(kind, f"{tool}, " + ("dynamo" if dynamo else "tracing"), make, act)
+
+
+@package
 def keras():
     os.environ["KERAS_BACKEND"] = "torch"
     import keras
@@ -669,6 +856,188 @@ def jax2onnx():
             return file("jax")
 
         row(kind, "to_onnx", export, lambda rows, f=function: [np.asarray(f(obs[None])).reshape(-1) for obs in rows])
+
+
+def folder(name):
+    """An empty folder."""
+    path = Path(tempfile.gettempdir(), name)
+    shutil.rmtree(path, ignore_errors=True)
+    path.mkdir()
+    return path
+
+
+@package
+def lerobot():
+    import torch
+    from lerobot.configs.types import FeatureType, NormalizationMode, PolicyFeature
+    from lerobot.policies.factory import make_pre_post_processors
+    from lerobot.policies.gaussian_actor import GaussianActorConfig, GaussianActorPolicy
+
+    random = np.random.default_rng(3)
+
+    def statistics(length):
+        center = random.normal(size=length).astype(np.float32)
+        width = random.uniform(0.5, 2, length).astype(np.float32)
+        return {"mean": center, "std": width, "min": center - 2 * width, "max": center + 2 * width,
+                "q01": center - width, "q99": center + width}  # fmt: skip
+
+    stats = {"observation.state": statistics(OBS), "action": statistics(ACT)}
+    stats = {key: {name: torch.from_numpy(value) for name, value in part.items()} for key, part in stats.items()}
+
+    class Network(torch.nn.Module):
+        def __init__(self, policy):
+            super().__init__()
+            self.policy = policy
+
+        def forward(self, state):
+            actor = self.policy.actor
+            return torch.tanh(actor.mean_layer(actor.network(actor.encoder({"observation.state": state}))))
+
+    for mode in ("MEAN_STD", "MIN_MAX", "QUANTILES"):
+        config = GaussianActorConfig(
+            input_features={"observation.state": PolicyFeature(FeatureType.STATE, (OBS,))},
+            output_features={"action": PolicyFeature(FeatureType.ACTION, (ACT,))},
+            normalization_mapping={"STATE": NormalizationMode[mode], "ACTION": NormalizationMode[mode], "ENV": NormalizationMode[mode]},
+            device="cpu", push_to_hub=False,
+        )  # fmt: skip
+        torch.manual_seed(0)
+        policy = GaussianActorPolicy(config).eval()
+        before, after = make_pre_post_processors(config, dataset_stats=stats)
+
+        def make(policy=policy, before=before, after=after):
+            path = folder("lerobot")
+            policy.save_pretrained(path)
+            before.save_pretrained(path)
+            after.save_pretrained(path)
+            names = {"input_names": ["observation.state"], "output_names": ["action"]}
+            torch.onnx.export(Network(policy).eval(), (torch.zeros(1, OBS),), str(path / "policy.onnx"), dynamo=False, **names)
+            return str(path)
+
+        def act(rows, policy=policy, before=before, after=after):
+            with torch.no_grad():
+                return [after(Network(policy)(before({"observation.state": torch.from_numpy(obs)})["observation.state"])) for obs in rows]
+
+        kind = f"gaussian_actor, {mode}"
+        row(kind, "pretrained model and ONNX", make, act)
+        answers = {"graph.complete": True, "rate_hz": 30}
+        row(kind, "with answers", make, act, accept_profile=True, answers=answers)
+
+
+@package
+def kinfer():
+    import onnx
+    import torch
+    from kinfer.export.serialize import pack
+    from kinfer.rust_bindings import PyModelMetadata
+
+    joints, commands = [f"joint_{i}" for i in range(ACT)], ["x", "y", "turn"]
+    torch.manual_seed(0)
+    for kind, size in (("MLP", 1), ("GRU", 16)):
+        metadata = PyModelMetadata(joint_names=joints, command_names=commands, carry_size=[size])
+
+        class Step(torch.nn.Module):
+            def __init__(self, size=size):
+                super().__init__()
+                width = 2 * ACT + len(commands)
+                self.cell, self.out = torch.nn.GRUCell(width, 16), torch.nn.Linear(16 if size > 1 else width, ACT)
+                self.is_cell = size > 1
+
+            def forward(self, joint_angles, joint_angular_velocities, command, carry):
+                x = torch.cat([joint_angles, joint_angular_velocities, command])
+                if self.is_cell:
+                    carry = self.cell(x[None], carry[None])[0]
+                    return self.out(carry), carry
+                return self.out(x), carry
+
+        step = Step().eval()
+        width = 2 * ACT + len(commands)
+
+        class Start(torch.nn.Module):
+            def forward(self, size=size):
+                return torch.zeros(size)
+
+        def exported(module, given, names, outputs):
+            # export_fn takes a ScriptFunction, which torch 2.15's default exporter refuses.
+            content = io.BytesIO()
+            torch.onnx.export(module, given, content, dynamo=False, input_names=names, output_names=outputs)
+            return onnx.load_from_string(content.getvalue())
+
+        def make(step=step, size=size, metadata=metadata):
+            given = (torch.zeros(ACT), torch.zeros(ACT), torch.zeros(len(commands)), torch.zeros(size))
+            names = ["joint_angles", "joint_angular_velocities", "command", "carry"]
+            path = folder("kinfer") / "policy.kinfer"
+            step_fn = exported(step, given, names, ["action", "carry_out"])
+            path.write_bytes(pack(exported(Start(), (), [], ["carry"]), step_fn, metadata))
+            return str(path)
+
+        def act(rows, step=step, size=size):
+            carry, actions = torch.zeros(size), []
+            for obs in torch.from_numpy(rows):
+                with torch.no_grad():
+                    action, carry = step(*obs.split([ACT, ACT, len(commands)]), carry)
+                actions.append(action.numpy())
+            return actions
+
+        row(kind, "kinfer archive", make, act, width, accept_profile=True, answers={"packed.rate_hz": 50, "packed.target": "position"})
+
+
+@package
+def leapp():
+    import torch
+    from leapp import annotate
+    from leapp.inference_manager import InferenceManager
+
+    import leapp
+
+    torch.manual_seed(0)
+    body = torch.nn.Sequential(torch.nn.Linear(OBS + ACT, 24), torch.nn.ELU(), torch.nn.Linear(24, ACT))
+    gru, lstm, out = torch.nn.GRU(OBS, 16), torch.nn.LSTM(OBS, 16), torch.nn.Linear(16, ACT)
+    history = torch.nn.Sequential(torch.nn.Linear(3 * OBS, 24), torch.nn.ELU(), torch.nn.Linear(24, ACT))
+
+    def fed_back(obs, last):
+        action = body(torch.cat([obs, last], 1))
+        return action, [action]
+
+    def frames(obs, before):
+        now = torch.cat([before[:, OBS:], obs], 1)
+        return history(now), [now]
+
+    def by_gru(obs, h):
+        y, h = gru(obs[None], h)
+        return out(y[0]), [h]
+
+    def by_lstm(obs, h, c):
+        y, (h, c) = lstm(obs[None], (h, c))
+        return out(y[0]), [h, c]
+
+    for kind, function, states in [
+        ("last action fed back", fed_back, [(1, ACT)]),
+        ("history of 3 frames", frames, [(1, 3 * OBS)]),
+        ("GRU", by_gru, [(1, 1, 16)]),
+        ("LSTM", by_lstm, [(1, 1, 16)] * 2),
+    ]:
+        for export in ("onnx-dynamo", "onnx-torchscript"):
+
+            def make(function=function, states=states, export=export):
+                path = folder("leapp")
+                leapp.start("policy", save_path=str(path))
+                with torch.no_grad():
+                    obs = annotate.input_tensors("actor", {"obs": torch.zeros(1, OBS)})
+                    held = annotate.state_tensors("actor", {f"s{i}": torch.zeros(shape) for i, shape in enumerate(states)})
+                    action, after = function(obs, *(held if isinstance(held, tuple) else (held,)))
+                    annotate.update_state("actor", {f"s{i}": state for i, state in enumerate(after)})
+                    annotate.output_tensors("actor", {"action": action}, export_with=export)
+                leapp.stop()
+                leapp.compile_graph(visualize=False)
+                return str(path / "policy")
+
+            def act(rows):
+                manager = InferenceManager(str(next(Path(tempfile.gettempdir(), "leapp", "policy").glob("*.yaml"))))
+                (key,) = manager.inputs
+                return [next(iter(manager({key: torch.from_numpy(obs[None])}).values())).reshape(-1).numpy().copy() for obs in rows]
+
+            answers = {"rate_hz": 50, "target.action": "position"}
+            row(kind, export, make, act, accept_profile=True, answers=answers)
 
 
 if __name__ == "__main__":
