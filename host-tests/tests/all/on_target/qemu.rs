@@ -69,7 +69,9 @@ fn golden_run(elf: &Path, target: Target, stream: &[u8]) -> Result<Output> {
 
 #[test]
 fn portable_kernels_give_the_golden_sums_without_assembler() -> Result<()> {
-    let cases = golden::cases(1);
+    // These builds have no layouts for Helium.
+    let is_built = |case: &golden::Case| case.shape.lanes != Lanes::Helium;
+    let cases: Vec<_> = golden::cases(1).into_iter().filter(is_built).collect();
     // The cases that fit the memory of the small target.
     let fits = |c: &&golden::Case| c.shape.cols <= 256 && c.words().len() + c.prepared().len() < 1500;
     let (all, short) =
