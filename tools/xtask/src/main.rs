@@ -119,7 +119,7 @@ fn main() -> ExitCode {
         Command::Descriptions(options) => measure(&[Target::Fpu], "descriptions", options),
         Command::Faults(options) => measure(&[Target::Fpu], "faults", options),
         Command::Peers(options) => {
-            measure(&[Target::Fpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M33], "peers", options)
+            measure(&[Target::Fpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M55], "peers", options)
         }
         Command::Fit(options) => measure(&[Target::Fpu], "fit", options),
         Command::Budgets(options) => measure(&[Target::Fpu, Target::M33], "budgets", options),

@@ -15,8 +15,8 @@ use super::cases::{Case, STEPS};
 #[derive(Debug)]
 pub(crate) struct Core {
     pub(crate) name: &'static str,
-    /// Board of the program; `None` for the Cortex-M55, whose programs have a linker script here.
-    pub(crate) target: Option<Target>,
+    /// Its board.
+    pub(crate) target: Target,
     /// Name of our package.
     pub(crate) package: Option<&'static str>,
     pub(crate) flags: &'static [&'static str],
@@ -28,7 +28,7 @@ pub(crate) struct Core {
 
 const fn core(
     (name, package): (&'static str, Option<&'static str>),
-    target: Option<Target>,
+    target: Target,
     flags: &'static [&'static str],
     rust: (&'static str, &'static str),
     bakenn: &'static str,
@@ -46,11 +46,11 @@ const RV32: &[&str] = &["-march=rv32imac", "-mabi=ilp32"];
 const RUST_RV32: (&str, &str) = ("riscv32imac-unknown-none-elf", "");
 
 pub(crate) const CORES: [Core; 5] = [
-    core(("m4f", Some("cortex-m4f")), Some(Target::Fpu), M4F, RUST_M4F, "cortex-m4"),
-    core(("m3", Some("cortex-m3")), Some(Target::NoDsp), M3, ("thumbv7m-none-eabi", ""), "portable32"),
-    core(("m0", Some("cortex-m0plus")), Some(Target::V6m), M0, ("thumbv6m-none-eabi", ""), "cortex-m0plus"),
-    core(("rv32imac", Some("rv32imac")), Some(Target::Riscv), RV32, RUST_RV32, "rv32imc"),
-    core(("m55", None), None, M55, RUST_M55, "cortex-m4"),
+    core(("m4f", Some("cortex-m4f")), Target::Fpu, M4F, RUST_M4F, "cortex-m4"),
+    core(("m3", Some("cortex-m3")), Target::NoDsp, M3, ("thumbv7m-none-eabi", ""), "portable32"),
+    core(("m0", Some("cortex-m0plus")), Target::V6m, M0, ("thumbv6m-none-eabi", ""), "cortex-m0plus"),
+    core(("rv32imac", Some("rv32imac")), Target::Riscv, RV32, RUST_RV32, "rv32imc"),
+    core(("m55", None), Target::M55, M55, RUST_M55, "cortex-m4"),
 ];
 
 /// What is compiled with a peer.
@@ -95,7 +95,7 @@ fn first_error(text: &str) -> &str {
 
 impl Core {
     fn is_arm(&self) -> bool {
-        self.target != Some(Target::Riscv)
+        self.target != Target::Riscv
     }
 
     /// Returns gcc's name, and Debian's packages of it.
@@ -178,9 +178,9 @@ impl Core {
             }
         }
         let script = match self.target {
-            None => harness().join("mps3-an547.ld"),
-            Some(Target::Riscv) => harness().join("riscv.ld"),
-            Some(_) => c.join("mps2-an386.ld"),
+            Target::M55 => harness().join("mps3-an547.ld"),
+            Target::Riscv => harness().join("riscv.ld"),
+            _ => c.join("mps2-an386.ld"),
         };
         link.args(&sources.linked).arg("-L").arg(&c).arg("-T").arg(script);
         link.args(["-nostartfiles", "-Wl,--gc-sections", "-lm", "-o", "peer.elf"]);
@@ -190,25 +190,7 @@ impl Core {
 
     /// Runs a program.
     pub(crate) fn measure(&self, case: &Case, counter: &Counter, elf: &Path) -> Result<Measured> {
-        let mut command = match self.target {
-            Some(target) => target.run(elf),
-            None => {
-                let mut command = Command::new(Target::Fpu.board().emulator);
-                command.args([
-                    "-M",
-                    "mps3-an547",
-                    "-display",
-                    "none",
-                    "-monitor",
-                    "none",
-                    "-serial",
-                    "none",
-                    "-kernel",
-                ]);
-                command.arg(elf).args(["-semihosting-config", "enable=on,target=native"]);
-                command
-            }
-        };
+        let mut command = self.target.run(elf);
         counter.attach(&mut command, elf)?;
         let text = run(&mut command)?;
         let words = |kind: &str| -> Result<Vec<u32>> {
@@ -219,7 +201,7 @@ impl Core {
         ensure!(outputs.len() == STEPS * case.outputs(), "the program printed {} outputs", outputs.len());
         let regions = counter.regions()?;
         let region = regions.first().context("nothing was counted")?;
-        let cycles = if self.target == Some(Target::Fpu) { Some(Code::read(elf)?.cycles(region, 0)?) } else { None };
+        let cycles = if self.target == Target::Fpu { Some(Code::read(elf)?.cycles(region, 0)?) } else { None };
         Ok(Measured {
             instructions: region.instructions,
             cycles,
