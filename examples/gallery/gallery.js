@@ -7,15 +7,18 @@ const byId = (id) => document.getElementById(id);
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name);
 const integer = (n) => n.toString().replace(/\B(?=(\d{3})+$)/g, ",");
 
-const heads = await compile(bytes(byId("heads").textContent));
-const simulation = await WebAssembly.compile(await unpacked(byId("simulation").textContent));
+let heads;
+let simulation;
 let which = 0;
 let level = 0;
 let robot;
 let head;
 let seed = 1;
 let isPaused = false;
+/** Why the last step failed. */
 let failed = "";
+/** Why the page, or the last choice, does not work. */
+let broken = "";
 /** The reader has set the goal; before, the sliders show the task's. */
 let isAimed = false;
 const opened = new Map();
@@ -32,22 +35,28 @@ async function headOf(which, level) {
   return opened.get(key);
 }
 
-async function begin() {
-  const [chosen, { exports }] = [which, await WebAssembly.instantiate(simulation, {})];
+/** The newest choice: an older one that is still loading is dropped. */
+let newest = 0;
+/** Starts a robot. Frames run in between, so everything that belongs to it changes at once, at the end. */
+async function begin(chosen) {
+  const own = ++newest;
+  const bits = Math.min(level, data[chosen].images.length);
+  const { exports } = await WebAssembly.instantiate(simulation, {});
   exports.begin(data[chosen].robot, seed++);
-  const first = await headOf(chosen, level);
-  if (chosen !== which) return;
-  [robot, head] = [exports, first];
+  const first = await headOf(chosen, bits);
+  if (own !== newest) return;
+  [which, level, robot, head, broken] = [chosen, bits, exports, first, ""];
   head.reset();
+  controls();
 }
 /** Switches the bits while the robot runs: the new head starts from its reset. */
-async function change() {
-  const [chosen, bits] = [which, level];
-  const next = await headOf(chosen, bits);
-  // Another choice may have been quicker.
-  if (chosen !== which || bits !== level) return;
-  head = next;
+async function change(bits) {
+  const own = ++newest;
+  const next = await headOf(which, bits);
+  if (own !== newest) return;
+  [level, head, broken] = [bits, next, ""];
   head.reset();
+  press("levels", level);
 }
 const array = (Type, address, length) => new Type(robot.memory.buffer, address, length);
 function step() {
@@ -67,23 +76,26 @@ function step() {
 function choice(id, names, current, choose) {
   byId(id).replaceChildren(...names.map((name, i) => {
     const button = document.createElement("button");
-    Object.assign(button, { type: "button", textContent: name, onclick: () => choose(i) });
-    button.setAttribute("aria-pressed", i === current);
+    Object.assign(button, { type: "button", textContent: name, onclick: () => choose(i).catch(report) });
     return button;
   }));
+  press(id, current);
 }
+/** Marks a choice. The buttons stay, and with them the focus of the keyboard. */
+function press(id, current) {
+  [...byId(id).children].forEach((button, i) => button.setAttribute("aria-pressed", i === current));
+}
+function report(error) {
+  broken = error.message;
+  write(byId("note"), broken);
+}
+function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+/** Makes the controls of a robot that has just begun. */
 function controls() {
-  choice("robots", data.map(({ robot }) => ROBOTS[robot].title), which, async (i) => {
-    which = i;
-    level = Math.min(level, data[which].images.length);
-    await begin();
-    controls();
-  });
-  choice("levels", ["f32", ...data[which].images.map(({ label }) => label)], level, async (i) => {
-    level = i;
-    await change();
-    controls();
-  });
+  press("robots", which);
+  choice("levels", ["f32", ...data[which].images.map(({ label }) => label)], level, change);
   const goals = ROBOTS[data[which].robot].goals;
   const inputs = goals.map(([, min, max], i) => Object.assign(document.createElement("input"), { type: "range", id: `goal${i}`, min, max, step: 0.01, oninput: aim }));
   function aim() {
@@ -93,8 +105,8 @@ function controls() {
   isAimed = false;
   byId("goal").replaceChildren(...goals.flatMap(([name], i) => [Object.assign(document.createElement("label"), { htmlFor: `goal${i}`, textContent: name }), inputs[i]]));
 }
-byId("left").onclick = () => robot.push(-ROBOTS[data[which].robot].push);
-byId("right").onclick = () => robot.push(ROBOTS[data[which].robot].push);
+byId("left").onclick = () => robot?.push(-ROBOTS[data[which].robot].push);
+byId("right").onclick = () => robot?.push(ROBOTS[data[which].robot].push);
 byId("pause").onclick = () => {
   isPaused = !isPaused;
   byId("pause").setAttribute("aria-pressed", isPaused);
@@ -154,31 +166,36 @@ function drawArm(view, context, width, height) {
   line(context, [at(goal), at([goal[0], goal[1], 0])], colour("--soft"), 1);
   disc(context, at(goal), 9, colour("--b8"));
 }
-function figures() {
+function figures(isDue) {
   const { title, unit, error, hertz } = ROBOTS[data[which].robot];
   const image = data[which].images[level - 1];
   const [now, episodes, successes] = [robot.number(3), robot.number(4), robot.number(5)];
+  Object.assign(document.documentElement.dataset, { ready: "true", robot: title, episodes, successes, error: now });
+  write(byId("note"), broken || failed || (image ? `Predicted on a Cortex-M4F at ${data[which].clock_hz / 1e6} MHz with memory that never waits, of ${1000 / hertz} ms between steps.` : "The policy before it was quantized."));
+  if (!isDue) return;
   const entries = [
     ["image", image ? `${integer(image.bytes)} B` : `${integer(data[which].f32_bytes)} B in f32`],
     ["a step, predicted", image ? (image.milliseconds === null ? "-" : `${image.milliseconds.toFixed(3)} ms`) : "-"],
     [error, unit === "mm" ? `${(1000 * now).toFixed(1)} mm` : `${now.toFixed(3)} ${unit}`],
     ["successful episodes", `${successes} of ${episodes}`],
   ];
-  byId("figures").replaceChildren(...entries.map(([name, text]) => {
-    const [div, dt, dd] = ["div", "dt", "dd"].map((tag) => document.createElement(tag));
-    [dt.textContent, dd.textContent] = [name, text];
-    div.append(dt, dd);
-    return div;
-  }));
-  byId("note").textContent = failed || (image ? `Predicted on a Cortex-M4F at ${data[which].clock_hz / 1e6} MHz with memory that never waits, of ${1000 / hertz} ms between steps.` : "The policy before it was quantized.");
-  Object.assign(document.documentElement.dataset, { ready: "true", robot: title, episodes, successes, error: now });
+  const list = byId("figures");
+  while (list.children.length < entries.length) {
+    const div = document.createElement("div");
+    div.append(...["dt", "dd"].map((tag) => document.createElement(tag)));
+    list.append(div);
+  }
+  entries.forEach((texts, i) => texts.forEach((text, j) => write(list.children[i].children[j], text)));
 }
 
 /** The goal is at the end of what is drawn. */
 const goal = (view) => view.slice(-ROBOTS[data[which].robot].goals.length);
 let last = performance.now();
 let owed = 0;
+let written = -Infinity;
 function frame(now) {
+  // First, so that the failure of one frame does not end the others.
+  requestAnimationFrame(frame);
   if (robot && head) {
     const { hertz, draw } = ROBOTS[data[which].robot];
     owed = isPaused ? 0 : Math.min(owed + ((now - last) / 1000) * hertz, 12);
@@ -186,12 +203,19 @@ function frame(now) {
     const view = [...array(Float64Array, robot.view(), robot.number(2))];
     draw(view, ...stage());
     if (!isAimed) goal(view).forEach((value, i) => (byId(`goal${i}`).value = value));
-    figures();
+    const isDue = now - written > 250;
+    if (isDue) written = now;
+    figures(isDue);
   }
   last = now;
-  requestAnimationFrame(frame);
 }
-level = Math.max(0, data[0].images.findIndex(({ label }) => label === "2 bits") + 1);
-await begin();
-controls();
-requestAnimationFrame(frame);
+try {
+  heads = await compile(bytes(byId("heads").textContent));
+  simulation = await WebAssembly.compile(await unpacked(byId("simulation").textContent));
+  level = Math.max(0, data[0].images.findIndex(({ label }) => label === "2 bits") + 1);
+  choice("robots", data.map(({ robot }) => ROBOTS[robot].title), which, begin);
+  await begin(0);
+  requestAnimationFrame(frame);
+} catch (error) {
+  report(new Error(`This page cannot run here: ${error.message}`));
+}
