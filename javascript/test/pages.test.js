@@ -1,7 +1,9 @@
 // The report and the gallery in a real browser: Debian's Chromium, driven by Playwright. `cargo xtask wasm --check` makes the
 // pages, whose folder ACTQ_PAGES names.
 import assert from "node:assert/strict";
-import { access } from "node:fs/promises";
+import { access, mkdtemp, readFile, rm, writeFile } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
 import { after, before, test } from "node:test";
 import { pathToFileURL } from "node:url";
 
@@ -37,7 +39,7 @@ async function open(name, { width = 1400, colorScheme = "light" } = {}) {
   page.on("pageerror", (error) => problems.push(error.message));
   page.on("dialog", (dialog) => (problems.push(dialog.message()), dialog.dismiss()));
   page.on("request", (request) => /^(file|data|blob):/.test(request.url()) || problems.push(request.url()));
-  await page.goto(pathToFileURL(`${folder}/${name}`).href);
+  await page.goto(pathToFileURL(resolve(folder, name)).href);
   await page.waitForFunction(() => document.documentElement.dataset.ready === "true", undefined, { timeout: 30000 });
   return { page, problems };
 }
@@ -47,6 +49,7 @@ test("a report has its sections, the bits of the host, and no error", { skip }, 
   for (const id of ["network", "errors", "live", "flash", "contract", "provenance"]) assert.ok(await page.locator(`#${id}`).isVisible(), id);
   assert.equal(await page.getAttribute("#bits", "data-equal"), "true", await page.textContent("#bits"));
   assert.ok(Number(await page.getAttribute("#speed", "data-milliseconds")) < 1000, await page.textContent("#speed"));
+  for (const label of await page.locator("[role=region]").evaluateAll((all) => all.map((region) => region.ariaLabel))) assert.match(label, /\w/);
   const figures = await page.locator("#top dd").allTextContents();
   assert.ok(figures.length >= 5 && figures.every((text) => text.length > 0 && !/NaN|undefined|null/.test(text)), figures.join());
   assert.doesNotMatch(await page.innerText("main"), /NaN|undefined|\[object/);
@@ -67,6 +70,27 @@ test("the diagram of a bundle leads from its raw inputs to its targets", { skip 
   assert.deepEqual(problems, []);
 });
 
+test("a frontier joins the best images of each axis, and its marks differ", { skip }, async () => {
+  const image = (i, bytes, milliseconds, nmse) => ({ curve: `curve ${i}`, bytes, milliseconds, nmse, success: null, is_own: i === 0 });
+  // The third is beaten in bytes, and not in milliseconds.
+  const points = [[1000, 1, 0.5], [2000, 3, 0.2], [2500, 2, 0.3], ...Array.from({ length: 9 }, (_, i) => [4000 + i, 4, 0.9])];
+  const sweep = { clock_hz: 168e6, images: points.map((point, i) => image(i, ...point)) };
+  const report = await readFile(`${folder}/report.html`, "utf8");
+  const scratch = await mkdtemp(join(tmpdir(), "actq-pages-"));
+  try {
+    await writeFile(join(scratch, "sweep.html"), report.replace('"sweep":null', () => `"sweep":${JSON.stringify(sweep)}`));
+    const { page, problems } = await open(join(scratch, "sweep.html"));
+    const lines = await page.locator("#frontier polyline").evaluateAll((all) => all.map((line) => line.getAttribute("points").split(" ").length));
+    assert.deepEqual(lines, [2, 3]);
+    const legend = await page.locator("#frontier .legend path").evaluateAll((all) => all.map((path) => path.getAttribute("d") + path.getAttribute("fill")));
+    assert.equal(new Set(legend).size, points.length);
+    if (process.env.ACTQ_PICTURES) await page.screenshot({ path: `${process.env.ACTQ_PICTURES}/sweep.png`, fullPage: true });
+    assert.deepEqual(problems, []);
+  } finally {
+    await rm(scratch, { recursive: true });
+  }
+});
+
 test("a slider moves the actions of both policies", { skip }, async () => {
   const { page, problems } = await open("report.html");
   const actions = () => page.locator("#live td.n").allTextContents();
@@ -75,7 +99,7 @@ test("a slider moves the actions of both policies", { skip }, async () => {
   for (let i = 0; i < 40; i++) await page.keyboard.press("ArrowRight");
   const moved = await actions();
   assert.notDeepEqual(moved, before);
-  await page.locator("#errors tr.pick").first().press("Enter");
+  await page.locator("#errors td button").first().press("Enter");
   assert.notDeepEqual(await actions(), moved);
   assert.deepEqual(problems, []);
 });
@@ -107,6 +131,37 @@ for (const width of [1400, 390]) {
     });
   }
 }
+
+test("a choice in the gallery keeps the focus and the goal", { skip }, async () => {
+  const { page, problems } = await open("index.html");
+  await page.locator("#goal0").focus();
+  for (let i = 0; i < 5; i++) await page.keyboard.press("ArrowRight");
+  const set = await page.inputValue("#goal0");
+  const last = page.locator("#levels button").last();
+  await last.focus();
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => document.querySelector("#levels button:last-child").getAttribute("aria-pressed") === "true");
+  assert.ok(await last.evaluate((button) => button === document.activeElement));
+  assert.equal(await page.locator("#levels button[aria-pressed=true]").count(), 1);
+  assert.equal(await page.inputValue("#goal0"), set);
+  const robots = page.locator("#robots button");
+  for (let i = (await robots.count()) - 1; i >= 0; i--) {
+    await robots.nth(i).focus();
+    await page.keyboard.press("Enter");
+    await page.waitForTimeout(300);
+    assert.ok(await robots.nth(i).evaluate((button) => button === document.activeElement));
+    assert.equal(await robots.nth(i).getAttribute("aria-pressed"), "true");
+  }
+  assert.deepEqual(problems, []);
+});
+
+test("the gallery says why it cannot run", { skip }, async () => {
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  await page.addInitScript(() => (WebAssembly.compile = () => Promise.reject(new Error("no WebAssembly here"))));
+  await page.goto(pathToFileURL(`${folder}/index.html`).href);
+  await page.getByText("no WebAssembly here").waitFor({ timeout: 10000 });
+});
 
 test("the balancer survives a push at 2 bits", { skip }, async () => {
   const { page, problems } = await open("index.html");

@@ -62,10 +62,6 @@ pub struct SweptImage {
     pub nmse: f64,
     /// Success of its rollouts.
     pub success: Option<Success>,
-    /// `true` if no other image has fewer bytes and a smaller error.
-    pub is_frontier: bool,
-    /// `true` if no other image has fewer bytes and more success.
-    pub is_success_frontier: bool,
     /// `true` for the image of the page.
     pub is_own: bool,
 }
@@ -94,7 +90,7 @@ pub fn success_of(text: &str) -> Result<Success> {
 impl Sweep {
     /// Takes the images of a policy; `sha256` is the digest of the page's image.
     pub fn new(policy: &MergedPolicy, clock_hz: f64, sha256: &str) -> Self {
-        let image = |(i, image): (usize, &actq_jobs::results::MergedImage)| {
+        let image = |image: &actq_jobs::results::MergedImage| {
             let made = image.made.as_ref()?;
             let episodes = made.driven.as_ref().map(|driven| driven.episodes);
             let success = made.success().zip(episodes).zip(made.interval);
@@ -104,12 +100,10 @@ impl Sweep {
                 milliseconds: made.milliseconds(clock_hz),
                 nmse: made.nmse,
                 success: success.map(|((share, episodes), interval)| (share, episodes, interval)),
-                is_frontier: policy.frontier.contains(&i),
-                is_success_frontier: policy.success_frontier.contains(&i),
                 is_own: made.image.image == sha256,
             })
         };
-        Self { clock_hz, images: policy.images.iter().enumerate().filter_map(image).collect() }
+        Self { clock_hz, images: policy.images.iter().filter_map(image).collect() }
     }
 }
 

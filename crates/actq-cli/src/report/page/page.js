@@ -32,13 +32,17 @@ function section(id, title, ...children) {
   sections.push([id, title]);
   return element;
 }
-function table(heads, rows, numeric = []) {
+function table(heads, rows, numeric = [], name = heads.filter(Boolean).join(", ")) {
   const cell = (tag) => (text, i) => el(tag, { class: numeric.includes(i) ? "n" : undefined, scope: tag === "th" ? "col" : undefined }, text);
   const body = rows.map((row) => (row instanceof Element ? row : el("tr", {}, ...row.map(cell("td")))));
-  return el("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": heads.join(", ") },
-    el("table", {}, el("thead", {}, el("tr", {}, ...heads.map(cell("th")))), el("tbody", {}, ...body)));
+  return el("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": name },
+    el("table", {}, heads.length ? el("thead", {}, el("tr", {}, ...heads.map(cell("th")))) : null, el("tbody", {}, ...body)));
 }
-const legend = (entries) => el("div", { class: "legend" }, ...entries.map(([name, colour]) => el("span", { style: `--c: ${colour}` }, name)));
+// An entry is a name, its colour, and a mark; without one, a square.
+function legend(entries) {
+  const drawnMark = (d, colour) => svg("svg", { viewBox: "-8 -8 16 16", width: 16, height: 16, "aria-hidden": "true" }, svg("path", { d, fill: colour }));
+  return el("div", { class: "legend" }, ...entries.map(([name, colour, mark]) => (mark ? el("span", { class: "marked" }, drawnMark(mark, colour), name) : el("span", { style: `--c: ${colour}` }, name))));
+}
 
 // Names of the values of observation and action.
 function names(ports, count, noun) {
@@ -58,7 +62,7 @@ function trust() {
   const sentences = [];
   if (runs) {
     const known = nmse ?? mean(runs.actions.map(([ratio]) => ratio));
-    sentences.push(`On ${integer(measured)} of ${integer(runs.recorded)} recorded observations the image's actions differ from the f32 policy's by an NMSE of ${error(known)} (mean squared error over variance; 1 is no better than a constant).`);
+    sentences.push(`On ${integer(measured)} of ${integer(runs.recorded)} recorded observations the image's ${nmse === null ? "actions differ" : "raw output differs"} from the f32 policy's by an NMSE of ${error(known)} (mean squared error over variance; 1 is no better than a constant).`);
   } else {
     sentences.push("No error is shown: the report was made without the policy and a recording.");
   }
@@ -78,7 +82,7 @@ document.getElementById("top").append(
     ["bits per weight", facts.bits_per_weight.toFixed(3)],
     ["a step, predicted", facts.time ? milliseconds(...facts.time) : "-"],
     ["scratch RAM", `${integer(facts.scratch)} B`],
-    runs && ["action error (NMSE)", error(nmse ?? mean(runs.actions.map(([ratio]) => ratio)))],
+    runs && [nmse === null ? "error of the actions (NMSE)" : "error of the raw output (NMSE)", error(nmse ?? mean(runs.actions.map(([ratio]) => ratio)))],
     data.own_path && ["error on its own path", error(data.own_path[0])],
     data.success && ["success", `${percent(data.success[0])} of ${data.success[1]}`],
     data.success && ["95 % interval", data.success[2].map(percent).join(" to ")],
@@ -135,20 +139,27 @@ const PALETTE = ["var(--image)", "var(--b8)", "var(--b3)", "var(--b4)", "#cc79a7
 // b. The frontier.
 if (sweep?.images.length) {
   const curves = [...new Set(sweep.images.map(({ curve }) => curve))];
-  const marks = ["M-5,0a5,5 0 1,0 10,0a5,5 0 1,0 -10,0", "M-5,-5h10v10h-10z", "M0,-6l6,10h-12z", "M0,-7l6,7l-6,7l-6,-7z", "M-6,-2h4v-4h4v4h4v4h-4v4h-4v-4h-4z"];
-  const errors = { name: "Error", of: (image) => Math.max(image.nmse, 1e-14), axis: range(sweep.images.map((image) => Math.max(image.nmse, 1e-14)), true), isOn: (image) => image.is_frontier };
-  const successes = { name: "Success in percent", of: (image) => 100 * image.success[0], axis: { min: 0, max: 105 }, isOn: (image) => image.is_success_frontier };
+  // Six marks beside five colours: the first thirty curves differ.
+  const marks = ["M-5,0a5,5 0 1,0 10,0a5,5 0 1,0 -10,0", "M-5,-5h10v10h-10z", "M0,-6l6,10h-12z", "M0,-7l6,7l-6,7l-6,-7z", "M-6,-2h4v-4h4v4h4v4h-4v4h-4v-4h-4z", "M0,6l6,-10h-12z"];
+  const markOf = (curve) => [PALETTE[curve % PALETTE.length], marks[curve % marks.length]];
+  const errors = { name: "Error", of: (image) => Math.max(image.nmse, 1e-14), axis: range(sweep.images.map((image) => Math.max(image.nmse, 1e-14)), true), cost: (image) => image.nmse };
+  const successes = { name: "Success in percent", of: (image) => 100 * image.success[0], axis: { min: 0, max: 105 }, cost: (image) => -image.success[0] };
+  // Those that cost less than all others with at most as much of the axis.
+  function frontier(images, key, cost) {
+    let least = Infinity;
+    return [...images].sort((a, b) => a[key] - b[key] || cost(a) - cost(b)).filter((image) => cost(image) < least && ((least = cost(image)), true));
+  }
   const driven = sweep.images.filter((image) => image.success);
   const panel = (images, measure, key, name) => chart({
     width: fitting(560), label: `${measure.name} over ${name}`, x: { ...range(sweep.images.map((image) => image[key])), name }, y: measure.axis,
     draw(root, sx, sy) {
       const at = (image) => [sx(image[key]), sy(measure.of(image))];
-      const line = images.filter(measure.isOn).sort((a, b) => a[key] - b[key]).map((image) => at(image).join(",")).join(" ");
+      const line = frontier(images, key, measure.cost).map((image) => at(image).join(",")).join(" ");
       root.append(svg("polyline", { points: line, fill: "none", stroke: "var(--soft)", "stroke-width": 1.5 }));
       for (const image of images) {
         const [px, py] = at(image);
-        const which = curves.indexOf(image.curve);
-        const mark = svg("path", { d: marks[which % marks.length], transform: `translate(${px},${py})`, fill: PALETTE[which % PALETTE.length] });
+        const [fill, d] = markOf(curves.indexOf(image.curve));
+        const mark = svg("path", { d, transform: `translate(${px},${py})`, fill });
         mark.append(svg("title", {}, `${image.curve}: ${integer(image.bytes)} B, ${image.milliseconds.toFixed(3)} ms, NMSE ${error(image.nmse)}${image.success ? `, success ${percent(image.success[0])}` : ""}`));
         root.append(mark);
         if (image.is_own) root.append(svg("circle", { cx: px, cy: py, r: 10, fill: "none", stroke: "var(--focus)", "stroke-width": 2.5 }), svg("text", { x: px + 14, y: py + 4 }, "this image"));
@@ -161,8 +172,8 @@ if (sweep?.images.length) {
   draw();
   drawn.push(draw);
   const rows = sweep.images.map((image) => [image.curve + (image.is_own ? " (this image)" : ""), integer(image.bytes), image.milliseconds.toFixed(3), error(image.nmse), image.success ? percent(image.success[0]) : "-"]);
-  section("frontier", "Frontier", el("p", {}, "Each mark is an image of the sweep; the line joins those that no other image beats in bytes and error. The vertical axis is the NMSE of the actions on held-out observations." + (driven.length ? " Below, it is the success in closed loop, in percent of the episodes." : "")),
-    legend(curves.map((name, i) => [name, PALETTE[i % PALETTE.length]])),
+  section("frontier", "Frontier", el("p", {}, "Each mark is an image of the sweep; each line joins those that no other image beats on both axes. The vertical axis is the NMSE of the network's raw output on held-out observations." + (driven.length ? " Below, it is the success in closed loop, in percent of the episodes." : "")),
+    legend(curves.map((name, i) => [name, ...markOf(i)])),
     place,
     el("details", {}, el("summary", {}, "As a table"), table(["curve", "bytes", "ms", "NMSE", "success"], rows, [1, 2, 3, 4])));
 }
@@ -222,7 +233,7 @@ const live = {};
 if (runs) {
   const worstShare = Math.max(...runs.actions.map(([ratio]) => ratio ?? 0));
   const bar = (share) => el("div", { class: "bar", style: "--c: var(--image)" }, el("i", { style: `left:0;width:${100 * share}%` }));
-  const actions = table(["action", "NMSE", "", "largest"], runs.actions.map(([ratio, max], i) => [actionNames[i], error(ratio), bar(worstShare ? (ratio ?? 0) / worstShare : 0), value(max)]), [1, 3]);
+  const actions = table(["action", "NMSE", "share of the largest NMSE", "largest error"], runs.actions.map(([ratio, max], i) => [actionNames[i], error(ratio), bar(worstShare ? (ratio ?? 0) / worstShare : 0), value(max)]), [1, 3]);
   const layers = facts.ops.map((op, i) => [op, i]).filter(([op]) => op.matrix !== null);
   const byLayer = table(["matrix", "weights", "rounding"], layers.map(([op, i]) => {
     const { name, error_share } = facts.matrices[op.matrix];
@@ -245,8 +256,8 @@ if (runs) {
   drawn.push(trace);
   const worst = table(["episode", "step", "error"], runs.worst.map((one) => {
     const load = () => live.load?.(one.observation, one.actions);
-    const key = (event) => (event.key === "Enter" || event.key === " ") && (event.preventDefault(), load());
-    return el("tr", { class: "pick", tabindex: "0", role: "button", "aria-label": `episode ${one.at[0]}, step ${one.at[1]}: run this observation`, onclick: load, onkeydown: key }, ...[one.at[0], one.at[1], error(one.error)].map((text) => el("td", { class: "n" }, String(text))));
+    const button = el("button", { type: "button", "aria-label": `episode ${one.at[0]}, step ${one.at[1]}: run this observation`, onclick: load }, String(one.at[0]));
+    return el("tr", {}, ...[button, String(one.at[1]), error(one.error)].map((content) => el("td", { class: "n" }, content)));
   }), [0, 1, 2]);
   section("errors", "Errors", el("p", {}, `Actions of the image against the f32 policy on ${integer(runs.compared)} of ${integer(runs.recorded)} observations of ${runs.recording}, after the action contract.`, nmse === null ? "" : ` The NMSE of the network's raw output on ${integer(measured)} of them is ${error(nmse)}.`),
     el("div", { class: "two" }, el("div", {}, el("h3", {}, "By action"), actions), el("div", {}, el("h3", {}, "By layer"), byLayer, el("p", { class: "soft" }, "Weights: the matrix's share of the error that its weights were predicted to cause, from the statistics. Rounding: the NMSE that rounding its input adds to its output, measured on the recording."))),
@@ -301,7 +312,7 @@ async function start() {
     const row = el("tr", {}, el("td", {}, name), own, ...(exact ? [other, difference] : []), el("td", {}, el("div", { class: "bar", style: "--c: var(--image)" }, mark)));
     return { row, own, other, difference, mark };
   });
-  output.replaceChildren(table(["action", "image", ...(exact ? ["f32", "difference"] : []), ""], rows.map(({ row }) => row), exact ? [1, 2, 3] : [1]),
+  output.replaceChildren(table(["action", "image", ...(exact ? ["f32", "difference"] : []), "size"], rows.map(({ row }) => row), exact ? [1, 2, 3] : [1]),
     exact && data.head.reference.bits === 16 ? el("p", { class: "soft" }, "For the size of this file, the weights of the f32 policy are rounded to 16 bits here; the errors above are of the exact ones.") : "",
     runs && !exact ? el("p", { class: "soft" }, "The f32 policy is too large for this file; the section on errors compares with it.") : "");
   live.step = () => {
@@ -478,7 +489,7 @@ if (facts.ports.length) {
   const rows = actionNames.map((name, i) => [name, ...facts.contract.map(([, values]) => (Math.abs(values[i]) >= 3.4028234e38 ? "-" : value(values[i])))]);
   const contract = facts.contract.length ? table(["action", ...facts.contract.map(([name]) => name)], rows, facts.contract.map((_, i) => i + 1)) : el("p", {}, "No scales or limits of the action.");
   section("contract", "Contract", contract, el("p", {}, [`Control rate ${facts.rate_hz} Hz.`, ...facts.playback.map((text) => `${text[0].toUpperCase()}${text.slice(1)}.`), facts.self_test ? `A self-test of ${facts.self_test} steps is in the image.` : "No self-test is in the image."].join(" ")));
-  section("provenance", "Provenance", table(["", ""], [["SHA-256 of the image", facts.sha256], ["CRC-32 in its header", facts.crc32], ["SHA-256 of its source", facts.source], ["features of the kernels", facts.features.join(" ")], ...facts.made, ["report by actq", facts.actq]].map(([name, text]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", { class: "mono" }, text)))));
+  section("provenance", "Provenance", table([], [["SHA-256 of the image", facts.sha256], ["CRC-32 in its header", facts.crc32], ["SHA-256 of its source", facts.source], ["features of the kernels", facts.features.join(" ")], ...facts.made, ["report by actq", facts.actq]].map(([name, text]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", { class: "mono" }, text))), [], "Provenance"));
 }
 
 document.querySelector("nav").append(...sections.map(([id, title]) => el("a", { href: `#${id}` }, title)));
