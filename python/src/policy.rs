@@ -196,21 +196,25 @@ pub(crate) fn import_path(
         let limits = stated(limits);
         let options = ImportOptions { output, states, observed: observe, limits, rate_hz, ..ImportOptions::default() };
         let is_answered = accept_profile || !answers.is_empty() || profile.is_some();
-        let refuse_answers =
-            || error!("{}: only a deploy bundle takes accept_profile, answers and profile", path.display());
-        if Onnx.accepts(&path) {
-            if is_answered {
-                return Err(refuse_answers());
-            }
+        let is_onnx = Onnx.accepts(&path);
+        if is_onnx && !is_answered {
             let imported = import(&path, &options).map_err(raise_of_import)?;
             let policy = imported.policy(&path, &path).or_raise()?;
             return Ok(Policy::new(policy, Some(imported.source.files().or_raise()?)));
         }
-        if options.output.is_some() || !options.states.is_empty() || !options.observed.is_empty() {
+        let names_values = options.output.is_some() || !options.states.is_empty() || !options.observed.is_empty();
+        if is_onnx && (names_values || options.rate_hz.is_some()) {
+            return Err(error!(
+                "{}: a bundle takes no output, states, observe and rate_hz: its description has them",
+                path.display()
+            ));
+        }
+        if names_values {
             return Err(error!("{}: only an ONNX file takes output, states and observe", path.display()));
         }
         let is_policy = DeployFolder.accepts(&path) || path.join(FILES[0]).is_file();
-        let is_bundle = path.is_dir() || path.extension().is_some_and(|ending| ending == "kinfer");
+        // Answers make a bundle of an ONNX file, as they do for `actq import`.
+        let is_bundle = is_onnx || path.is_dir() || path.extension().is_some_and(|ending| ending == "kinfer");
         if options.rate_hz.is_some() {
             return Err(error!("{}: only an ONNX file takes rate_hz; this source states its rate", path.display()));
         }
@@ -221,7 +225,7 @@ pub(crate) fn import_path(
             return Err(error!("{}: a policy folder takes no limits; set them in its files", path.display()));
         }
         if is_answered {
-            return Err(refuse_answers());
+            return Err(error!("{}: only a deploy bundle takes accept_profile, answers and profile", path.display()));
         }
         let policy = load(&path).or_raise()?;
         let files = FILES.map(|name| fs::read(path.join(name)));

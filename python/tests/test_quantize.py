@@ -178,5 +178,31 @@ def test_a_profile_describes_a_stack_of_ones_own(mlp, tmp_path):
         policy(raw[0, :7])
     with pytest.raises(actq.Error, match="profile: .*no.toml: "):
         actq.import_policy(bundle, profile=tmp_path / "no.toml")
-    with pytest.raises(actq.Error, match="mlp.onnx: only a deploy bundle takes accept_profile, answers and profile"):
+    # A profile makes a bundle of an ONNX file; this one lacks the keys of the profile.
+    with pytest.raises(actq.Error, match="not a bundle of this profile: no file has its keys"):
         actq.import_policy(mlp, profile=profile)
+    with pytest.raises(actq.Error, match="policy: only a deploy bundle takes accept_profile, answers and profile"):
+        actq.import_policy(UR3, profile=profile)
+
+
+def test_one_onnx_file_with_metadata_is_a_bundle(mlp, tmp_path):
+    onnx = pytest.importorskip("onnx", reason="onnx is not installed")
+    path, model = tmp_path / "mjlab.onnx", onnx.load(mlp)
+    metadata = {
+        "joint_names": "a,b,c,d",
+        "observation_names": "joint_pos,joint_vel,actions",
+        "default_joint_pos": "0.1,0.2,0.3,0.4",
+        "action_scale": "0.5,0.5,0.5,0.5",
+        "joint_stiffness": "1,1,1,1",
+        "joint_damping": "2,2,2,2",
+    }
+    onnx.helper.set_model_props(model, metadata)
+    onnx.save(model, path)
+    policy = actq.import_policy(path, accept_profile=True, answers={"rate_hz": 50})
+    assert (policy.obs_len, policy.act_len, policy.rate_hz) == (8, 4, 50.0)
+    # Without an answer it is the network alone.
+    assert actq.import_policy(path).obs_len == 12
+    with pytest.raises(actq.Error, match="rate_hz: how many ticks a second"):
+        actq.import_policy(path, accept_profile=True)
+    with pytest.raises(actq.Error, match="mjlab.onnx: a bundle takes no output, states, observe and rate_hz"):
+        actq.import_policy(path, accept_profile=True, output="action")
