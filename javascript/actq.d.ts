@@ -19,9 +19,9 @@ export class Head {
    * Opens an image, the content of an `.actq` file, and checks it.
    *
    * @param module A compiled module; by default, the file `actq.wasm.gz` beside this one.
-   * @throws If the bytes are no image of this version, or damaged.
+   * @throws If the content is no image of this version, or damaged.
    */
-  static open(bytes: Uint8Array, module?: WebAssembly.Module): Promise<Head>;
+  static open(content: BufferSource, module?: WebAssembly.Module): Promise<Head>;
   /** Name of the policy. */
   readonly name: string;
   /** Values of an observation. */

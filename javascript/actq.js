@@ -49,8 +49,11 @@ export class Head {
     Object.freeze(this);
   }
 
-  /** Opens an image of these bytes. `module` is a compiled module; by default, it is the file beside this one. */
-  static async open(bytes, module) {
+  /** Opens an image of these bytes, a Uint8Array or an ArrayBuffer. `module` is a compiled module; by default, it is the file beside this one. */
+  static async open(content, module) {
+    const isView = ArrayBuffer.isView(content);
+    if (!isView && !(content instanceof ArrayBuffer)) throw new TypeError(`the image is of type ${typeof content}; pass a Uint8Array or an ArrayBuffer`);
+    const bytes = isView ? new Uint8Array(content.buffer, content.byteOffset, content.byteLength) : new Uint8Array(content);
     const { exports } = await WebAssembly.instantiate(module ?? (await (compiled ??= own().catch(again))), {});
     const address = exports.allocate(bytes.length);
     new Uint8Array(exports.memory.buffer, address, bytes.length).set(bytes);

@@ -19,6 +19,15 @@ test("an image gives its properties and actions", async () => {
   assert.deepEqual(head.step(observation), first);
 });
 
+test("an image may be an ArrayBuffer or a part of one", async () => {
+  const whole = new Uint8Array(valid.length + 8);
+  whole.set(valid, 4);
+  const part = whole.subarray(4, 4 + valid.length);
+  const { crc32 } = await Head.open(valid);
+  for (const content of [part, new DataView(whole.buffer, 4, valid.length), part.slice().buffer]) assert.equal((await Head.open(content)).crc32, crc32);
+  for (const content of ["ur3.actq", [...valid], undefined]) await assert.rejects(Head.open(content), /pass a Uint8Array or an ArrayBuffer/);
+});
+
 test("heads are independent", async () => {
   const [a, b] = await Promise.all([Head.open(valid), Head.open(valid)]);
   const observation = new Float32Array(a.observationLength).fill(0.5);
