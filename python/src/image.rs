@@ -141,7 +141,7 @@ impl Image {
     }
 
     /// Raw inputs in the order of the observation, then targets in the order of the action, each as (kind, name, names
-    /// of the values). Empty without a description (docs/DEPLOY.md).
+    /// of the values, their number). Empty without a description (docs/DEPLOY.md).
     #[getter]
     fn ports(&self) -> PyResult<Vec<Port>> {
         let port = |port: actq_kernels::Port<'_>| {
@@ -337,6 +337,17 @@ impl Image {
         let class = py.get_type::<Self>().into_bound_py_any(py)?;
         (class, (self.bytes(py),)).into_pyobject(py)
     }
+}
+
+/// Writes a file as [`Image::save`] does, whatever it replaces.
+#[pyfunction]
+#[pyo3(signature = (path, text))]
+pub(crate) fn write_text(
+    py: Python<'_>,
+    #[pyo3(from_py_with = given)] path: PathBuf,
+    #[pyo3(from_py_with = given)] text: String,
+) -> PyResult<()> {
+    py.detach(|| write(&path, text.as_bytes())).or_raise()
 }
 
 /// Sorts values by the names of [`export::network`], as "weight_3" and "table_5_0".

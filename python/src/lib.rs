@@ -21,7 +21,7 @@ mod _actq {
     #[pymodule_export]
     use crate::head::{Head, head_of_states};
     #[pymodule_export]
-    use crate::image::Image;
+    use crate::image::{Image, write_text};
     #[pymodule_export]
     use crate::link::Link;
     #[pymodule_export]

@@ -7,9 +7,9 @@ use actq::budget::Budget;
 use actq::data::{Dataset, Recordings, Sizes};
 use actq::error::{Context as _, Error};
 use actq::methods::{Activations, Method, Options};
-use actq::pipeline;
 use actq::pipeline::driven::{DriveOutcome, Driven};
 use actq::pipeline::tune::{TunePlan, run};
+use actq::pipeline::{self, check_budget};
 use actq::runtime::ImageBuffer;
 use actq_cli::report::tuned;
 use actq_kernels::Width;
@@ -66,6 +66,7 @@ pub(crate) fn tune(
     let options = request.options(Method::Distill)?;
     let (policy, rollout) = (policy.policy.clone(), Arc::new(rollout));
     let (tuned, images) = work::run(py, progress, move |worker| {
+        check_budget(&policy, &options)?;
         let sizes = Sizes::of(&policy);
         let load = |passed: Vec<Passed>| passed.into_iter().map(|p| p.load(sizes)).collect::<Result<Vec<_>, _>>();
         let (calib, mut heldout) = (load(calib)?, load(heldout)?);

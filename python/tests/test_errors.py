@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import actq
+from actq._report import Page
 from conftest import UR3
 
 
@@ -113,6 +114,8 @@ def test_wrong_types_are_errors_of_actq(mlp, observations):
         "inspect": lambda: image.inspect(clock="fast"),
         "report's policy": lambda: image.report(object()),
         "report's recordings": lambda: image.report(policy, recordings=3),
+        "report's file": lambda: Page("x").save(3),
+        "report's folder": lambda: Page("x").save("missing/x.html"),
         "board": lambda: image.cost(3),
         "export": lambda: image.export_c("c", name=3),
         "port": lambda: actq.Link(3),
@@ -150,6 +153,14 @@ def test_sources_of_policies_are_checked(mlp, tmp_path):
             actq.import_policy(mlp, answers=answers)
 
 
+def test_torch_is_named_if_it_is_missing(monkeypatch):
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(actq.Error, match="FakeQuant needs torch .*; install it by `pip install torch`"):
+        actq.FakeQuant
+    with pytest.raises(actq.Error, match="modules and TorchScript files need torch"):
+        actq.import_policy(SimpleNamespace(forward=lambda obs: obs))
+
+
 def test_only_files_of_their_kind_are_replaced(mlp, observations, tmp_path):
     policy = actq.import_policy(mlp)
     image = actq.quantize(policy, observations, method="rtn", progress=False)
@@ -164,6 +175,11 @@ def test_only_files_of_their_kind_are_replaced(mlp, observations, tmp_path):
     for _ in range(2):
         image.save(tmp_path / "i.actq")
         image.to_onnx(tmp_path / "i.onnx")
+    page, link = tmp_path / "page.html", tmp_path / "link.html"
+    link.symlink_to(page)
+    for text in ("first", "second \u00b1"):
+        Page(text).save(link)
+        assert link.is_symlink() and page.read_text(encoding="utf-8") == text
     with pytest.raises(actq.Error, match="steps is 0; use a whole number from 1 on"):
         image.export_c(tmp_path / "c", golden=recording, steps=0)
     with pytest.raises(actq.Error, match='the image was made from another policy than "ur3_reach"; pass that one, or none'):

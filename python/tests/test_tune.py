@@ -82,6 +82,17 @@ def test_rounds_learn_from_their_rollouts(mlp):
     assert "own path" in str(first)
 
 
+def test_rounds_keep_the_budgets_of_quantize(mlp, observations):
+    policy, env = actq.import_policy(mlp), envs(AutoresetMode.SAME_STEP)
+    given = {"flash": "3K", "ms": 0.2, "clock": 100e6, "steps": 5, "frames": 100, "progress": False}
+    tuned = actq.tune(policy, env, observations, **given)
+    assert len(tuned.image) <= 3 * 1024 and tuned.image.cost(clock=100e6)["milliseconds"] <= 0.2
+    with pytest.raises(actq.Error, match="more than one budget is given"):
+        actq.tune(policy, env, observations, bpw=2, flash=3000, progress=False)
+    with pytest.raises(actq.Error, match='effort is "slow"'):
+        actq.tune(policy, env, observations, effort="slow", progress=False)
+
+
 def test_recordings_and_functions_of_the_caller(mlp, observations):
     told = []
 

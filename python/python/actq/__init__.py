@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, List
 
 from ._actq import Error, Head, Image, Link, Policy, __version__
 from ._evaluate import ErrorReport, evaluate
-from ._import import import_policy
+from ._import import import_policy, torch_module
 from ._quantize import quantize
 from ._rollout import Episode, Rollout, rollout
 from ._sweep import Point, Sweep, sweep
@@ -58,6 +58,7 @@ def __dir__() -> List[str]:
 def __getattr__(name: str) -> Any:
     # Only what needs torch imports it.
     if name == "FakeQuant":
+        torch_module("FakeQuant needs")
         from ._fake_quant import FakeQuant
 
         return FakeQuant

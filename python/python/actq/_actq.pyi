@@ -85,9 +85,9 @@ class Image:
         Raises `actq.Error` if it cannot be read, is damaged, or has another format version.
         """
     def save(self, path: _Path) -> None:
-        """Writes the file, whole or not at all.
+        """Writes the file, whole or not at all. It replaces only an image or an empty file.
 
-        Raises `actq.Error` if the file cannot be written.
+        Raises `actq.Error` if the file exists and is something else, or cannot be written.
         """
     def inspect(self, *, clock: float = 168e6) -> Report:
         """Returns the report of `actq inspect`: operations, bits, memory, contract, time at `clock` in Hz."""
@@ -96,6 +96,7 @@ class Image:
 
         With the `policy` that the image was made from, it compares both on `recordings`, files of observations, or on the
         recording in the policy's folder. Raises `actq.Error` if one of them does not match the image.
+        Only the command draws statistics, sweeps and rollouts (--stats, --store, --driven), and arrays must be saved first.
         """
     def cost(self, board: str = "stm32f405", *, clock: float = 168e6) -> Cost:
         """Predicts the cost of a step on a board at `clock` in Hz.
@@ -125,7 +126,8 @@ class Image:
         policy takes "noise". What depends on earlier actions (step limits, smoothing, switches, playback) is not part of
         it, and activations are not rounded.
 
-        Raises `actq.Error` for an image with a description (docs/DEPLOY.md), and if the file cannot be written.
+        It replaces a file only if the name ends in .onnx. Raises `actq.Error` for an image with a description
+        (docs/DEPLOY.md), and if the file cannot be written.
         """
     def network(self) -> Dict[str, Any]: ...
     def retrained(self, levels: Dict[str, List[int]], floats: Dict[str, List[float]]) -> Image: ...
@@ -262,7 +264,8 @@ class Link:
         """Sends an image to the slot that does not run; the controller checks it, tests it, and runs it.
 
         version: must not be below that of an image that ran before.
-        signature: 64 bytes by `actq sign`, for controllers that require one.
+        signature: 64 bytes, for controllers that require them. `actq sign` writes JSON: pass
+            `bytes.fromhex(json["signature"])`, and its "version" as `version`.
         """
     def close(self) -> None:
         """Closes the port."""
@@ -294,6 +297,7 @@ def import_onnx(
 def policy_of_files(json: bytes, weights: bytes, guards: List[str], dir: _Path) -> Policy: ...
 def head_of_states(image: Image, seed: int, states: Optional[npt.NDArray[np.uint8]]) -> Head: ...
 def bytes_of(text: str) -> int: ...
+def write_text(path: _Path, text: str) -> None: ...
 def quantize(
     policy: Policy, recordings: Any, heldout: Any, request: Dict[str, Any], progress: _Report
 ) -> Tuple[Image, List[str], List[str]]: ...

@@ -1,4 +1,4 @@
-"""ErrorReport of an image."""
+"""Errors of an image."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ._typing import Recordings
 
 @dataclass(frozen=True)
 class ErrorReport:
-    """ErrorReport of an image's raw outputs against the f32 policy's, as `actq eval --json` prints them."""
+    """Errors of an image's raw outputs against the f32 policy's, as `actq eval --json` prints them."""
 
     #: Mean squared error over variance, averaged over the output's dimensions.
     nmse: float

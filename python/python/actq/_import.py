@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     Source = Union[PathLike, torch.nn.Module, torch.jit.ScriptModule]
     Example = Union[torch.Tensor, Tuple[torch.Tensor, ...]]
 
+#: Begins the error without torch.
+NEEDS_TORCH = "modules and TorchScript files need"
 #: File name extensions of TorchScript.
 TORCHSCRIPT = {".pt", ".pth", ".ts", ".torchscript", ".jit"}
 
@@ -60,7 +62,8 @@ def import_policy(
     name: of a module, the policy's name; the default is its class.
     accept_profile, answers: of a bundle, the answers to what its files do not say, as `actq import` takes them: a path
         of a TOML file, or a mapping.
-    profile: of a bundle, the path of the profile of your own deploy stack, a TOML file.
+    profile: of a bundle, the path of the profile of your own deploy stack, a TOML file. With one of these three, an ONNX
+        file is read as a bundle, by its metadata.
     low, high: limits of the actions, or of a bundle's targets, in their unit: a number, or one for each, as
         `env.action_space.low`. Of these and those in the source, the stricter ones hold. A motor controller refuses to arm
         without limits.
@@ -101,7 +104,7 @@ def import_policy(
             raise _actq.Error(f"{path}: there is no such file")
         name = name or path.stem
         try:
-            source = _torch_module().jit.load(str(path), map_location="cpu")
+            source = torch_module(NEEDS_TORCH).jit.load(str(path), map_location="cpu")
         except Exception as error:
             text = str(error).strip().split("\n")[0]
             raise _actq.Error(f"{path}: torch cannot read it as TorchScript: {text}; pass a module instead") from error
@@ -109,7 +112,7 @@ def import_policy(
         raise _actq.Error(f"the policy is of type {type(source).__name__}; pass a path, a torch.nn.Module or a trained model")
     if accept_profile or answers is not None or profile is not None:
         raise _actq.Error("only a deploy bundle takes accept_profile, answers and profile")
-    _torch_module()
+    torch_module(NEEDS_TORCH)
     from . import _models
     from ._torch import import_module
 
@@ -142,11 +145,12 @@ def _numbers(name: str, value: Any) -> List[float]:
     return [float(number) for number in numbers]
 
 
-def _torch_module() -> Any:
+def torch_module(needed: str) -> Any:
+    """Imports torch, or raises an error that begins with what needs it."""
     try:
         import torch
     except ImportError as error:
-        raise _actq.Error(f'modules and TorchScript files need torch ({error}); pip install "actq[torch]"') from error
+        raise _actq.Error(f"{needed} torch ({error}); install it by `pip install torch`") from error
     return torch
 
 

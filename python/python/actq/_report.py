@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from html import escape
-from pathlib import Path
 from typing import Union
+
+from . import _actq
 
 
 class Report(str):
@@ -23,17 +23,11 @@ class Page(str):
     """A report as an HTML file, in which the image runs. A notebook shows it."""
 
     def save(self, path: Union[str, "os.PathLike[str]"]) -> None:
-        """Writes the file, whole or not at all."""
-        place = Path(path)
-        handle, part = tempfile.mkstemp(dir=place.parent, prefix=f".{place.name}", suffix=".part")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
-                file.write(self)
-            os.chmod(part, 0o644)
-            os.replace(part, place)
-        except BaseException:
-            os.unlink(part)
-            raise
+        """Writes the file, whole or not at all. A symbolic link stays, and its target is written.
+
+        Raises `actq.Error` if the file cannot be written.
+        """
+        _actq.write_text(path, self)
 
     def __repr__(self) -> str:
         return f"Page({len(self)} characters)"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple
+from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple, Union
 
 from . import _actq
 from ._actq import Head, Image, Policy
 from ._progress import Progress, reporter
-from ._quantize import log, request
+from ._quantize import CLOCK, log, request
 from ._rollout import Act, Observe, Rollout, Success, rollout
 from ._typing import Recordings
 
@@ -58,6 +58,9 @@ def tune(
     *,
     bits: Optional[int] = None,
     bpw: Optional[float] = None,
+    flash: Union[None, int, str] = None,
+    ms: Optional[float] = None,
+    clock: float = CLOCK,
     rounds: int = 1,
     frames: int = 10_000,
     observe: Optional[Observe] = None,
@@ -66,6 +69,7 @@ def tune(
     heldout: Optional[Recordings] = None,
     steps: Optional[int] = None,
     minutes: Optional[float] = None,
+    effort: Optional[str] = None,
     relative: bool = False,
     seed: int = 1,
     progress: Progress = None,
@@ -76,7 +80,7 @@ def tune(
     env: a vector environment of Gymnasium. All of its robots step together; it stays open.
     recordings: observations of the f32 policy, as for `quantize`. Without them, an image of 8 bits of the policy is
         rolled out in `env` in its place.
-    bits, bpw: bits of every weight, or bits per weight of all weights; the default is 3 bits.
+    bits, bpw, flash, ms, clock: the budget, as for `quantize`; the default is 3 bits of every weight.
     rounds: on-policy rounds after the first image, 1 to 100. N rounds make N + 1 rollouts.
     frames: frames of a rollout, of all robots together.
     observe: makes the policy's observations [n, n_obs] of the environment's; the default flattens arrays.
@@ -84,12 +88,15 @@ def tune(
         value for Discrete.
     success: is called with an `Episode` and says if it succeeded. The default reads "is_success" or "success" of the
         environment's info; without them, no success is known.
-    heldout, steps, minutes, relative, seed, progress: as for `quantize`.
+    heldout, steps, minutes, effort, relative, seed, progress: as for `quantize`.
 
     The same seed gives the same images if the environment does the same. Raises `actq.Error` as `quantize` does, and what
     the environment raises. Ctrl-C returns at once.
     """
-    options = request(bits=bits, bpw=bpw, steps=steps, minutes=minutes, relative=relative, seed=seed)
+    options = request(
+        bits=bits, bpw=bpw, flash=flash, ms=ms, clock=clock, steps=steps, minutes=minutes, effort=effort, relative=relative,
+        seed=seed,
+    )  # fmt: skip
     rollouts: List[Rollout] = []
     # A recurrent policy that plays chunks reads an observation only where it plans.
     every = policy.execute if policy.state_len > 0 else 1
