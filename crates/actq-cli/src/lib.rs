@@ -1,4 +1,4 @@
-//! The command `actq`: command line, tables, plots, progress, and the host's end of the link. The library `actq` does
+//! The command `actq`: command line, tables, reports, progress, and the host's end of the link. The library `actq` does
 //! the work on policies and images.
 #![forbid(unsafe_code)]
 

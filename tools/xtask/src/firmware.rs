@@ -30,7 +30,7 @@ pub(crate) struct Options {
     /// The stricter of these and the image's own limits hold; without either no axis may move.
     #[arg(long, allow_hyphen_values = true)]
     pub(crate) limits: Option<String>,
-    /// Features of firmware-demo: tick-8khz, foc, defmt-rtt, defmt-semihosting
+    /// Features of firmware-demo: tick-8khz, foc, defmt-rtt, defmt-semihosting, faults (for tests)
     #[arg(long, value_name = "LIST")]
     pub(crate) features: Option<String>,
     /// The public key, as `actq keygen` prints it, that signs images; others are refused (feature signed)

@@ -69,9 +69,9 @@ pub(crate) struct ReportArgs {
     /// The policy that the image was made from: a folder, or an ONNX file
     #[arg(long, value_name = "POLICY_DIR")]
     pub(crate) policy: Option<PathBuf>,
-    /// Recordings of observations, or a folder of them [default: the held-out recording in POLICY_DIR, or else its calibration
-    /// recording]
-    #[arg(long, value_name = "FILE|DIR", num_args = 1..)]
+    /// A recording of observations, or a folder of them; may be repeated [default: the held-out recording in POLICY_DIR, or
+    /// else its calibration recording]
+    #[arg(long, value_name = "FILE|DIR")]
     pub(crate) recordings: Vec<PathBuf>,
     /// A recording of this image's own rollout, by actq serve --record, or a folder of them; and as FILE.json the line
     /// with success and episodes that the simulator printed; may be repeated

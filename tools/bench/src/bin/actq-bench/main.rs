@@ -114,8 +114,8 @@ enum Command {
         /// The folder to write
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
-        /// The module of the robots
-        #[arg(long, value_name = "FILE.wasm")]
+        /// The module of the robots, which xtask passes
+        #[arg(long, value_name = "FILE.wasm", hide = true)]
         robots: PathBuf,
         /// Only the balancer at 2 bits, which learns briefly, and two reports: for tests
         #[arg(long)]
