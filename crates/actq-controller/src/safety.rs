@@ -51,11 +51,13 @@ pub struct Safety<const AXES: usize> {
 }
 
 impl<const AXES: usize> Safety<AXES> {
-    /// Creates a disarmed controller. `deadline` is the range that may be set, in ticks, at least 1 (0 counts as 1);
-    /// its end applies until then. `seed` should differ at every start, so that requests from before the start are
-    /// refused: a count of starts in memory that a reset preserves, or a free-running timer.
+    /// Creates a disarmed controller. `deadline` is the range that may be set, in ticks, at least 1 (0 counts as 1) and
+    /// less than `u32::MAX` (which counts as 1 less); its end applies until then. `seed` should differ at every start, so
+    /// that requests from before the start are refused: a count of starts in memory that a reset preserves, or a
+    /// free-running timer.
     pub fn new(axes: [Axis; AXES], deadline: RangeInclusive<u32>, seed: u32) -> Self {
-        let (least, most) = (*deadline.start().max(&1), *deadline.end().max(&1));
+        // Below the age that means that there was no observation.
+        let (least, most) = (*deadline.start().max(&1), *deadline.end().clamp(&1, &(u32::MAX - 1)));
         Self {
             axes,
             deadline: most,

@@ -191,6 +191,17 @@ fn arming_requires_a_recent_observation_and_token() {
 }
 
 #[test]
+fn the_longest_deadline_needs_an_observation() {
+    let axis = Axis::new(-1.0, 1.0, 0.1, 0.0, SafeAction::Hold).expect("the axis is valid");
+    let mut safety = Safety::new([axis], 1..=u32::MAX, 1);
+    Check::ALL.into_iter().for_each(|check| safety.check(check, true));
+    assert_eq!(safety.arm(safety.token()), Err(Refusal::Stale));
+    safety.observed();
+    safety.tick();
+    assert_eq!(safety.arm(safety.token()), Ok(()));
+}
+
+#[test]
 fn an_axis_without_limits_prevents_arming() {
     let axis = Axis::new(0.0, 0.0, 1.0, 0.0, SafeAction::Hold).expect("an axis with one value");
     for (axes, refusal) in [([axis, Axis::STILL], Some(Refusal::Limits)), ([axis; 2], None)] {
