@@ -18,6 +18,8 @@ pub struct Slots<F, A> {
     pub(super) authority: A,
     /// Slots that must not be selected again before the next start.
     refused: [bool; 2],
+    /// Highest confirmed version that the slots had since the start: an update erases a record before it has another.
+    floor: u32,
 }
 
 /// An image to run.
@@ -40,7 +42,7 @@ pub struct Candidate {
 impl<F: NorFlash, A: Authority> Slots<F, A> {
     /// Creates slots in `flash` for images that `authority` accepts.
     pub const fn new(flash: F, layout: Layout, authority: A) -> Self {
-        Self { flash, layout, authority, refused: [false; 2] }
+        Self { flash, layout, authority, refused: [false; 2], floor: 0 }
     }
 
     /// Returns the flash, to read an image that is not mapped into memory.
@@ -95,13 +97,15 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
         }
     }
 
-    /// Returns the lowest version that an update may have: the highest confirmed one.
+    /// Returns the lowest version that an update may have: the highest one that was confirmed in a slot in this or an
+    /// earlier call since the start.
     pub fn least_version(&mut self) -> u32 {
         let versions = Slot::BOTH.map(|slot| {
             let confirmed = self.marks(slot).is_some_and(|marks| marks.confirmed);
             self.record(slot).filter(|_| confirmed).map_or(0, |record| record.plan.version)
         });
-        versions.into_iter().fold(0, u32::max)
+        self.floor = versions.into_iter().fold(self.floor, u32::max);
+        self.floor
     }
 
     /// Returns the generation of the next image.

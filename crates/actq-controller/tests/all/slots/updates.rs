@@ -169,6 +169,26 @@ fn a_refused_update_changes_nothing() {
     assert_eq!(Device::start(&mut flash, &layout, Anyone).runs, Some(image.bytes));
 }
 
+/// The newest image does not run, so that an update erases it, and with it the record of the highest version.
+#[test]
+fn an_erased_version_counts_until_the_next_start() {
+    let (mut flash, layout) = flash();
+    let [old, newest] = [1, 5].map(|version| Image::new(100, version, true));
+    let mut device = Device::start(&mut flash, &layout, Anyone);
+    for image in [&old, &newest] {
+        assert_eq!(device.update(image, 100, None), Ok(()));
+    }
+    // The second image is in slot B, behind its record.
+    flash.bytes[2048 + 256] ^= 1;
+    let mut device = Device::start(&mut flash, &layout, Anyone);
+    assert_eq!(device.runs.as_ref(), Some(&old.bytes));
+    device.wait(|updater| updater.begin(newest.plan())).expect("the same version is allowed");
+    assert_eq!(device.updater.abort(), Ok(()));
+    let older = Image::new(100, 4, true);
+    assert_eq!(device.update(&older, 100, None), Err(Refusal::Rollback));
+    assert_eq!(device.update(&newest, 100, None), Ok(()));
+}
+
 #[test]
 fn an_image_that_fails_its_test_never_runs() {
     let (mut flash, layout) = flash();
