@@ -81,8 +81,8 @@ impl Head<'_, '_> {
         Ok(())
     }
 
-    /// Returns `true` if the last action in the saved words of the arena is one that the contract allows, and no more
-    /// chunks predict a period than an ensemble has. A file's checksum does not tell who wrote it.
+    /// Returns `true` if the last action in the saved words of the arena is one that the contract allows, and every
+    /// period of an ensemble has room for another chunk, as after each action. A file's checksum does not tell who wrote it.
     fn has_valid_arena(&self, words: impl Iterator<Item = u32> + Clone, started: bool) -> bool {
         let [state, output, rest] = self.saved_regions();
         let rest_of = |region: Region| {
@@ -96,7 +96,7 @@ impl Head<'_, '_> {
         let (kept, horizon) = (self.image.kept(), self.image.horizon());
         let counts = Region { offset: kept.end().saturating_sub(horizon), len: horizon };
         (!started || rest_of(self.image.action()).enumerate().all(is_allowed))
-            && rest_of(counts).all(|count| count as usize <= horizon)
+            && rest_of(counts).all(|count| (count as usize) < horizon)
     }
 
     fn check_saved(&self, given: usize) -> Result<(), SavedError> {
