@@ -74,7 +74,7 @@ impl<S: Stage> Motor<S> {
             Some(duties) => self.bridges.drive(duties),
             None => {
                 self.control.reset();
-                self.bridges.coast() && outputs.first() == Some(&Output::Coast)
+                if outputs.first() == Some(&Output::Coast) { self.bridges.coast() } else { self.bridges.fail() }
             }
         }
     }
@@ -200,6 +200,13 @@ mod tests {
         // A lost sensor.
         motor.motor.flux = Stator::default();
         assert!(!motor.apply(&[Output::Drive(0.0)], &axes) && !motor.bridges.stage().on);
+        // A sensor that works again: off until the controller is disarmed.
+        motor.motor.flux = Stator { alpha: 1.0, beta: 0.0 };
+        for output in [Output::Drive(0.0), Output::Brake] {
+            assert!(!motor.apply(&[output], &axes) && !motor.bridges.stage().on);
+        }
+        assert!(motor.apply(&[Output::Coast], &axes) && !motor.bridges.stage().on);
+        assert!(motor.apply(&[Output::Drive(0.0)], &axes) && motor.bridges.stage().on);
         // The break input.
         motor.bridges.stage().broken = true;
         assert!(!motor.apply(&[Output::Coast], &axes) && !motor.apply(&[Output::Brake], &axes));

@@ -5,10 +5,11 @@ use actq_boards::hal::Stage;
 use actq_controller::{Axis, Output};
 use embedded_hal::pwm::SetDutyCycle as _;
 
-/// A power stage, with `on` after it was switched on.
+/// A power stage.
 #[derive(Debug)]
 pub struct Bridges<S> {
     stage: S,
+    /// It was switched on, or failed, and the outputs have not coasted since: it is not switched on again.
     on: bool,
 }
 
@@ -38,6 +39,14 @@ impl<S: Stage> Bridges<S> {
         self.stage.disable();
         self.on = false;
         !self.stage.is_broken()
+    }
+
+    /// Switches all bridges off until the outputs coast; returns `false`.
+    #[cfg(feature = "foc")]
+    pub(crate) fn fail(&mut self) -> bool {
+        self.stage.disable();
+        self.on = true;
+        false
     }
 
     /// Sets the bridges' duty cycles, 0 to 1; returns `false` if the stage is off and should be on.

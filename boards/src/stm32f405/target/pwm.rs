@@ -107,6 +107,8 @@ impl Stage for Pwm {
 
     fn enable(&mut self) -> bool {
         self.timer.sr().modify(|_, w| w.bif().clear_bit());
+        // Loads the duty cycles, which would otherwise be those of before until the end of the period.
+        self.timer.egr().write(|w| w.ug().set_bit());
         self.timer.bdtr().modify(|_, w| w.moe().set_bit());
         // The bit reads as 1 some cycles after it was set (RM0090, section 17.3.12). The break input keeps it at 0.
         wait(SET, || self.is_on())
