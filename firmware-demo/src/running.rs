@@ -32,9 +32,9 @@ struct Started {
 }
 
 impl<'i, 's> Running<'i, 's> {
-    /// Runs `head`, whose image is in `bytes`.
-    pub fn new(head: Head<'i, 's>, bytes: &'i [u8]) -> Self {
-        Self { head, bytes, scrub: Scrub::new(bytes), step: None, longest_step: 0 }
+    /// Runs `head`, whose image is in `bytes`; `sum` is their checksum for the scrub, from before their check.
+    pub const fn new(head: Head<'i, 's>, bytes: &'i [u8], sum: u32) -> Self {
+        Self { head, bytes, scrub: Scrub::new(sum), step: None, longest_step: 0 }
     }
 
     /// Longest step so far, in µs.

@@ -2,7 +2,7 @@
 
 use actq_controller::breadcrumb::{Record, WORDS};
 use actq_controller::progress::Progress;
-use actq_controller::scrub::Scrub;
+use actq_controller::scrub::{Scrub, checksum};
 use actq_link::code::{Crash, ResetCause};
 use actq_testkit::Random;
 
@@ -55,7 +55,7 @@ fn the_watchdog_needs_progress_of_all_three() {
 fn the_scrub_detects_every_flipped_bit() {
     let image: Vec<u8> = (0..300u32).map(|i| (i * i) as u8).collect();
     for piece in [1, 7, 64, 299, 300, 1000] {
-        let mut scrub = Scrub::new(&image);
+        let mut scrub = Scrub::new(checksum(&image));
         let mut round =
             |image: &[u8]| (0..=image.len()).find_map(|_| scrub.advance(image, piece)).expect("the round ends");
         assert!(round(&image) && round(&image));

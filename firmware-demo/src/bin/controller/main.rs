@@ -53,7 +53,7 @@ mod app {
     use actq_boards::port::{Buffers, Port, Wire};
     use actq_controller::endpoint::Facts;
     use actq_controller::slots::Candidate;
-    use actq_controller::{Check, Endpoint, Guard, Output, Safety, Settings, Shared as _};
+    use actq_controller::{Check, Endpoint, Guard, Output, Safety, Settings, Shared as _, scrub};
     use actq_firmware_demo::deadline::BAUD;
     use actq_firmware_demo::image;
     #[cfg(feature = "foc")]
@@ -197,12 +197,13 @@ mod app {
         let mut work =
             Work { port, watchdog, safety, endpoint, updates, rates: *rates, stack: start::stack, out, state };
         loop {
+            // It reads the whole image before the check does, while the longer timeout holds.
+            work.watchdog.feed();
+            let sum = scrub::checksum(bytes);
             let head = image::open(bytes, scratch, start::LENGTHS, work.watchdog);
             let refusal = head.as_ref().err().copied();
             let image = head.as_ref().map_or(0, |head| head.image().crc());
-            // It reads the whole image, so the longer timeout still holds.
-            work.watchdog.feed();
-            let mut running = head.ok().map(|head| Running::new(head, bytes));
+            let mut running = head.ok().map(|head| Running::new(head, bytes, sum));
             let watched = work.watchdog.start(TIMEOUTS.turn);
             work.safety.with(|safety| {
                 safety.check(Check::Watchdog, watched);
