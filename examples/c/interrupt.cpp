@@ -22,7 +22,8 @@ constexpr uint32_t period = CORE_HZ / 1000;
 
 uint32_t scratch[POLICY_SCRATCH_WORDS];
 actq::Head head;
-// Written by the main loop while `ready` is false, read by the interrupt while it is true.
+// Written by the main loop while `ready` is false, read by the interrupt while it is true. `volatile` does not order
+// `action`: the fences do, as std::atomic_signal_fence would, which needs libstdc++.
 float action[POLICY_ACTION_LEN];
 volatile bool ready;
 volatile unsigned ticks;
@@ -38,7 +39,10 @@ extern "C" void tick() {
     }
     ticks = ticks + 1;
     if (ready) {
+        // Reads of the action belong between both fences.
+        __atomic_signal_fence(__ATOMIC_ACQUIRE);
         applied = applied + 1;
+        __atomic_signal_fence(__ATOMIC_RELEASE);
         ready = false;
     }
 }
@@ -75,10 +79,12 @@ int main() {
             given.value = action[i];
             wrong += given.bits != policy_golden_actions[step * POLICY_ACTION_LEN + i];
         }
+        __atomic_signal_fence(__ATOMIC_RELEASE);
         ready = true;
         while (ready) {
             __asm__ volatile("wfi");
         }
+        __atomic_signal_fence(__ATOMIC_ACQUIRE);
     }
     csr = 0;
     print_number(applied);

@@ -34,6 +34,25 @@ static IMAGE: &[u8] = include_image!(env!(
 /// An action.
 pub type Action = [f32; AXES];
 
+/// Ticks for which an action holds: long enough for the next one, and short enough to stop without it.
+const HOLD: u32 = 100;
+
+/// An action with the ticks for which it still holds.
+#[derive(Clone, Copy, Debug)]
+pub struct Held(Action, u32);
+
+impl Held {
+    /// Holds a new action.
+    pub const fn new(action: Action) -> Self {
+        Self(action, HOLD)
+    }
+
+    /// Counts a tick; without a newer action an old one ends.
+    pub fn tick(self) -> Option<Self> {
+        Some(Self(self.0, self.1.checked_sub(1)?))
+    }
+}
+
 /// Returns a head that passed its self-test. Firmware that moves a robot should report which check failed.
 pub fn open(scratch: &mut [u32]) -> Option<Head<'static, '_>> {
     let mut head = Head::new(Image::new_checked(IMAGE).ok()?, scratch).ok()?;
@@ -84,10 +103,10 @@ impl Motors {
         Self(0)
     }
 
-    /// Applies the last action, if any, in a control tick.
-    pub fn tick(&mut self, action: Option<Action>) {
+    /// Applies the last action in a control tick; without one that holds, real motors get their safe action.
+    pub fn tick(&mut self, held: Option<Held>) {
         self.0 += 1;
-        let (Some(action), Some(mut out)) = (action, host::stdout()) else { return };
+        let (Some(Held(action, _)), Some(mut out)) = (held, host::stdout()) else { return };
         let written = write!(out, "{}", self.0)
             .and_then(|()| action.iter().try_for_each(|value| write!(out, " {:08x}", value.to_bits())));
         host::exit(written.is_ok())

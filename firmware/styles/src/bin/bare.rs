@@ -11,7 +11,7 @@ mod firmware {
     use core::convert::Infallible;
     use core::task::Poll;
 
-    use actq_firmware_styles::{Action, Motors, SCRATCH, SLICE, Sensors, open, start_tick};
+    use actq_firmware_styles::{Held, Motors, SCRATCH, SLICE, Sensors, open, start_tick};
     use actq_firmware_support::host;
     use cortex_m::peripheral::SYST;
     use cortex_m::{Peripherals, singleton};
@@ -19,13 +19,14 @@ mod firmware {
     use critical_section::Mutex;
 
     /// The last action, from the loop to the tick.
-    static ACTION: Mutex<Cell<Option<Action>>> = Mutex::new(Cell::new(None));
+    static ACTION: Mutex<Cell<Option<Held>>> = Mutex::new(Cell::new(None));
 
     #[entry]
     fn main() -> ! {
         let (peripherals, scratch) = (Peripherals::take(), singleton!(: [u32; SCRATCH] = [0; SCRATCH]));
         if let (Some(peripherals), Some(scratch)) = (peripherals, scratch) {
             let _ = control(peripherals.SYST, scratch);
+            publish(None);
         }
         host::exit(false)
     }
@@ -34,8 +35,13 @@ mod firmware {
     #[exception]
     fn SysTick() {
         static mut MOTORS: Motors = Motors::new();
-        let action = critical_section::with(|cs| ACTION.borrow(cs).get());
-        MOTORS.tick(action);
+        let held = critical_section::with(|cs| ACTION.borrow(cs).get()).and_then(Held::tick);
+        publish(held);
+        MOTORS.tick(held);
+    }
+
+    fn publish(held: Option<Held>) {
+        critical_section::with(|cs| ACTION.borrow(cs).set(held));
     }
 
     /// The loop; it ends if the head cannot be opened or a step fails.
@@ -52,7 +58,7 @@ mod firmware {
                     break action.try_into().ok()?;
                 }
             };
-            critical_section::with(|cs| ACTION.borrow(cs).set(Some(action)));
+            publish(Some(Held::new(action)));
         }
     }
 }

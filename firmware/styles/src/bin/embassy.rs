@@ -12,7 +12,7 @@ mod firmware {
     use core::task::Poll;
 
     use actq_boards::device::{Interrupt, interrupt};
-    use actq_firmware_styles::{Action, Motors, SCRATCH, SLICE, Sensors, open, start_tick};
+    use actq_firmware_styles::{Held, Motors, SCRATCH, SLICE, Sensors, open, start_tick};
     use actq_firmware_support::host;
     use cortex_m::{Peripherals, singleton};
     use embassy_executor::{InterruptExecutor, Spawner};
@@ -22,14 +22,15 @@ mod firmware {
 
     static CONTROL: InterruptExecutor = InterruptExecutor::new();
     static TICK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-    /// The newest action, from the head to the tick.
-    static ACTION: Signal<CriticalSectionRawMutex, Action> = Signal::new();
+    /// The newest action, or none after an error, from the head to the tick.
+    static ACTION: Signal<CriticalSectionRawMutex, Option<Held>> = Signal::new();
 
     #[embassy_executor::main(entry = "cortex_m_rt::entry")]
     async fn main(_below: Spawner) {
         // An otherwise unused interrupt, with a higher priority than the thread.
         CONTROL.start(Interrupt::SERIAL).spawn(tick().expect("the first task"));
         let _ = control().await;
+        ACTION.signal(None);
         host::exit(false)
     }
 
@@ -47,11 +48,11 @@ mod firmware {
     /// The control tick, which interrupts the tasks of the thread.
     #[embassy_executor::task]
     async fn tick() {
-        let (mut motors, mut action) = (Motors::new(), None);
+        let (mut motors, mut held) = (Motors::new(), None::<Held>);
         loop {
             TICK.wait().await;
-            action = ACTION.try_take().or(action);
-            motors.tick(action);
+            held = ACTION.try_take().unwrap_or(held).and_then(Held::tick);
+            motors.tick(held);
         }
     }
 
@@ -62,13 +63,14 @@ mod firmware {
         start_tick(Peripherals::take()?.SYST);
         loop {
             head.begin(&sensors.wait().await).ok()?;
-            ACTION.signal(loop {
+            let action = loop {
                 if let Poll::Ready(action) = head.poll(SLICE).ok()? {
                     break action.try_into().ok()?;
                 }
                 // Other tasks wait at most for one slice.
                 yield_now().await;
-            });
+            };
+            ACTION.signal(Some(Held::new(action)));
         }
     }
 }
