@@ -6,7 +6,7 @@ use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
 use actq_c::*;
-use actq_kernels::image::seal;
+use actq_kernels::image::{checksum, seal};
 use libfuzzer_sys::fuzz_target;
 
 /// Instructions of the longest step to run, and words of the largest scratch memory.
@@ -97,6 +97,11 @@ fn run(bytes: &[u8], script: &[u8]) {
                     let bytes = script.length(saved_bytes, saved.len());
                     let at = script.next();
                     saved[at] ^= script.next() as u8;
+                    // A right checksum, so that the checks behind it are reached.
+                    if script.next() % 2 == 0 {
+                        let sum = checksum(&saved[..bytes]).to_le_bytes();
+                        saved[12..16].copy_from_slice(&sum);
+                    }
                     actq_restore(head, saved.as_ptr(), bytes)
                 }
                 14 => {
