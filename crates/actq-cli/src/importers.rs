@@ -1,13 +1,17 @@
 //! The policy formats that the command reads. To add one, append it to `IMPORTERS`.
 
+use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 
-use actq::data::{Dataset, Learned, Recording, Sizes};
+use actq::data::{Dataset, Learned, Recording, Sizes, described_by};
 use actq::import::{Importer, PolicyFolder};
 use actq::policy::Policy;
-use actq_deploy::{DeployFolder, observed};
+use actq_deploy::description::Description;
+use actq_deploy::{DESCRIPTION, DeployFolder, observed};
+use actq_kernels::image::checksum;
 use actq_onnx::Onnx;
-use anyhow::Result;
+use anyhow::{Context as _, Result, ensure};
 
 /// All importers. The first that accepts a path reads it; [`PolicyFolder`] reports a path that none accepts.
 static IMPORTERS: [&dyn Importer; 3] = [&Onnx, &DeployFolder, &PolicyFolder];
@@ -37,10 +41,33 @@ pub(crate) fn policy_files(path: &Path) -> Vec<PathBuf> {
 /// networks read.
 pub fn learned(policy: &Policy, files: &[PathBuf]) -> Result<Option<Learned>> {
     if files.is_empty() {
+        check_description(policy)?;
         return Ok(Learned::load(policy, files)?);
     }
     let mut parts = files.iter().map(|file| recorded(policy, file)).collect::<actq::error::Result<Vec<_>>>()?;
     Ok(Some(Learned::join(&mut parts, &policy.graph)?))
+}
+
+/// Refuses a recording in the folder of a bundle that was made of raw values by another description.
+fn check_description(policy: &Policy) -> Result<()> {
+    if policy.around.is_none() {
+        return Ok(());
+    }
+    let own = description_checksum(&fs::read_to_string(policy.dir.join(DESCRIPTION))?)?;
+    for path in Recording::Calib.paths(&policy.dir).into_iter().filter(|path| path.exists()) {
+        ensure!(
+            described_by(&path)?.is_none_or(|made| made == own),
+            "{}: was made by another {DESCRIPTION} than the present one; pass recordings of raw values by --calib FILE, or remove it",
+            path.display()
+        );
+    }
+    Ok(())
+}
+
+/// Returns the checksum of what a description says, without its comments.
+pub(crate) fn description_checksum(text: &str) -> Result<u32> {
+    let description = Description::parse(text).context(DESCRIPTION)?;
+    Ok(checksum(description.to_toml(&BTreeMap::default())?.as_bytes()))
 }
 
 /// Reads a recording that a user made for a policy, as what its networks read.

@@ -247,6 +247,21 @@ impl Facts {
         Ok(self.value::<String>(key)?.as_deref() == Some(choice))
     }
 
+    /// As [`Self::is_choice`], for a bundle of which the profile does not know: its value is no answer.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::value_or_default`].
+    pub(crate) fn is_answered(&mut self, key: &str, choice: &str) -> Result<bool> {
+        if self.answers.0.contains_key(key) {
+            return self.is_choice(key, choice);
+        }
+        let rule = self.profile.rules.iter().find(|rule| rule.key == key);
+        let rule = rule.with_context(|| format!("profile {}: there is no rule {key}", self.profile.family))?;
+        self.ask(Question { key: key.to_owned(), meaning: rule.meaning.clone(), profile: None });
+        Ok(false)
+    }
+
     /// Returns a number above 0 by its rule; 1 while it is a question.
     ///
     /// # Errors

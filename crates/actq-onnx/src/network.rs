@@ -61,6 +61,8 @@ pub struct Imported {
     pub bounded: usize,
     /// Nodes before the action that replace or limit NaN and infinity, with what they do. The policy has no such nodes.
     pub guards: Vec<String>,
+    /// Axes of the inputs, after the first, that have no length; each is taken as 1.
+    pub unsized_axes: Vec<String>,
     /// Reasons why the file is invalid, although its network can be read.
     pub faults: Vec<String>,
 }
@@ -169,7 +171,7 @@ impl Imported {
 fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Imported> {
     options.check(&model.graph)?;
     let Followed { mut exprs, outputs, errors } = follow_outputs(model, options)?;
-    let cells = Cells::find(model, &mut exprs, &outputs, &options.states);
+    let cells = Cells::find(model, &mut exprs, &outputs, &options.states)?;
     let output = &outputs[choose(&exprs, &cells, &outputs, errors, options)?];
     let is_constant = |i: &usize| matches!(output.value.elements()[*i], Element::Known(_));
     let constant = (0..output.value.len()).filter(is_constant).collect();
@@ -238,6 +240,7 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         contract: last,
         bounded,
         guards,
+        unsized_axes: remarks::unsized_axes(model, &exprs, &live),
         faults: remarks::faults(model),
     })
 }

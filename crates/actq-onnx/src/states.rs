@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use actq::error::{Context as _, Result, bail, ensure};
+use actq::error::{Context as _, Error, Result, bail, ensure};
 use actq::text::printable;
 
 use crate::file::model::Model;
@@ -29,7 +29,16 @@ pub(crate) struct Cells {
 impl Cells {
     /// Finds the cells whose next states are among the outputs. `named` are pairs of inputs and outputs from the
     /// caller.
-    pub(crate) fn find(model: &Model, exprs: &mut Exprs, outputs: &[Output], named: &[(String, String)]) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// If two inputs may be the state of an LSTM.
+    pub(crate) fn find(
+        model: &Model,
+        exprs: &mut Exprs,
+        outputs: &[Output],
+        named: &[(String, String)],
+    ) -> Result<Self> {
         let mut found = Self::default();
         for output in outputs {
             let elements = output.value.elements();
@@ -43,7 +52,13 @@ impl Cells {
                 let whole = (0..len).all(|k| elements.get(at + k) == Some(&Element::Of(next, k)));
                 if whole && !matches!(exprs.get(next), Expr::Cell(_) | Expr::CellState(_) | Expr::Input(_)) {
                     let candidates = candidates(model, exprs, output, Run { of: 0, from: at, len }, named);
-                    let cell = exprs.gru_of(next).or_else(|| exprs.lstm_of(next, &candidates));
+                    let cell = match exprs.gru_of(next) {
+                        Some(cell) => Some(cell),
+                        None => match exprs.lstm_of(next, &candidates) {
+                            Ok(cell) => cell,
+                            Err(runs) => return Err(ambiguous(model, exprs, output, runs)),
+                        },
+                    };
                     if let Some(cell) = cell {
                         let h = exprs.put(Expr::Cell(Box::new(cell.cell)), len);
                         found.instead.insert(next, h);
@@ -56,7 +71,7 @@ impl Cells {
                 at += if whole { len } else { 1 };
             }
         }
-        found
+        Ok(found)
     }
 
     /// Replaces an element of a decomposed cell by that of the cell.
@@ -113,9 +128,25 @@ fn input_of(model: &Model, exprs: &Exprs, run: &Run) -> Result<(usize, String)> 
     Ok((i, printable(&port.name).into_owned()))
 }
 
+/// Says that two inputs may be the state of an LSTM.
+fn ambiguous(model: &Model, exprs: &Exprs, output: &Output, runs: [Run; 2]) -> Error {
+    let [first, second] = runs.map(|run| input_of(model, exprs, &run).map(|(_, name)| name).unwrap_or_default());
+    let next = printable(&output.name);
+    Error::input(format!(
+        "the inputs {first:?} and {second:?} have the same length, and either may be the state whose next value is the output \
+         {next:?}; pass --state {first}={next} or --state {second}={next}"
+    ))
+}
+
 /// Lists runs of inputs that may be the hidden state whose next value is at `place` of an output: inputs as long as the
-/// output. Inputs that the caller pairs come first, then those with a similar name.
-fn candidates(model: &Model, exprs: &mut Exprs, output: &Output, place: Run, named: &[(String, String)]) -> Vec<Run> {
+/// output. Those that the caller pairs have rank 0 and come first, then those with a similar name.
+fn candidates(
+    model: &Model,
+    exprs: &mut Exprs,
+    output: &Output,
+    place: Run,
+    named: &[(String, String)],
+) -> Vec<(usize, Run)> {
     let mut found: Vec<(usize, Run)> = Vec::new();
     for (i, port) in model.graph.inputs.iter().enumerate() {
         let len: Option<usize> = port
@@ -136,7 +167,7 @@ fn candidates(model: &Model, exprs: &mut Exprs, output: &Output, place: Run, nam
         found.push((rank, Run { of, ..place }));
     }
     found.sort_by_key(|(rank, _)| *rank);
-    found.into_iter().map(|(_, run)| run).collect()
+    found
 }
 
 /// Strips the parts of a name that distinguish a state before a step from the state after it.

@@ -25,7 +25,7 @@ pub(crate) use dataset::mean_and_variance;
 pub use joined::{Learned, MAX_FRAMES, Share, joined, longest_piece};
 pub use npy::npy_header;
 pub(crate) use origin::is_link_log;
-pub use origin::{CRC32, driven_by};
+pub use origin::{CRC32, DESCRIBED, described_by, driven_by};
 pub use parts::Part;
 pub use range::{Outside, Range, runs};
 pub use recording::{Recording, Recordings, files_of};

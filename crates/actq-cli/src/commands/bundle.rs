@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
-use actq::data::NpzWriter;
+use actq::data::{DESCRIBED, NpzWriter};
 use actq::import::Importer as _;
 use actq::text::count;
 use actq_deploy::description::Description;
@@ -17,6 +17,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 use super::import::refuse_existing;
 use crate::args::{ImportArgs, ReadingArgs};
+use crate::importers::description_checksum;
 use crate::outputs::unfinished::OutputFolder;
 use crate::questions;
 use crate::report::{deployment, notes};
@@ -60,7 +61,8 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     inputs.extend(args.calib.iter().chain(&args.reading.answers).chain(&args.reading.profile).cloned());
     inputs.extend(args.reading.reference.iter().flat_map(|(raw, expect)| [raw, expect]).cloned());
     if let Some(raw) = &args.calib {
-        files.push(("calib.npz".to_owned(), calibration(&reading.description, &bundle, raw)?));
+        let written = String::from_utf8_lossy(&files[0].1).into_owned();
+        files.push(("calib.npz".to_owned(), calibration(&reading.description, &bundle, raw, &written)?));
     }
     let (names, contents): (Vec<PathBuf>, Vec<Vec<u8>>) =
         files.into_iter().map(|(name, content)| (args.out.join(name), content)).unzip();
@@ -235,13 +237,15 @@ fn joined(folder: &str, path: &str) -> String {
     if matches!(folder, "" | ".") { path.to_owned() } else { format!("{folder}/{path}") }
 }
 
-/// Returns a recording of what the networks read, made of raw inputs: what they learn from.
-fn calibration(description: &Description, bundle: &Bundle, raw: &Path) -> Result<Vec<u8>> {
+/// Returns a recording of what the networks read, made of raw inputs: what they learn from. `written` is the
+/// description's text, which the recording names.
+fn calibration(description: &Description, bundle: &Bundle, raw: &Path, written: &str) -> Result<Vec<u8>> {
     let plan = Plan::new(description, bundle).context(DESCRIPTION)?;
     let Deployment { columns, .. } = Deployment::new(&description.name, description.rate_hz as f32, &plan)?;
     let ticks = Raw::read(raw)?.run(plan)?;
     let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
     let values = ticks.iter().flat_map(|tick| columns.iter().map(|column| tick.observation[*column] as f32));
     npz.array("obs", &[1, ticks.len(), columns.len()], values)?;
+    npz.array(DESCRIBED, &[1], [i64::from(description_checksum(written)?)])?;
     Ok(npz.finish()?.into_inner())
 }

@@ -11,6 +11,7 @@ use actq::methods::{Effort, Method};
 use actq::runtime::ImageBuffer;
 use actq_deploy::description::Description;
 use actq_deploy::{Bundle, DESCRIPTION};
+use actq_jobs::job::version;
 use actq_onnx::{Onnx, data_files};
 use anyhow::{Context as _, Result, ensure};
 
@@ -71,7 +72,7 @@ pub(crate) fn run(args: &DeployArgs) -> Result<()> {
 /// Imports the bundle, or checks the description that an earlier run has written.
 fn import_bundle(args: &DeployArgs, policy: &Path, description: &Path) -> Result<()> {
     let only_reference = args.recordings.is_empty();
-    let (record, checksums) = (args.out.join(IMPORTED), checksums(&args.bundle)?);
+    let (record, checksums) = (args.out.join(IMPORTED), checksums(&args.bundle)? + &option_checksums(args)?);
     let raw = args.reading.reference.as_ref().map(|(raw, _)| raw.clone());
     if description.exists() {
         // It may have been edited.
@@ -118,17 +119,34 @@ fn checksums(bundle: &Path) -> Result<String> {
     Ok(text)
 }
 
+/// Returns lines like those of [`checksums`] for the options whose files an import reads.
+fn option_checksums(args: &DeployArgs) -> Result<String> {
+    let raw = args.reading.reference.as_ref().map(|(raw, _)| raw).filter(|_| args.recordings.is_empty());
+    let files = [
+        ("--answers", args.reading.answers.as_ref()),
+        ("--profile", args.reading.profile.as_ref()),
+        ("--reference", raw),
+    ];
+    let line = |(option, file): (&str, Option<&std::path::PathBuf>)| {
+        file.map(|file| Ok(format!("{:08x} {option}\n", checksum(file)?)))
+    };
+    files.into_iter().filter_map(line).collect()
+}
+
 fn checksum(file: &Path) -> Result<u32> {
     let bytes = fs::read(file).with_context(|| format!("{}: cannot read the file", file.display()))?;
     Ok(actq_kernels::image::checksum(&bytes))
 }
 
-/// Refuses a bundle of other files than those that the kept description was made of.
+/// Refuses a bundle of other files than those that the kept description was made of, and other answers, profile or
+/// reference to learn from. An option that is no longer given stays as it was.
 fn check_imported(args: &DeployArgs, policy: &Path, imported: &str, checksums: &str) -> Result<()> {
     let [before, now]: [BTreeSet<&str>; 2] = [imported, checksums].map(|text| text.lines().collect());
-    let names: BTreeSet<&str> =
-        before.symmetric_difference(&now).filter_map(|line| Some(line.split_once(' ')?.1)).collect();
-    let named: Vec<&str> = names.iter().copied().take(MAX_NAMED).collect();
+    let name = |line: &&str| line.split_once(' ').map_or("", |(_, name)| name).to_owned();
+    let given: BTreeSet<String> = now.iter().map(name).collect();
+    let differ = before.symmetric_difference(&now).map(name);
+    let names: BTreeSet<String> = differ.filter(|name| !name.starts_with("--") || given.contains(name)).collect();
+    let named: Vec<&str> = names.iter().map(String::as_str).take(MAX_NAMED).collect();
     let more = if names.len() > MAX_NAMED { " and others" } else { "" };
     ensure!(
         names.is_empty(),
@@ -146,6 +164,10 @@ fn quantize_policy(args: &DeployArgs, policy: &Path, image: &Path, made_with: &s
     if is_made(image, policy, &record, made_with) {
         return print(&format!("{}: made before with the same options\n", image.display()));
     }
+    // No record is of an image that an interrupted run has left.
+    if record.exists() {
+        fs::remove_file(&record).with_context(|| format!("{}: cannot remove the file", record.display()))?;
+    }
     quantize::run(&quantize_args(args, policy, image), Some(Method::Distill), |_, _| String::new())?;
     // Those of the image before, should the check of this one fail.
     let firmware = args.board.iter().map(|board| args.out.join(format!("{board}.elf")));
@@ -154,7 +176,12 @@ fn quantize_policy(args: &DeployArgs, policy: &Path, image: &Path, made_with: &s
             fs::remove_file(&stale).with_context(|| format!("{}: cannot remove the file", stale.display()))?;
         }
     }
-    fs::write(record, made_with).context("cannot write the options")
+    fs::write(record, recorded(image, made_with)?).context("cannot write the options")
+}
+
+/// Returns the text of a record: the options, and the image that they made.
+fn recorded(image: &Path, made_with: &str) -> Result<String> {
+    Ok(format!("{made_with}image {:08x}\n", checksum(image)?))
 }
 
 fn has_gains(description: &Path) -> Result<bool> {
@@ -194,7 +221,7 @@ fn quantize_args(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs
 
 /// Returns what an image depends on beside the policy, as text.
 fn made_with(args: &DeployArgs) -> Result<String> {
-    let mut text = format!("{:?}, {:?}, seed {}\n", args.budget, args.learn, args.run.seed);
+    let mut text = format!("actq {}\n{:?}, {:?}, seed {}\n", version(), args.budget, args.learn, args.run.seed);
     if let Some(core) = args.core {
         text += &format!("{core:?}\n");
     }
@@ -210,7 +237,7 @@ fn made_with(args: &DeployArgs) -> Result<String> {
 
 /// Returns `true` if an image of this policy was made with the same options.
 fn is_made(image: &Path, policy: &Path, record: &Path, made_with: &str) -> bool {
-    let same = fs::read_to_string(record).is_ok_and(|text| text == made_with);
+    let same = fs::read_to_string(record).is_ok_and(|text| recorded(image, made_with).is_ok_and(|own| own == text));
     let digest = || -> Result<[u8; 32]> {
         let buffer = ImageBuffer::read(image)?;
         Ok(buffer.image(image)?.digest())

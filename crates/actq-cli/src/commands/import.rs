@@ -5,6 +5,7 @@ use std::path::Path;
 use actq::data::{Dataset, Recording, Sizes};
 use actq::import::contract::StatedLimits;
 use actq::import::{FILES, Importer as _};
+use actq_deploy::DESCRIPTION;
 use actq_onnx::{ImportOptions, Onnx, import};
 use anyhow::{Result, ensure};
 
@@ -73,8 +74,16 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     ))
 }
 
-/// Refuses to replace files without --force.
+/// Refuses to replace files without --force, and a folder with a policy in the other form, which would be read instead.
 pub(super) fn refuse_existing(args: &ImportArgs, files: &[&Path]) -> Result<()> {
+    for form in [DESCRIPTION, FILES[0]] {
+        let path = args.out.join(form);
+        ensure!(
+            !path.exists() || files.contains(&&*path),
+            "{}: is of another policy in this folder; remove it, or choose another --out",
+            path.display()
+        );
+    }
     for path in files {
         ensure!(args.force || !path.exists(), "{}: already exists; use --force to overwrite", path.display());
     }

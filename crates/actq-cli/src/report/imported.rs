@@ -34,6 +34,9 @@ pub fn summary(imported: &Imported, policy: &Policy) -> String {
         count(policy.weights, "weight"),
         count(policy.parameters, "parameter")
     );
+    for (i, axis) in imported.unsized_axes.iter().enumerate() {
+        text += &format!("{:9} {axis}\n", if i == 0 { "axes" } else { "" });
+    }
     for (i, guard) in imported.guards.iter().enumerate() {
         text += &format!("{:9} {guard}\n", if i == 0 { "guard" } else { "" });
     }

@@ -47,10 +47,13 @@ pub fn report(image: &Image<'_>) -> String {
     let digest = hex(&image.digest());
     let kind = kind(image);
     let (obs, act) = (count(image.obs_len(), "observation"), count(image.act_len(), "action"));
-    // An image does not say whether its policy stated the rate.
-    let is_default = image.rate_hz() == DEFAULT_RATE_HZ;
-    let rate =
-        format!("{} Hz{}", image.rate_hz(), if is_default { ", the default of policies without a rate" } else { "" });
+    // An image does not say whether its policy stated the rate; a bundle does.
+    let is_default = image.rate_hz() == DEFAULT_RATE_HZ && image.ports().next().is_none();
+    let rate = format!(
+        "{} Hz{}",
+        image.rate_hz(),
+        if is_default { ", also the default of policies without a rate" } else { "" }
+    );
     let _ = writeln!(text, "policy        {}", printable(image.name()));
     let _ = writeln!(text, "source        sha256 {digest}");
     let _ = writeln!(text, "image         {} bytes, crc32 {:08x}", image.bytes(), image.crc());

@@ -351,9 +351,20 @@ fn nodes(list: &[Bytes]) -> Result<Vec<Node>> {
     all(list, "the nodes")?.into_iter().map(one).collect()
 }
 
+/// Sets a number that is 0, and an empty text: onnx.proto3's writers leave them out.
+fn whole(mut attribute: proto::Attribute) -> proto::Attribute {
+    match (attribute.r#type, &attribute.ref_attr_name) {
+        (Some(1), None) => drop(attribute.f.get_or_insert_default()),
+        (Some(2), None) => drop(attribute.i.get_or_insert_default()),
+        (Some(3), None) => drop(attribute.s.get_or_insert_default()),
+        _ => {}
+    }
+    attribute
+}
+
 fn attributes(list: &[Bytes]) -> Result<HashMap<String, proto::Attribute>> {
     let attributes: Vec<proto::Attribute> = all(list, "the attributes")?;
-    Ok(attributes.into_iter().map(|a| (a.name.clone().unwrap_or_default(), a)).collect())
+    Ok(attributes.into_iter().map(|a| (a.name.clone().unwrap_or_default(), whole(a))).collect())
 }
 
 fn ports(list: &[Bytes]) -> Result<Vec<Port>> {
@@ -369,4 +380,24 @@ fn ports(list: &[Bytes]) -> Result<Vec<Port>> {
         })
     };
     ports.into_iter().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_that_a_writer_left_out_is_0() {
+        let of = |kind: Option<i32>, given: Option<&str>| {
+            let attribute =
+                proto::Attribute { r#type: kind, ref_attr_name: given.map(str::to_owned), ..Default::default() };
+            let proto::Attribute { f, i, s, .. } = whole(attribute);
+            (f, i, s.map(|text| text.len()))
+        };
+        assert_eq!(of(Some(1), None), (Some(0.0), None, None));
+        assert_eq!(of(Some(2), None), (None, Some(0), None));
+        assert_eq!(of(Some(3), None), (None, None, Some(0)));
+        assert_eq!(of(Some(2), Some("axis")), (None, None, None), "the caller gives it");
+        assert_eq!(of(None, None), (None, None, None));
+    }
 }

@@ -3,11 +3,12 @@
 use std::collections::BTreeSet;
 
 use actq::error::Result;
+use actq::text::printable;
 
-use crate::file::model::{Model, Node};
+use crate::file::model::{Model, Node, Port};
 use crate::nodes::follow::{Follower, Scope, needed};
 use crate::values::compare::uniform;
-use crate::values::expr::{Exprs, Guard};
+use crate::values::expr::{Expr, Exprs, Guard, Id};
 
 /// The most nodes between a test and the choice by it.
 const MAX_BETWEEN: usize = 6;
@@ -44,6 +45,21 @@ const FIRST_SETS: [(&str, i64); 29] = [
     ("RMSNormalization", 23),
     ("Swish", 24),
 ];
+
+/// Lists the axes of the inputs that an action reads, after the first, that have no length.
+pub(super) fn unsized_axes(model: &Model, exprs: &Exprs, live: &[Id]) -> Vec<String> {
+    let inputs = live.iter().filter_map(|&id| match exprs.get(id) {
+        Expr::Input(i) | Expr::Integers(i) => model.graph.inputs.get(*i),
+        _ => None,
+    });
+    let axes = |port: &Port| {
+        let shape = port.shape.iter().flatten().enumerate().skip(1);
+        let open = shape.filter(|(_, len)| len.is_none()).map(|(axis, _)| axis);
+        open.map(|axis| format!("axis {axis} of {} has no length: one step of time is taken", printable(&port.name)))
+            .collect::<Vec<_>>()
+    };
+    inputs.flat_map(axes).collect()
+}
 
 /// Describes the nodes that give NaN and infinity a meaning, of those that these outputs need.
 pub(super) fn guards(model: &Model, exprs: &Exprs, outputs: &[String]) -> Result<Vec<String>> {

@@ -134,12 +134,22 @@ impl<'m> Follower<'m> {
                 "the function takes at most {} inputs",
                 function.inputs.len()
             );
+            let is_given = |i: usize| inputs.get(i).is_some_and(Option::is_some);
+            let omitted = function.inputs.iter().enumerate().filter(|(i, _)| !is_given(*i)).map(|(_, name)| name);
+            let omitted: Vec<&String> = omitted.collect();
+            let mut graph = function.graph.clone();
+            // Its nodes omit them, too.
+            graph
+                .nodes
+                .iter_mut()
+                .flat_map(|node| &mut node.inputs)
+                .filter(|name| omitted.contains(&&**name))
+                .for_each(String::clear);
             for (name, tensor) in function.inputs.iter().zip(inputs) {
                 inner.extend(tensor.map(|tensor| (name.clone(), tensor)));
             }
             let mut given = function.defaults.clone();
             given.extend(node.attributes.clone());
-            let mut graph = function.graph.clone();
             bind(&mut graph, &given);
             let outer = std::mem::replace(&mut self.given, given);
             let done = self.run(&graph, &mut inner, &function.outputs, depth - 1);

@@ -45,7 +45,7 @@ pub(crate) fn one(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
         "Elu" => elu(number("alpha", 1.0), 1.0),
         "Celu" => {
             let alpha = number("alpha", 1.0);
-            ensure!(alpha != 0.0, "has alpha 0");
+            ensure!(alpha > 0.0, "has alpha {alpha}; only one above 0 is supported");
             Box::new(move |exprs: &mut Exprs, x: Id| {
                 let scaled = exprs.scaled(x, 1.0 / alpha, 0.0);
                 let elu = exprs.function(Function::Elu, scaled);
@@ -76,6 +76,9 @@ pub(crate) fn one(call: &Call<'_>, exprs: &mut Exprs) -> Result<Option<Tensor>> 
 /// Returns `x sigmoid(k x)`.
 fn gate(k: f64) -> OnVector {
     Box::new(move |exprs, x| {
+        if k == 0.0 {
+            return exprs.scaled(x, 0.5, 0.0);
+        }
         let scaled = exprs.scaled(x, k, 0.0);
         let silu = exprs.function(Function::Silu, scaled);
         exprs.scaled(silu, 1.0 / k, 0.0)

@@ -46,6 +46,9 @@ pub(crate) fn along(shape: &[usize], axis: usize, chosen: Vec<usize>) -> Result<
 /// Returns the indices that ONNX's Slice keeps of an axis of `len` values.
 pub(crate) fn slice(len: usize, start: i64, end: i64, step: i64) -> Result<Vec<usize>> {
     ensure!(step != 0, "has a step of 0");
+    if len == 0 {
+        return Ok(Vec::new());
+    }
     let n = len as i64;
     let from_end = |i: i64| if i < 0 { i.saturating_add(n) } else { i };
     let (low, high) = if step > 0 { (0, n) } else { (-1, n - 1) };

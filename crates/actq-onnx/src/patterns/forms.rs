@@ -75,8 +75,29 @@ impl Exprs {
     }
 
     /// Finds the LSTM whose hidden state after the step is `next`: `o tanh(c')` with `c' = f c + i g`. The state before
-    /// the step is one of `candidates`.
-    pub(crate) fn lstm_of(&mut self, next: Id, candidates: &[Run]) -> Option<Found> {
+    /// the step is one of `candidates`, the one of the least rank.
+    ///
+    /// # Errors
+    ///
+    /// The two runs of a rank that may both be that state: the graph is the same with either.
+    pub(crate) fn lstm_of(&mut self, next: Id, candidates: &[(usize, Run)]) -> Result<Option<Found>, [Run; 2]> {
+        let Some((gates, c, next_c)) = self.lstm_gates(next) else { return Ok(None) };
+        let hidden = self.len_of(next);
+        let mut fitting = candidates
+            .iter()
+            .filter(|(_, run)| run.len == hidden && *run != c && gates.iter().all(|gate| self.reads(gate, run)));
+        let Some(&(rank, h)) = fitting.next() else { return Ok(None) };
+        if let Some(&(_, other)) = fitting.find(|(other, _)| *other == rank) {
+            return Err([h, other]);
+        }
+        let Some((x, w_ih, w_hh, bias)) = self.gates(&gates, h) else { return Ok(None) };
+        let b_hh = vec![0.0; bias.len()];
+        let cell = Cell { lstm: true, x, w_ih, w_hh, b_ih: bias, b_hh, states: vec![h, c] };
+        Ok(Some(Found { cell, next_c: Some(next_c) }))
+    }
+
+    /// Returns an LSTM's gates i, f, g, o, its cell state, and the expression of the next one.
+    fn lstm_gates(&mut self, next: Id) -> Option<(Vec<Form>, Run, Id)> {
         let both = |(x, y): (Id, Id)| [(x, y), (y, x)];
         let (o, next_c) = both(self.product(next)?)
             .into_iter()
@@ -91,18 +112,7 @@ impl Exprs {
             Some((i, f, g, c))
         })?;
         let gates = [i, f, g, o].map(|gate| self.form(gate));
-        let gates: Vec<Form> = gates.into_iter().collect::<Option<_>>()?;
-        let hidden = self.len_of(next);
-        let h = candidates
-            .iter()
-            .copied()
-            .find(|run| run.len == hidden && *run != c && gates.iter().all(|gate| self.reads(gate, run)))?;
-        let (x, w_ih, w_hh, bias) = self.gates(&gates, h)?;
-        let b_hh = vec![0.0; bias.len()];
-        Some(Found {
-            cell: Cell { lstm: true, x, w_ih, w_hh, b_ih: bias, b_hh, states: vec![h, c] },
-            next_c: Some(next_c),
-        })
+        Some((gates.into_iter().collect::<Option<_>>()?, c, next_c))
     }
 
     /// Finds the GRU whose state after the step is `next`: `(1 - z) n + z h` with `n = tanh(input + r (W h + b))`.

@@ -96,6 +96,26 @@ impl Dataset {
         array.index_axis(Axis(0), episode).index_axis(Axis(0), step).to_vec()
     }
 
+    /// Refuses a recording on which the f32 network gives an action that is not finite.
+    pub(crate) fn require_finite_actions(&self, graph: &Graph) -> Result<()> {
+        let mut own = Self { action: None, ..self.clone() };
+        own.fill_actions(graph);
+        for episode in 0..own.length.len() {
+            for step in 0..own.length[episode] {
+                let action = own.action_at(episode, step).unwrap_or_default();
+                let wrong = action.iter().position(|value| !value.is_finite());
+                ensure!(
+                    wrong.is_none(),
+                    "{}: episode {episode}, step {step}: the f32 policy gives {} as action {}; leave out the step, or limit its values",
+                    self.path.display(),
+                    action[wrong.unwrap_or_default()],
+                    wrong.unwrap_or_default()
+                );
+            }
+        }
+        Ok(())
+    }
+
     /// Fills in the actions of the f32 network if none were recorded.
     pub fn fill_actions(&mut self, graph: &Graph) {
         if self.action.is_some() {

@@ -12,6 +12,26 @@ pub const CRC32: &str = "crc32";
 /// Name of an array that only the log of `actq link stream` has.
 pub(super) const APPLIED: &str = "applied";
 
+/// Name of the array that holds the checksum of the description by which a recording was made: one integer.
+pub const DESCRIBED: &str = "description";
+
+/// Reads the checksum of the description by which a recording was made of raw values; `None` if it names none.
+///
+/// # Errors
+///
+/// If the file cannot be read, or its array is not one checksum.
+pub fn described_by(path: &Path) -> Result<Option<u32>> {
+    let read = || -> Result<Option<u32>> {
+        let Some(array) = one(path, DESCRIBED)? else { return Ok(None) };
+        let number = match &array.values {
+            Values::I64(values) if values.len() == 1 => u32::try_from(values[0]).ok(),
+            _ => None,
+        };
+        number.with_context(|| format!("array {DESCRIBED:?} is not one int64, a checksum")).map(Some)
+    };
+    read().with_context(|| path.display().to_string())
+}
+
 /// Reads the CRC-32 of the image whose rollout a recording is; `None` if it names none.
 ///
 /// # Errors

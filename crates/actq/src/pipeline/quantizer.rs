@@ -7,7 +7,7 @@ use super::tries::Search;
 use crate::budget::Rate;
 use crate::data::Recordings;
 use crate::emit;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::measure::time::StepTime;
 use crate::methods::{Learning, Method, Options, Outcome, PreparedMethod, Progress, QuantizedNetwork};
 use crate::policy::Policy;
@@ -71,7 +71,15 @@ impl<'a> Quantizer<'a> {
         options: &Options,
         progress: &mut dyn FnMut(Progress),
     ) -> Result<QuantizedPolicy> {
-        self.image_of(self.method.quantize(rate, options, progress)?, rate)
+        let network = self.method.quantize(rate, options, progress);
+        self.image_of(network.map_err(|error| self.cause(error))?, rate)
+    }
+
+    /// Returns why a method fails: a f32 policy that gives no finite actions, or its own error.
+    fn cause(&self, error: Error) -> Error {
+        let calib = self.recordings.calib.as_ref().filter(|_| error.budget().is_none());
+        let infinite = calib.and_then(|calib| calib.require_finite_actions(&self.policy.graph).err());
+        infinite.unwrap_or(error)
     }
 
     /// Makes the image of a network that was quantized to a rate.

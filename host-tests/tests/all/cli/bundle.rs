@@ -206,6 +206,12 @@ fn deploy_makes_everything_and_keeps_what_is_made() -> Result<()> {
     for part in ["deploy.toml: kept", "made before with the same options", "largest error"] {
         ensure!(report.contains(part), "{part} is not in\n{report}");
     }
+    // Other answers are not taken for those of the import, and no other policy is put into its folder.
+    let answers = text(&robot.path("answers.toml"));
+    fs::write(&answers, "")?;
+    failed(&run(actq(&[&all[..], &["--answers", &answers]].concat()), b"")?, 1, &["has changed since", "--answers"])?;
+    let (folder, onnx) = (text(&robot.path("deployed/policy")), text(&robot.path("bundle/policy.onnx")));
+    failed(&run(actq(&["import", &onnx, "--out", &folder]), b"")?, 1, &["deploy.toml", "another policy"])?;
     for (file, part) in
         [("policy.rs", "pub const TARGET_TARGET: usize = 0;"), ("policy.h", "#define POLICY_STIFFNESS {10.0f, 20.0f}")]
     {
@@ -230,10 +236,30 @@ fn deploy_makes_everything_and_keeps_what_is_made() -> Result<()> {
     // Another option makes another image.
     let report = succeeded(&run(actq(&[&all[..], &["--bpw", "20"]].concat()), b"")?)?;
     ensure!(!report.contains("made before") && fs::read(robot.path("deployed/policy.actq"))? != image, "{report}");
+    // An image that an interrupted run leaves is not that of the record.
+    fs::write(robot.path("deployed/policy.actq"), &image)?;
+    let report = succeeded(&run(actq(&[&all[..], &["--bpw", "20"]].concat()), b"")?)?;
+    ensure!(!report.contains("made before") && fs::read(robot.path("deployed/policy.actq"))? != image, "{report}");
     let exact = run(actq(&[&all[..], &["--bpw", "19", "--max-nmse", "1e-12"]].concat()), b"")?;
     failed(&exact, 1, &["quantize at more bits"])?;
     ensure!(!robot.path("deployed/policy.h").exists(), "the constants of another image stay");
     Ok(())
+}
+
+#[test]
+fn what_an_edited_description_did_not_make_is_not_learned_from() -> Result<()> {
+    let robot = Robot::new(TWO_JOINTS)?;
+    let [bundle, raw, out, image] = ["bundle", "raw.npz", "made", "head.actq"].map(|name| text(&robot.path(name)));
+    succeeded(&run(actq(&["import", &bundle, "--accept-profile", "--calib", &raw, "--out", &out]), b"")?)?;
+    let quantize = || run(actq(&["quantize", &out, "--method", "rtn", "--out", &image]), b"");
+    let description = robot.path("made/deploy.toml");
+    let made = fs::read_to_string(&description)?;
+    fs::write(&description, format!("# A comment changes nothing.\n{made}"))?;
+    succeeded(&quantize()?)?;
+    let edited = made.replace("rate_hz = 100", "rate_hz = 50");
+    ensure!(edited != made, "{made}");
+    fs::write(&description, edited)?;
+    failed(&quantize()?, 1, &["calib.npz", "was made by another deploy.toml", "--calib"])
 }
 
 #[test]

@@ -31,11 +31,19 @@ pub(super) fn frames(config: &Config<'_>, facts: &mut Facts) -> Result<(usize, H
         "{}: only numbers in equal steps, from 0 or down to 0, are supported",
         config.location(key)
     );
+    let has_priority = by_term.is_some();
     let (by_term, layout) = match by_term {
         Some(by_term) => (by_term, config.location("observations_history_priority")),
         None => (facts.is_choice("history.layout", "term")?, facts.source("history.layout")),
     };
-    let first = if ascends == facts.is_choice("history.zero", "oldest")? { First::Oldest } else { First::Newest };
+    // Releases without the priority go through the list from its end or from its beginning, and the file does not say
+    // which one it is of.
+    let is_stated = ascends || has_priority;
+    let zero_is_oldest = match is_stated {
+        true => facts.is_choice("history.zero", "oldest")?,
+        false => facts.is_answered("history.zero", "oldest")?,
+    };
+    let first = if ascends == zero_is_oldest { First::Oldest } else { First::Newest };
     let fill = facts.value_or_default("history.fill")?;
     let [zero, filled] = ["history.zero", "history.fill"].map(|rule| facts.source(rule));
     facts.note("observation", format!("{}; {layout}; {zero}; {filled}", config.location(key)));

@@ -159,7 +159,12 @@ impl Reader<'_> {
             Terms::Listed(names) => (names.iter().map(plain).collect(), format!("profile {}", self.family)),
             Terms::Key(key) => {
                 let listed = document.peek(key).and_then(Node::texts);
-                let keys = document.keys(key).into_iter().map(str::to_owned).collect();
+                // Switches among the terms are no terms; as keys that nothing reads, they are questions.
+                let is_term = |name: &&str| {
+                    let node = document.peek(&format!("{key}.{name}"));
+                    node.is_none_or(|node| node.text().is_none() || node.is_null())
+                };
+                let keys = document.keys(key).into_iter().filter(is_term).map(str::to_owned).collect();
                 if listed.is_some() {
                     document.node(key);
                 }

@@ -66,6 +66,9 @@ impl RowStatistics {
         dataset.require_frames(MIN_FRAMES, "learning from fewer overfits")?;
         let every = if allowance.is_some() { dataset.frames().div_ceil(frames.max(1)) } else { 1 };
         let windows = Windows::new(graph.clone(), dataset, every);
+        if windows.output_variance.iter().any(|v| !v.is_finite()) {
+            dataset.require_finite_actions(graph)?;
+        }
         ensure!(
             windows.output_variance.iter().any(|v| *v > 0.0),
             "{}: the policy gives the same action at every observation; record observations with different actions",
