@@ -107,7 +107,7 @@ pub fn observed(folder: &Path, raw: &Dataset) -> Result<Dataset> {
     Ok(Dataset { path: raw.path.clone(), obs, action: None, length: raw.length.clone(), state: None })
 }
 
-/// Returns the targets of a folder's description for raw values [tick][value], one tick after the other from a reset.
+/// Returns the targets of a folder's description for raw values, a row a tick, one tick after the other from a reset.
 ///
 /// # Errors
 ///

@@ -179,7 +179,7 @@ fn a_library_of_2_bits_is_small() -> Result<()> {
 
 #[test]
 fn a_library_of_4_bits_is_small() -> Result<()> {
-    library_takes_at_most([14 << 10, 23 << 9], &[Width::W4], Function::Elu, "w4 paired elu")
+    library_takes_at_most([14_340, 23 << 9], &[Width::W4], Function::Elu, "w4 paired elu")
 }
 
 #[test]
