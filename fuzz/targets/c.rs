@@ -97,7 +97,7 @@ fn run(bytes: &[u8], script: &[u8]) {
                     let bytes = script.length(saved_bytes, saved.len());
                     let at = script.next();
                     saved[at] ^= script.next() as u8;
-                    // A right checksum, so that the checks behind it are reached.
+                    // A right checksum, so that the checks after it are reached.
                     if script.next() % 2 == 0 {
                         let sum = checksum(&saved[..bytes]).to_le_bytes();
                         saved[12..16].copy_from_slice(&sum);

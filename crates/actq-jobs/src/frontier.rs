@@ -19,7 +19,7 @@ pub fn frontier(points: &[(f64, f64)]) -> Vec<usize> {
 
 /// Returns an error for a logarithmic axis. An error of 0 has no logarithm; it counts as the smallest that f32 actions
 /// can show.
-pub fn drawn_error(nmse: f64) -> f64 {
+pub(crate) fn drawn_error(nmse: f64) -> f64 {
     nmse.max(1e-14)
 }
 

@@ -38,7 +38,7 @@ const PACKAGES: [Package; 15] = [
     ("leapp", &["leapp==0.7.2"], &[]),
 ];
 
-/// What LeRobot's policies and processors import; the package itself pins an older torch.
+/// The packages that LeRobot's policies and processors import; the package itself pins an older torch.
 const LEROBOT: &[&str] = &[
     "draccus==0.11.6",
     "einops==0.8.1",

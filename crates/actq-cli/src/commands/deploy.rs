@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use actq::data::files_of;
@@ -127,9 +127,8 @@ fn option_checksums(args: &DeployArgs) -> Result<String> {
         ("--profile", args.reading.profile.as_ref()),
         ("--reference", raw),
     ];
-    let line = |(option, file): (&str, Option<&std::path::PathBuf>)| {
-        file.map(|file| Ok(format!("{:08x} {option}\n", checksum(file)?)))
-    };
+    let line =
+        |(option, file): (&str, Option<&PathBuf>)| file.map(|file| Ok(format!("{:08x} {option}\n", checksum(file)?)));
     files.into_iter().filter_map(line).collect()
 }
 

@@ -1,4 +1,4 @@
-//! The image that controlled the robot while a recording was made.
+//! The origin of a recording: the image that controlled the robot, or the description by which it was made.
 
 use std::path::Path;
 
@@ -21,15 +21,7 @@ pub const DESCRIBED: &str = "description";
 ///
 /// If the file cannot be read, or its array is not one checksum.
 pub fn described_by(path: &Path) -> Result<Option<u32>> {
-    let read = || -> Result<Option<u32>> {
-        let Some(array) = one(path, DESCRIBED)? else { return Ok(None) };
-        let number = match &array.values {
-            Values::I64(values) if values.len() == 1 => u32::try_from(values[0]).ok(),
-            _ => None,
-        };
-        number.with_context(|| format!("array {DESCRIBED:?} is not one int64, a checksum")).map(Some)
-    };
-    read().with_context(|| path.display().to_string())
+    checksum(path, DESCRIBED, "a checksum")
 }
 
 /// Reads the CRC-32 of the image whose rollout a recording is; `None` if it names none.
@@ -38,18 +30,18 @@ pub fn described_by(path: &Path) -> Result<Option<u32>> {
 ///
 /// If the file cannot be read, or its array is not one CRC-32.
 pub fn driven_by(path: &Path) -> Result<Option<u32>> {
+    checksum(path, CRC32, "the CRC-32 of an image; record the image with actq serve --record")
+}
+
+/// Reads an array of one checksum; an error says `what` it is.
+fn checksum(path: &Path, name: &str, what: &str) -> Result<Option<u32>> {
     let read = || -> Result<Option<u32>> {
-        let Some(array) = one(path, CRC32)? else { return Ok(None) };
+        let Some(array) = one(path, name)? else { return Ok(None) };
         let number = match &array.values {
             Values::I64(values) if values.len() == 1 => u32::try_from(values[0]).ok(),
             _ => None,
         };
-        let number = number.with_context(|| {
-            format!(
-                "array {CRC32:?} is not one int64, the CRC-32 of an image; record the image with actq serve --record"
-            )
-        })?;
-        Ok(Some(number))
+        number.with_context(|| format!("array {name:?} is not one int64, {what}")).map(Some)
     };
     read().with_context(|| path.display().to_string())
 }

@@ -415,10 +415,10 @@ function flow() {
   const [first, last] = [facts.ops.findIndex(isNetwork), facts.ops.findLastIndex(isNetwork)];
   const length = (n) => `${n} value${n === 1 ? "" : "s"}`;
   const nodes = [];
-  const node = (kind, lines, from) => nodes.push({ kind, lines, from: [...new Set(from)].filter((n) => n !== undefined), to: 0 }) - 1;
+  const node = (kind, lines, from) => nodes.push({ kind, lines, from: [...new Set(from)] }) - 1;
   // The nodes that have the values of each input and operation; copies have those of what they copy.
   const places = inputs.map(({ name, len, names }) => [node("port", [[name, length(len)], ...names.map((joint, i) => [`${i} ${joint}`])], [])]);
-  const network = { lines: [["network", `${facts.matrices.length} matrices`]], from: [], id: undefined };
+  let network;
   const text = ({ name, detail, output }) => {
     const clip = name === "normalize" ? detail.split(" ").slice(1, 3).filter((limit) => Number.isFinite(parseFloat(limit))) : [];
     return [name === "normalize" ? `normalize${clip.length ? `, clip \u00b1${parseFloat(clip[0])}` : ""}` : `${name} ${name === "history" || name === "function" ? detail : ""}`, length(output)];
@@ -426,9 +426,9 @@ function flow() {
   facts.ops.forEach((op, i) => {
     const from = op.from.flatMap((n) => places[n] ?? []);
     if (first >= 0 && i >= first && i <= last) {
-      network.id ??= node("network", network.lines, []);
-      nodes[network.id].from = [...new Set([...nodes[network.id].from, ...from])].filter((n) => n !== network.id);
-      places.push([network.id]);
+      network ??= node("network", [["network", `${facts.matrices.length} matrices`]], []);
+      nodes[network].from = [...new Set([...nodes[network].from, ...from])].filter((n) => n !== network);
+      places.push([network]);
     } else if (op.name === "copy" || op.name === "select" || op.detail.endsWith("by the quantizer")) {
       places.push(from);
     } else if (from.length === 1 && nodes[from[0]].last !== undefined && op.from.every((n) => n === nodes[from[0]].last)) {
@@ -470,7 +470,7 @@ function flow() {
     root.append(svg("rect", { x, y, width: wide, height, rx: 6, fill: "var(--card)", stroke: kind === "op" ? "var(--line)" : kind === "network" ? "var(--image)" : "var(--focus)", "stroke-width": 1.5 }));
     lines.forEach(([name, size], i) => {
       const shown = name.length > 26 ? `${name.slice(0, 25)}\u2026` : name;
-      const label = svg("text", { x: x + 8, y: y + pad + 13 + i * line, class: i && kind !== "op" ? "soft" : "" }, size ? `${shown.trim()}` : shown);
+      const label = svg("text", { x: x + 8, y: y + pad + 13 + i * line, class: i && kind !== "op" ? "soft" : "" }, shown.trim());
       label.append(svg("title", {}, size ? `${name}, ${size}` : name));
       root.append(label);
       if (size && shown.length < 20) root.append(svg("text", { x: x + wide - 8, y: y + pad + 13 + i * line, "text-anchor": "end", class: "soft" }, size.split(" ")[0]));

@@ -178,7 +178,7 @@ fn an_erased_version_counts_until_the_next_start() {
     for image in [&old, &newest] {
         assert_eq!(device.update(image, 100, None), Ok(()));
     }
-    // The second image is in slot B, behind its record.
+    // The second image is in slot B, after its record.
     flash.bytes[2048 + 256] ^= 1;
     let mut device = Device::start(&mut flash, &layout, Anyone);
     assert_eq!(device.runs.as_ref(), Some(&old.bytes));

@@ -53,7 +53,7 @@ pub(crate) const CORES: [Core; 5] = [
     core(("m55", None), Target::M55, M55, RUST_M55, "cortex-m4"),
 ];
 
-/// What is compiled with a peer.
+/// The sources and flags that a peer is compiled with.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sources {
     pub(crate) files: Vec<PathBuf>,
@@ -63,7 +63,7 @@ pub(crate) struct Sources {
     pub(crate) flags: Vec<String>,
 }
 
-/// What a program has printed and taken.
+/// The output of a program, and its figures.
 #[derive(Debug)]
 pub(crate) struct Measured {
     pub(crate) instructions: u64,
