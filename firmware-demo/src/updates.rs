@@ -10,19 +10,20 @@ use embedded_storage::nor_flash::NorFlash;
 pub struct Updates<F, A: Authority>(Option<Updater<F, A>>);
 
 impl<F: NorFlash, A: Authority> Updates<F, A> {
-    /// Uses the two halves of `flash` as slots, and selects the image to run: accepted by `authority` and passed by
-    /// `test`. Without room for two slots or without an authority, updates are not supported. It feeds the watchdog
+    /// Uses the two halves of `flash` as slots, and selects the image to run: of this `build`, accepted by `authority`
+    /// and passed by `test`. Without room for two slots or without an authority, updates are not supported. It feeds the watchdog
     /// before each piece ([`Slots::select`]), and passes it to the test.
     pub fn new<W: Watchdog>(
         flash: F,
         authority: Option<A>,
+        build: u32,
         watchdog: &mut W,
         mut test: impl FnMut(&Candidate, &mut W) -> bool,
     ) -> (Self, Option<Candidate>) {
         let Some(authority) = authority else { return (Self(None), None) };
         let middle = (flash.capacity() / 2) as u32;
         let Ok(layout) = Layout::new(&flash, 0..middle, middle..2 * middle) else { return (Self(None), None) };
-        let mut slots = Slots::new(flash, layout, authority);
+        let mut slots = Slots::new(flash, layout, authority, build);
         let running = loop {
             let Some(candidate) = slots.select(|| watchdog.feed()) else { break None };
             if test(&candidate, watchdog) && slots.confirm(candidate.slot) {

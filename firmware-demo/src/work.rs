@@ -248,7 +248,7 @@ pub(crate) mod tests {
         status_period: u32,
         out: &'p mut [u8],
     ) -> OneAxis<'p> {
-        let (updates, _) = Updates::new(Ram(flash.0), Some(Anyone), &mut WatchdogMock::default(), |_, _| false);
+        let (updates, _) = Updates::new(Ram(flash.0), Some(Anyone), 0, &mut WatchdogMock::default(), |_, _| false);
         let breadcrumb = Record::report(ResetCause::Power, None);
         let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
         let settings = Settings { status_period, flash_while_armed: false, quiet: 1000 };

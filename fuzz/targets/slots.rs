@@ -21,7 +21,7 @@ fn run(mut memory: [u8; FLASH], authority: impl Authority) {
     let flash = Ram::<4, SECTOR>::new(&mut memory);
     let half = FLASH as u32 / 2;
     let layout = Layout::new(&flash, 0..half, half..FLASH as u32).expect("both slots are in the flash");
-    let mut slots = Slots::new(flash, layout, authority);
+    let mut slots = Slots::new(flash, layout, authority, 0);
     let _ = slots.least_version();
     if let Some(first) = slots.select(|| ()) {
         slots.reject(first.slot);

@@ -125,7 +125,7 @@ fn firmware(
     let flash = Ram::<4, SECTOR>::new(&mut memory);
     let sector = SECTOR as u32;
     let layout = Layout::new(&flash, 0..2 * sector, 2 * sector..4 * sector)?;
-    let mut updater = Updater::new(Slots::new(flash, layout, Key::new(key)?), None);
+    let mut updater = Updater::new(Slots::new(flash, layout, Key::new(key)?, 0), None);
 
     let axis = Axis::new(-100.0, 100.0, f32::INFINITY, 0.0, SafeAction::Coast)?;
     let mut safety = Safety::new([axis; ACT], 1..=DEADLINE, 1);

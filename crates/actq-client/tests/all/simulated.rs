@@ -164,7 +164,7 @@ fn run<A: Authority>(
     listener.set_nonblocking(true).expect("the socket has options");
     let flash = Ram::<4, SECTOR>::new(flash);
     let layout = Layout::new(&flash, 0..8192, 8192..16384).expect("the slots are valid");
-    let mut slots = Slots::new(flash, layout, authority);
+    let mut slots = Slots::new(flash, layout, authority, 0);
     let running = slots.select(|| ()).filter(|candidate| !candidate.trial).map(|candidate| candidate.slot);
     let mut updater = Updater::new(slots, running);
 

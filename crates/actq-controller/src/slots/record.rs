@@ -1,7 +1,8 @@
 //! The record in a slot's first bytes, which describes its image.
 //!
 //! Little-endian words: magic, format, length, CRC-32 of the image, version, generation, 1 if a signature follows, the
-//! signature (64 bytes), zeros, and the CRC-32 (ISO-HDLC) of all bytes before it.
+//! signature (64 bytes), zeros, the build, and the CRC-32 (ISO-HDLC) of all bytes before it. Older firmware wrote no build:
+//! 0, which is another one.
 
 use actq_link::frame::CRC;
 
@@ -20,6 +21,8 @@ pub(super) struct Record {
     /// One more than the highest generation so far.
     pub(super) generation: u32,
     pub(super) signature: Option<[u8; 64]>,
+    /// Build of the firmware that wrote it ([`super::Slots::new`]).
+    pub(super) build: u32,
 }
 
 impl Record {
@@ -31,6 +34,9 @@ impl Record {
         let mut bytes = [0; BYTES];
         bytes.iter_mut().zip(content).for_each(|(place, byte)| *place = byte);
         if let Some((content, checksum)) = bytes.split_last_chunk_mut() {
+            if let Some((_, build)) = content.split_last_chunk_mut() {
+                *build = self.build.to_le_bytes();
+            }
             *checksum = CRC.checksum(content).to_le_bytes();
         }
         bytes
@@ -47,7 +53,8 @@ impl Record {
         let [magic, format, length, crc, version, generation, signed] =
             <[[u8; 4]; 7]>::try_from(words).ok()?.map(u32::from_le_bytes);
         let signature = (signed != 0).then_some(*rest.first_chunk()?);
+        let build = u32::from_le_bytes(*rest.last_chunk()?);
         let plan = Plan { length, crc, version };
-        ((magic, format) == (MAGIC, FORMAT)).then_some(Self { plan, generation, signature })
+        ((magic, format) == (MAGIC, FORMAT)).then_some(Self { plan, generation, signature, build })
     }
 }

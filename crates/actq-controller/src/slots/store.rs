@@ -16,6 +16,8 @@ pub struct Slots<F, A> {
     pub(super) flash: F,
     pub(super) layout: Layout,
     pub(super) authority: A,
+    /// Build of the firmware ([`Self::new`]).
+    pub(super) build: u32,
     /// Slots that must not be selected again before the next start.
     refused: [bool; 2],
     /// Highest confirmed version that the slots had since the start: an update erases a record before it has another.
@@ -40,9 +42,11 @@ pub struct Candidate {
 }
 
 impl<F: NorFlash, A: Authority> Slots<F, A> {
-    /// Creates slots in `flash` for images that `authority` accepts.
-    pub const fn new(flash: F, layout: Layout, authority: A) -> Self {
-        Self { flash, layout, authority, refused: [false; 2], floor: 0 }
+    /// Creates slots in `flash` for images that `authority` accepts. `build` identifies what the firmware took from its
+    /// built-in image, as limits and the order of axes: that image's CRC-32. An image that arrived under another build
+    /// does not run, because its actions would have another meaning. Its version still counts.
+    pub const fn new(flash: F, layout: Layout, authority: A, build: u32) -> Self {
+        Self { flash, layout, authority, build, refused: [false; 2], floor: 0 }
     }
 
     /// Returns the flash, to read an image that is not mapped into memory.
@@ -50,10 +54,10 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
         &mut self.flash
     }
 
-    /// Selects the image to run: the newest one that is complete, accepted by the authority and not rejected. The
-    /// caller tests it and [confirms](Self::confirm) or [rejects](Self::reject) it. After a rejection this selects
-    /// another one or none. It reads one image or both, and calls `progress` before each block. The check of a
-    /// signature follows the last block without another call.
+    /// Selects the image to run: the newest one of this build that is complete, accepted by the authority and not
+    /// rejected. The caller tests it and [confirms](Self::confirm) or [rejects](Self::reject) it. After a rejection
+    /// this selects another one or none. It reads one image or both, and calls `progress` before each block. The check
+    /// of a signature follows the last block without another call.
     pub fn select(&mut self, mut progress: impl FnMut()) -> Option<Candidate> {
         let generation = |record: Option<Record>| record.map(|record| record.generation);
         let newest = match generation(self.record(Slot::B)) > generation(self.record(Slot::A)) {
@@ -65,7 +69,8 @@ impl<F: NorFlash, A: Authority> Slots<F, A> {
 
     fn candidate(&mut self, slot: Slot, progress: impl FnMut()) -> Option<Candidate> {
         let (record, marks) = (self.record(slot)?, self.marks(slot)?);
-        if self.is_refused(slot) || marks.rejected || self.read_back(slot, &record, progress) != Found::Good {
+        let may_not = self.is_refused(slot) || marks.rejected || record.build != self.build;
+        if may_not || self.read_back(slot, &record, progress) != Found::Good {
             return None;
         }
         let may_run = marks.confirmed || marks.trials < TRIALS && marks.write(&mut self.flash, Mark::Trial);

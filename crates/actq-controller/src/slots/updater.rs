@@ -113,7 +113,7 @@ impl<F: NorFlash, A: Authority> Updater<F, A> {
         let refused = match found {
             Found::Good => {
                 let generation = self.slots.next_generation();
-                let record = Record { plan, generation, signature };
+                let record = Record { plan, generation, signature, build: self.slots.build };
                 let written = self.slots.write_record(slot, record) && self.slots.begin_trial(slot);
                 if !written {
                     // The record may be complete all the same, and the next start would try it.

@@ -280,7 +280,7 @@ fn an_update_continues_after_a_disarm() {
     let begin = (1 << 20) - 2 * LARGE;
     let flash = Flash::new(Model::new(vec![0; 2 * LARGE as usize], begin, 1), begin);
     let layout = Layout::new(&flash, 0..LARGE, LARGE..2 * LARGE).expect("the slots are valid");
-    let updater = Updater::new(Slots::new(flash, layout, Anyone), None);
+    let updater = Updater::new(Slots::new(flash, layout, Anyone, 0), None);
     let mut bench = Bench::of(Settings { status_period: 0, flash_while_armed: false, quiet: QUIET }, updater);
     // Arms, then makes a request after a disarm.
     let after_a_disarm = |bench: &mut Bench<Updater<Flash<Model>, Anyone>>, request: fn(u32) -> Message<'static>| {

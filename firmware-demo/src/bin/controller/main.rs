@@ -105,6 +105,7 @@ mod app {
         period: u32,
         rates: Rates,
         breadcrumb: Breadcrumb,
+        build: u32,
     }
 
     #[init(local = [buffers: Buffers<QUEUE> = Buffers::new()])]
@@ -119,6 +120,8 @@ mod app {
         info!("start {=u32}, reset cause {=u8}, {=u32} Hz", starts, breadcrumb.reset.code(), clock.hz);
         let image = Image::new_checked(start::built_in()).ok();
         let axes = image::axes(image.as_ref(), start::LIMITS, TICK_HZ as f32);
+        // The axes are those of this image, whatever image runs.
+        let build = image.as_ref().map_or(0, Image::crc);
         let mut safety = Safety::new(axes, DEADLINE, starts);
         safety.check(Check::Clock, clock.source == Source::Crystal);
         // The outcome counts later, with the final timeout.
@@ -139,7 +142,7 @@ mod app {
         // A request may come before the first tick, which must not count as a fault of the hardware.
         let applied = actuator.apply(&[Output::Coast; AXES], safety.built_axes());
         safety.check(Check::Hardware, applied);
-        let local = Local { wire, port, watchdog, actuator, timer, period, rates, breadcrumb };
+        let local = Local { wire, port, watchdog, actuator, timer, period, rates, breadcrumb, build };
         (Shared { safety, timing: Timing::default() }, local)
     }
 
@@ -172,10 +175,10 @@ mod app {
 
     /// The loop below the tick.
     #[idle(shared = [safety, timing], local = [
-        port, watchdog, rates, breadcrumb, scratch: [u32; SCRATCH] = [0; SCRATCH], out: [u8; SEND_BYTES] = [0; SEND_BYTES],
+        port, watchdog, rates, breadcrumb, build, scratch: [u32; SCRATCH] = [0; SCRATCH], out: [u8; SEND_BYTES] = [0; SEND_BYTES],
     ])]
     fn idle(cx: idle::Context) -> ! {
-        let idle::LocalResources { port, watchdog, rates, breadcrumb, scratch, out, .. } = cx.local;
+        let idle::LocalResources { port, watchdog, rates, breadcrumb, build, scratch, out, .. } = cx.local;
         let mut timing = cx.shared.timing;
         // SAFETY: RTIC runs this once.
         let memory = unsafe { start::slots() };
@@ -186,7 +189,7 @@ mod app {
             // test.
             unsafe { slot::mapped(memory, candidate.address, candidate.length) }.unwrap_or_default()
         };
-        let (updates, running) = Updates::new(flash, start::authority(), watchdog, |candidate, watchdog| {
+        let (updates, running) = Updates::new(flash, start::authority(), *build, watchdog, |candidate, watchdog| {
             image::open(bytes_of(candidate), scratch, start::LENGTHS, watchdog).is_ok()
         });
         let mut bytes = running.as_ref().map_or_else(start::built_in, bytes_of);

@@ -53,7 +53,7 @@ mod firmware {
         let slots = || {
             let (flash, middle) = (Ram(memory), 2 * SECTOR as u32);
             let layout = Layout::new::<Flash>(&flash, 0..middle, middle..2 * middle).ok()?;
-            Some(Slots::new(flash, layout, Key::new(&key).ok()?))
+            Some(Slots::new(flash, layout, Key::new(&key).ok()?, 0))
         };
         for running in [None, Some(Slot::A)] {
             update(Updater::new(slots()?, running), image, &signature, &mut names)?;

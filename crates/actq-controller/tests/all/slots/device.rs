@@ -5,6 +5,9 @@ use actq_controller::update::{Plan, Update};
 use actq_link::code::Refusal;
 use embedded_storage::nor_flash::NorFlash;
 
+/// The firmware's build.
+pub(super) const BUILD: u32 = 7;
+
 /// Bytes in place of an image. The first one decides the outcome of its self-test.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Image {
@@ -46,7 +49,12 @@ pub(super) struct Device<F, A: Authority> {
 impl<F: NorFlash, A: Authority> Device<F, A> {
     /// Switches power on.
     pub(super) fn start(flash: F, layout: &Layout, authority: A) -> Self {
-        let mut slots = Slots::new(flash, layout.clone(), authority);
+        Self::start_build(flash, layout, authority, BUILD)
+    }
+
+    /// Switches power on, with a firmware of this build.
+    pub(super) fn start_build(flash: F, layout: &Layout, authority: A, build: u32) -> Self {
+        let mut slots = Slots::new(flash, layout.clone(), authority, build);
         while let Some(candidate) = slots.select(|| ()) {
             let image = read(&mut slots, &candidate);
             if self_test(&image).is_ok() {

@@ -7,7 +7,7 @@ use actq_controller::slots::{Anyone, Layout, Slot};
 use actq_link::code::Refusal;
 use actq_testkit::Nor;
 
-use super::device::{Device, Image};
+use super::device::{BUILD, Device, Image};
 use super::flash::Fails;
 
 /// Returns images in sequence; the third and the fifth fail their test.
@@ -139,7 +139,7 @@ fn an_image_is_given_up_after_three_trials() {
     let mut slots = 0;
     for start in 0..4 {
         flash.power.fails_at = None;
-        let mut chosen = actq_controller::slots::Slots::new(&mut flash, layout.clone(), Anyone);
+        let mut chosen = actq_controller::slots::Slots::new(&mut flash, layout.clone(), Anyone, BUILD);
         let candidate = chosen.select(|| ()).expect("one of the images runs");
         slots += u32::from(candidate.trial);
         // The update itself was the first trial.

@@ -6,7 +6,7 @@ use actq_link::code::Refusal;
 use actq_testkit::{Nor, Random};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError as _, NorFlashErrorKind, ReadNorFlash};
 
-use super::device::{Device, Image};
+use super::device::{BUILD, Device, Image};
 
 type Flash = Nor<4, 1024>;
 
@@ -222,6 +222,26 @@ fn the_other_image_replaces_a_decayed_one() {
     }
 }
 
+/// An image of another build has the limits of another built-in image in mind. A record of older firmware has build 0.
+#[test]
+fn an_image_of_another_build_does_not_run() {
+    for other in [0, BUILD + 1] {
+        let (mut flash, layout) = flash();
+        let [old, new] = [5, 6].map(|version| Image::new(100, version, true));
+        let mut device = Device::start_build(&mut flash, &layout, Anyone, other);
+        assert_eq!(device.update(&old, 64, None), Ok(()));
+        let before = flash.bytes.clone();
+        let mut device = Device::start(&mut flash, &layout, Anyone);
+        assert_eq!((device.runs.as_ref(), device.updater.running()), (None, None));
+        assert_eq!(device.update(&Image::new(100, 4, true), 64, None), Err(Refusal::Rollback), "its version counts");
+        drop(device);
+        assert_eq!(flash.bytes, before, "nothing is written");
+        assert_eq!(Device::start(&mut flash, &layout, Anyone).update(&new, 64, None), Ok(()));
+        assert_eq!(Device::start(&mut flash, &layout, Anyone).runs, Some(new.bytes));
+        assert_eq!(Device::start_build(&mut flash, &layout, Anyone, other).runs, Some(old.bytes), "flashed back");
+    }
+}
+
 /// The firmware feeds its watchdog at these calls.
 #[test]
 fn a_start_reports_progress_before_each_block() {
@@ -230,7 +250,7 @@ fn a_start_reports_progress_before_each_block() {
         let image = Image::new(100, version, true);
         assert_eq!(Device::start(&mut flash, &layout, Anyone).update(&image, 64, None), Ok(()));
     }
-    let (mut slots, mut told) = (Slots::new(&mut flash, layout, Anyone), Vec::new());
+    let (mut slots, mut told) = (Slots::new(&mut flash, layout, Anyone, BUILD), Vec::new());
     for _ in 0..3 {
         let mut blocks = 0;
         let found = slots.select(|| blocks += 1).map(|candidate| candidate.slot);
@@ -297,5 +317,6 @@ fn invalid_slots_are_refused() {
     let f405 = Nor::<4, { SECTOR as usize }>::new(5, 0);
     assert_eq!(case(&f405, (SECTOR, 3 * SECTOR), (3 * SECTOR, 5 * SECTOR)), None);
     assert_eq!(case(&f405, (16 << 10, 3 * SECTOR), (3 * SECTOR, 5 * SECTOR)), Some(LayoutError::Sector));
-    drop(Slots::new(flash, Layout::new(&Flash::new(4, 0), 0..1024, 1024..2048).expect("the slots are valid"), Anyone));
+    let layout = Layout::new(&Flash::new(4, 0), 0..1024, 1024..2048).expect("the slots are valid");
+    drop(Slots::new(flash, layout, Anyone, BUILD));
 }
