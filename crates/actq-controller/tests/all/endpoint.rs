@@ -167,6 +167,24 @@ fn non_finite_actions_and_failed_heads_latch() {
     assert_eq!(fault, Some(Some(Fault::Head)));
 }
 
+/// A disarm has no token, so a host that has read nothing ends the safe actions with it. `docs/SAFETY.md` says so.
+#[test]
+fn anyone_may_disarm_and_then_outputs_coast() {
+    let mut bench = Bench::new();
+    let axis = |safe| Axis::new(-1.0, 1.0, 0.1, 0.0, safe).expect("the axis is valid");
+    bench.safety = Safety::new([SafeAction::Hold, SafeAction::Brake].map(axis), MIN_DEADLINE..=DEADLINE, 77);
+    Check::ALL.into_iter().for_each(|check| bench.safety.check(check, true));
+    for fault in Fault::ALL {
+        bench.arm();
+        bench.safety.act(&[0.1, 0.1]).expect("the action is valid");
+        bench.safety.tick();
+        bench.safety.trip(*fault);
+        assert_eq!(bench.safety.tick(), [Output::Drive(0.1), Output::Brake]);
+        assert_eq!((bench.ask(&Message::Disarm), bench.safety.state()), (Ok(()), State::Disarmed), "{fault:?}");
+        assert_eq!(bench.safety.tick(), [Output::Coast; 2]);
+    }
+}
+
 #[test]
 fn parameters_only_become_stricter_while_disarmed() {
     let mut bench = Bench::new();
