@@ -40,11 +40,11 @@ pub(crate) fn request<const OBS: usize, const AXES: usize>(
 ) -> Option<Result<(), Refusal>> {
     let outcome = match *message {
         Message::Arm { .. } if update.is_busy() => Err(Refusal::Busy),
-        // A request with the token was sent by the host of now, so its time is right: an old one was held up, or the
-        // clocks were learned from recorded frames.
+        // A request with the token was sent by the host of now, so its time is right, and the clocks follow it: an old
+        // one was held up, or the clocks were learned from recorded frames. Other reasons come first.
         Message::Arm { token } => safety.with(|safety| {
-            let is_current = token == safety.token();
-            if is_current && guard.date(sent, came).is_err() { Err(Refusal::Stale) } else { safety.arm(token) }
+            let is_old = token == safety.token() && guard.date(sent, came).is_err();
+            if is_old && safety.refusal().is_none() { Err(Refusal::Stale) } else { safety.arm(token) }
         }),
         Message::Disarm => {
             safety.with(Safety::disarm);

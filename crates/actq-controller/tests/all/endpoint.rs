@@ -259,6 +259,38 @@ fn old_requests_and_unsupported_updates_are_refused() {
     assert_eq!(bench.ask(&Message::Commit { signature: None }), Err(Refusal::Armed));
 }
 
+/// The age of an arm request is the last reason, after those of the state, and counts for the clocks all the same.
+#[test]
+fn an_old_arm_request_is_refused_for_the_first_reason() {
+    let late = |bench: &mut Bench, token| {
+        bench.observe();
+        let wire = bench.frame(&Message::Arm { token });
+        bench.micros += 100_000;
+        let answer = bench.bytes(&wire);
+        bench.parse(&answer, |answer| if let Message::Ack { refusal, .. } = answer { refusal } else { None }).flatten()
+    };
+    let mut bench = Bench::new();
+    let token = bench.status().token;
+    assert_eq!(late(&mut bench, token ^ 1), Some(Refusal::Token));
+    assert_eq!(late(&mut bench, token), Some(Refusal::Stale));
+    for (check, refusal) in [(Check::Image, Refusal::Image), (Check::Hardware, Refusal::Hardware)] {
+        bench.safety.check(check, false);
+        assert_eq!(late(&mut bench, token), Some(refusal));
+        bench.safety.check(check, true);
+    }
+    bench.arm();
+    let token = bench.status().token;
+    assert_eq!(late(&mut bench, token), Some(Refusal::Armed));
+    // An arm request is the fastest frame so far.
+    let mut bench = Bench::new();
+    let token = bench.status().token;
+    assert_eq!(bench.ask(&Message::Arm { token }), Err(Refusal::Stale), "no observation");
+    let wire = bench.frame(&Message::Observation(Floats::Values(&OBSERVATION)));
+    bench.micros += 100_000;
+    bench.bytes(&wire);
+    assert!(bench.safety.is_stale(), "older than the request");
+}
+
 /// If writing to flash stalls the tick, no request reaches the update unless disarmed. A commit never does.
 #[test]
 fn an_update_that_stalls_the_tick_needs_disarming() {
