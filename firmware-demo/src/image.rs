@@ -6,14 +6,14 @@ use actq_kernels::{Head, Image};
 use actq_link::code::Refusal;
 
 use crate::running::SLICE;
-use crate::timeouts::MAX_SLICE;
+use crate::timeouts::{MAX_SLICE, MAX_TEST};
 
 /// Default rate of an axis, in full ranges (low to high) per second, if the build has none.
 const RANGES_PER_SECOND: f32 = 10.0;
 
 /// Opens an image: checks it and its lengths, and runs its self-test, which must match bit for bit. It feeds the
 /// watchdog before the check, whose time grows with the image, and before each slice of the self-test, which is at most
-/// [`MAX_SLICE`].
+/// [`MAX_SLICE`]. A self-test of more than [`MAX_TEST`] slices ends there.
 ///
 /// # Errors
 ///
@@ -33,7 +33,13 @@ pub fn open<'i, 's>(
     if head.least_budget() > MAX_SLICE {
         return Err(Refusal::Unfit);
     }
-    head.self_test_in_slices(SLICE, || watchdog.feed()).map_err(|_| Refusal::SelfTest)?;
+    let mut slices = 0;
+    let passed = head.self_test_in_slices(SLICE, || {
+        watchdog.feed();
+        slices += 1;
+        slices <= MAX_TEST
+    });
+    passed.map_err(|_| if slices > MAX_TEST { Refusal::Unfit } else { Refusal::SelfTest })?;
     Ok(head)
 }
 
@@ -74,8 +80,41 @@ fn limited(limits: Limits, hz: f32) -> Option<Axis> {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use actq_link::frame::CRC;
+
     use super::*;
     use crate::work::tests::WatchdogMock;
+
+    /// Returns the example of `docs/FORMAT.md`, whose last five words are a step of its self-test, with `steps` of
+    /// them.
+    fn example(steps: u16) -> Vec<u32> {
+        let lines = include_str!("../../docs/FORMAT.md").lines().skip_while(|line| *line != "```hex").skip(1);
+        let hex = lines.take_while(|line| *line != "```").flat_map(|line| line[6..].split('#').next());
+        let hex = hex.flat_map(str::split_whitespace).map(|byte| u8::from_str_radix(byte, 16).expect("a byte"));
+        let bytes: Vec<u8> = hex.collect();
+        let mut words: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+        let step = words[58..].to_vec();
+        (1..steps).for_each(|_| words.extend(&step));
+        (words[2], words[17]) = (4 * words.len() as u32, words[17] & 0xffff_0000 | u32::from(steps));
+        let rest: Vec<u8> = words[4..].iter().flat_map(|word| word.to_le_bytes()).collect();
+        words[3] = CRC.checksum(&rest);
+        words.iter().map(|word| word.to_le()).collect()
+    }
+
+    /// Each step is one slice.
+    #[test]
+    fn too_long_self_tests_are_refused() {
+        for (steps, refusal) in [(1, None), (MAX_TEST as u16, None), (MAX_TEST as u16 + 1, Some(Refusal::Unfit))] {
+            let (words, mut watchdog) = (example(steps), WatchdogMock::default());
+            let bytes = bytemuck::cast_slice(&words);
+            assert_eq!(open(bytes, &mut [0; 64], [2, 3], &mut watchdog).err(), refusal, "{steps} steps");
+            assert_eq!(watchdog.feeds(), 1 + u32::from(steps));
+        }
+    }
 
     #[test]
     fn axes_have_the_limits_of_the_build() {

@@ -19,3 +19,7 @@ pub const TIMEOUTS: Timeouts = Timeouts { turn: 500, long: 4000 };
 /// image with a longer one is refused. `host-tests/tests/all/on_target/start.rs` asserts that it is shorter than
 /// [`Timeouts::turn`] at the slowest clock.
 pub const MAX_SLICE: u32 = 100_000;
+
+/// Most slices of a self-test. An image that needs more is refused, because nothing else is done meanwhile. They are
+/// 1e9 modelled instructions with slices of [`crate::running::SLICE`]: 8 s of a Cortex-M4 at 168 MHz.
+pub const MAX_TEST: u32 = 50_000;

@@ -230,6 +230,12 @@ pub(crate) mod tests {
     #[derive(Default)]
     pub(crate) struct WatchdogMock(u32, Vec<u16>);
 
+    impl WatchdogMock {
+        pub(crate) fn feeds(&self) -> u32 {
+            self.0
+        }
+    }
+
     impl Watchdog for WatchdogMock {
         fn start(&mut self, milliseconds: u16) -> bool {
             self.1.push(milliseconds);

@@ -256,20 +256,26 @@ fn a_sliced_self_test_is_the_same_test() -> Result<()> {
     for seed in 0..4 {
         let (policy, outcomes) = network(seed)?;
         let bytes = emit::image(&policy, &outcomes)?;
-        let in_pieces = |bytes: &[u8], budget| {
+        let in_pieces = |bytes: &[u8], budget, most| {
             let buffer = ImageBuffer::new(bytes);
             with_head::<_, anyhow::Error>(buffer.image(Path::new("slices"))?, |head| {
                 let mut pieces = 0;
                 let whole = head.self_test();
-                Ok((head.self_test_in_slices(budget, || pieces += 1), whole, pieces, head.image().self_test_steps()))
+                let passed = head.self_test_in_slices(budget, || {
+                    pieces += 1;
+                    pieces <= most
+                });
+                Ok((passed, whole, pieces, head.image().self_test_steps()))
             })
         };
-        let (passed, whole, finest, steps) = in_pieces(&bytes, 0)?;
+        let (passed, whole, finest, steps) = in_pieces(&bytes, 0, usize::MAX)?;
         assert_eq!((passed, whole), (Ok(()), Ok(())));
-        let (passed, _, coarsest, _) = in_pieces(&bytes, u32::MAX)?;
+        let (passed, _, coarsest, _) = in_pieces(&bytes, u32::MAX, usize::MAX)?;
         assert_eq!((passed, coarsest), (Ok(()), steps));
+        let (passed, _, pieces, _) = in_pieces(&bytes, 0, finest - 1)?;
+        assert_eq!((passed, pieces), (Err(StepError::Stale), finest), "it ends where it is told to");
         assert!(finest > 2 * steps, "{finest} pieces of {steps} steps");
-        let (refused, whole, ..) = in_pieces(&with_wrong_self_test(&bytes)?, 0)?;
+        let (refused, whole, ..) = in_pieces(&with_wrong_self_test(&bytes)?, 0, usize::MAX)?;
         assert_eq!((refused, whole), (Err(StepError::SelfTest { step: 0 }), Err(StepError::SelfTest { step: 0 })));
     }
     Ok(())

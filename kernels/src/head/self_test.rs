@@ -18,19 +18,20 @@ impl Head<'_, '_> {
 
     /// Runs [`Self::self_test`] in slices of at most `budget` modelled instructions, as [`Self::poll`] does, or of
     /// [`Self::least_budget`] if that is more. It calls `before` ahead of each slice, so that the caller can feed a
-    /// watchdog however long the test takes.
+    /// watchdog. As soon as `before` returns `false`, the test ends.
     ///
     /// # Errors
     ///
-    /// Those of [`Self::self_test`].
-    pub fn self_test_in_slices(&mut self, budget: u32, mut before: impl FnMut()) -> Result<(), StepError> {
+    /// Those of [`Self::self_test`], and [`StepError::Stale`] if `before` ended the test.
+    pub fn self_test_in_slices(&mut self, budget: u32, mut before: impl FnMut() -> bool) -> Result<(), StepError> {
         let budget = budget.max(self.least_budget());
         self.play_self_test(|head| {
-            before();
-            while !head.advance(&mut Budget::of_poll(budget), false)? {
-                before();
+            while before() {
+                if head.advance(&mut Budget::of_poll(budget), false)? {
+                    return Ok(());
+                }
             }
-            Ok(())
+            Err(Fault::Stale)
         })
     }
 
