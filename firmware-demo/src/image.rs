@@ -70,7 +70,8 @@ fn limited(limits: Limits, hz: f32) -> Option<Axis> {
         Some(rate) => rate / hz,
         // An axis with a single value does not move at any rate.
         None if low == high => 1.0 + high.abs(),
-        None => (high - low) / (hz / RANGES_PER_SECOND),
+        // Of halves, because the range itself may be too large for f32.
+        None => (high / 2.0 - low / 2.0) / (hz / 2.0 / RANGES_PER_SECOND),
     };
     let start = 0f32.max(low).min(high);
     let ramp = Axis::new(low, high, step, start, SafeAction::Ramp { step });
@@ -121,6 +122,8 @@ mod tests {
         let limits = |text: &str| text.parse::<Limits>().expect("valid limits");
         let all = axes_within::<2>(|_| None, &[limits("-1:3")], 1000.0);
         assert_eq!(all.map(|axis| (axis.low(), axis.high(), axis.rate(), axis.start())), [(-1.0, 3.0, 0.04, 0.0); 2]);
+        let [wide] = axes_within(|_| None, &[limits("-2e38:2e38")], 1000.0);
+        assert_eq!((wide.rate(), wide.safe()), (4e36, SafeAction::Ramp { step: 4e36 }));
         let [ramps, coasts, fixed] = axes_within(|_| None, &["-1:1:20", "2:4:8", "3:3"].map(limits), 1000.0);
         assert_eq!((ramps.rate(), ramps.safe()), (0.02, SafeAction::Ramp { step: 0.02 }));
         assert_eq!((coasts.rate(), coasts.start(), coasts.safe()), (0.008, 2.0, SafeAction::Coast));

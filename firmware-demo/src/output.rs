@@ -69,9 +69,11 @@ impl<S: Stage> Bridges<S> {
     }
 }
 
-/// Returns a value's position between its axis' limits, 0 to 1; NaN for an axis with a single value.
+/// Returns a value's position between its axis' limits, 0 to 1; NaN for an axis with a single value. It takes halves,
+/// because the range itself may be too large for f32.
 fn share(value: f32, axis: &Axis) -> f32 {
-    (value - axis.low()) / (axis.high() - axis.low())
+    let low = axis.low() / 2.0;
+    (value / 2.0 - low) / (axis.high() / 2.0 - low)
 }
 
 #[cfg(test)]
@@ -149,6 +151,14 @@ mod tests {
         assert_eq!((duties(&bridges), bridges.stage.on), ([500, 0, 0], true));
         assert!(bridges.apply(&[Output::Drive(0.0), Output::Coast, Output::Brake, Output::Brake], &axes));
         assert!(!bridges.stage.on);
+    }
+
+    #[test]
+    fn the_widest_limits_have_duty_cycles() {
+        let axis = Axis::new(-2e38, 2e38, 1.0e38, 0.0, SafeAction::Brake).expect("the axis is valid");
+        let mut bridges = Bridges::new(Mock::default());
+        assert!(bridges.apply(&[-1e38, 0.0, 2e38].map(Output::Drive), &[axis; 3]));
+        assert_eq!(bridges.stage.duties(), [250, 500, 1000]);
     }
 
     #[test]
