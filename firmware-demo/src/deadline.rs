@@ -1,9 +1,14 @@
-//! The deadlines that a host may set.
+//! The tick's rate, and the deadlines that a host may set.
 
 use core::ops::RangeInclusive;
 
 /// Bits per second of the serial line.
 pub const BAUD: u32 = 921_600;
+
+/// Returns the ticks per second, with the feature `tick-8khz` (`is_fast`) or without it.
+pub const fn tick_hz(is_fast: bool) -> u32 {
+    if is_fast { 8000 } else { 1000 }
+}
 
 /// Returns the allowed ticks without an observation, or without an action, before the safe action: 10 ms to half a
 /// second at `tick_hz` ticks per second. With less, a host that reads the status before it arms has no recent

@@ -1,6 +1,7 @@
 //! The checks of an image for this controller, and the axes from its contract.
 
 use actq_boards::hal::Watchdog;
+use actq_controller::axis::AxisError;
 use actq_controller::{Axis, Limits, SafeAction};
 use actq_kernels::{Head, Image};
 use actq_link::code::Refusal;
@@ -44,8 +45,9 @@ pub fn open<'i, 's>(
 }
 
 /// Returns an axis for each value of an image's actions, at `hz` ticks per second. It has the stricter of the
-/// contract's and the build's limits; the build has limits for each axis, or one for all. Without finite limits, and
-/// all of them without an image, because a damaged one may have had limits, an axis is [`Axis::STILL`].
+/// contract's and the build's limits; the build has limits for each axis, or one for all. Without finite limits or with
+/// too small a rate, and all of them without an image, because a damaged one may have had limits, an axis is
+/// [`Axis::STILL`].
 pub fn axes<const AXES: usize>(image: Option<&Image<'_>>, built: &[Limits], hz: f32) -> [Axis; AXES] {
     image.map_or([Axis::STILL; AXES], |image| axes_within(|i| image.limits(i), built, hz))
 }
@@ -56,15 +58,19 @@ fn axes_within<const AXES: usize>(
     hz: f32,
 ) -> [Axis; AXES] {
     let mut axes = [Axis::STILL; AXES];
-    for (i, axis) in axes.iter_mut().enumerate() {
+    for (i, place) in axes.iter_mut().enumerate() {
         let limits = Limits::of_axis(i, contract(i), built);
-        *axis = limits.and_then(|limits| limited(limits, hz)).unwrap_or(Axis::STILL);
+        *place = limits.and_then(|limits| axis(limits, hz).ok()).unwrap_or(Axis::STILL);
     }
     axes
 }
 
-/// Returns an axis whose safe action is a ramp to 0, or coasting.
-fn limited(limits: Limits, hz: f32) -> Option<Axis> {
+/// Returns an axis at `hz` ticks per second, whose safe action is a ramp to 0, or coasting.
+///
+/// # Errors
+///
+/// [`AxisError::Rate`] if the change in a tick is too small beside the limits.
+pub fn axis(limits: Limits, hz: f32) -> Result<Axis, AxisError> {
     let Limits { low, high, rate } = limits;
     let step = match rate {
         Some(rate) => rate / hz,
@@ -76,7 +82,7 @@ fn limited(limits: Limits, hz: f32) -> Option<Axis> {
     let start = 0f32.max(low).min(high);
     let ramp = Axis::new(low, high, step, start, SafeAction::Ramp { step });
     // It coasts if 0 is outside the limits.
-    ramp.or_else(|_| Axis::new(low, high, step, start, SafeAction::Coast)).ok()
+    ramp.or_else(|_| Axis::new(low, high, step, start, SafeAction::Coast))
 }
 
 #[cfg(test)]

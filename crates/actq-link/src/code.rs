@@ -131,8 +131,8 @@ codes! {
         Unfit = 19, "this controller cannot run the image";
         /// The break input is active, or a break or an overrun latched and the controller was not disarmed since.
         Hardware = 20, "the break input is active, or a break or an overrun latched; remove the cause, disarm, and then arm";
-        /// An axis has no finite limits, neither from the built-in image nor from the build.
-        Limits = 21, "an axis has no limits, so no output may move; build the firmware with --limits LOW:HIGH, or with an image \
+        /// An axis has no finite limits, neither from the built-in image nor from the build, or too small a rate.
+        Limits = 21, "an axis has no limits or too small a rate, so no output may move; build the firmware with --limits LOW:HIGH, or with an image \
             whose actions have low and high";
     }
 }

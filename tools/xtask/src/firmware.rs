@@ -6,6 +6,7 @@ use std::process::Command;
 
 use actq_boards::{Application, Target, root, target_dir};
 use actq_controller::Limits;
+use actq_firmware_demo::deadline::tick_hz;
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
@@ -63,7 +64,8 @@ impl Options {
         let application = target.board().application.context("the board has no application")?;
         check_out(&out, image.as_deref())?;
         let limits = limits.as_deref().map_or(Ok(Vec::new()), limits::read)?;
-        let check = |image: &Path| check(image, &limits, application, target);
+        let is_fast = features.as_deref().is_some_and(|list| list.split(',').any(|one| one.trim() == "tick-8khz"));
+        let check = |image: &Path| check(image, &limits, tick_hz(is_fast), application, target);
         let given = image.as_deref().map(check).transpose()?;
         setup::rust_target(target.triple())?;
         let (image, has_around) = given.map_or_else(|| check(&example()?), Ok)?;
@@ -95,9 +97,9 @@ fn check_out(out: &Path, image: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// Returns the whole path of an image that the board's application runs with these limits, and whether it has
+/// Returns the whole path of an image that the board's application runs with these limits and ticks, and whether it has
 /// operations around its network; an error tells why the application does not run it.
-fn check(path: &Path, limits: &[Limits], application: Application, target: Target) -> Result<(PathBuf, bool)> {
+fn check(path: &Path, limits: &[Limits], hz: u32, application: Application, target: Target) -> Result<(PathBuf, bool)> {
     let bytes = fs::read(path).with_context(|| format!("cannot read the image {}", path.display()))?;
     // Words, because an image must be aligned to 4 bytes.
     let mut words = vec![0u32; bytes.len().div_ceil(4)];
@@ -112,7 +114,7 @@ fn check(path: &Path, limits: &[Limits], application: Application, target: Targe
         "{}: needs {needed} words of scratch memory, but the application on {name} has {given} (SCRATCH of the board)",
         path.display()
     );
-    let still = limits::without_limits(limits, &image)?;
+    let still = limits::without_limits(limits, &image, hz).with_context(|| path.display().to_string())?;
     if !still.is_empty() {
         eprintln!(
             "warning: {}: no finite limits for {}: the controller will refuse to arm; --limits LOW:HIGH sets them",
@@ -210,7 +212,8 @@ mod tests {
     #[test]
     fn invalid_images_are_refused_by_name() {
         let application = Target::F405.board().application.expect("an application");
-        let refused = |path: &Path| format!("{:#}", check(path, &[], application, Target::F405).expect_err("refused"));
+        let refused =
+            |path: &Path| format!("{:#}", check(path, &[], 1000, application, Target::F405).expect_err("refused"));
         let file = std::env::temp_dir().join(format!("actq-no-image-{}", std::process::id()));
         for (bytes, why) in [
             (&[0; 4096][..], "not an actq image (magic differs)"),

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use actq_controller::Limits;
+use actq_firmware_demo::image::axis;
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, bail, ensure};
 
@@ -21,17 +22,34 @@ pub(crate) fn read(value: &str) -> Result<Vec<Limits>> {
     text.trim_end().lines().enumerate().map(line).collect()
 }
 
-/// Lists the actions of an image without finite limits, of their own or of the build, as "action 0".
-pub(crate) fn without_limits(limits: &[Limits], image: &Image<'_>) -> Result<Vec<String>> {
-    let (given, actions) = (limits.len(), image.act_len());
+/// Lists the actions of an image without finite limits, of their own or of the build, as "action 0". Fails if an action
+/// has limits with which the application, at `hz` ticks per second, does not move its axis.
+pub(crate) fn without_limits(limits: &[Limits], image: &Image<'_>, hz: u32) -> Result<Vec<String>> {
+    still(limits, image.act_len(), |i| image.limits(i), hz)
+}
+
+fn still(
+    limits: &[Limits],
+    actions: usize,
+    contract: impl Fn(usize) -> Option<[f32; 2]>,
+    hz: u32,
+) -> Result<Vec<String>> {
+    let given = limits.len();
     ensure!(
         given < 2 || given == actions,
         "--limits has {given} lines, the image has {actions} actions; give one line for each"
     );
     let mut still = Vec::new();
     for i in 0..actions {
-        match (Limits::of_axis(i, image.limits(i), limits), image.limits(i)) {
-            (Some(_), _) => {}
+        match (Limits::of_axis(i, contract(i), limits), contract(i)) {
+            (Some(limits), _) => {
+                axis(limits, hz as f32).with_context(|| {
+                    format!(
+                        "action {i} with limits {limits} at {hz} ticks per second; give a larger RATE, the change in a \
+                         second, by --limits LOW:HIGH:RATE"
+                    )
+                })?;
+            }
             (None, Some([low, high])) if !limits.is_empty() => {
                 bail!("--limits leaves no value for action {i}, which the image limits to {low}:{high}")
             }
@@ -45,6 +63,20 @@ pub(crate) fn without_limits(limits: &[Limits], image: &Image<'_>) -> Result<Vec
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rates_that_move_nothing_are_refused() {
+        let still = |text: &str, hz| still(&[text.parse().expect("limits")], 2, |_| None, hz);
+        for (text, hz) in [("-1:1:0.0001", 1000), ("-1:1:0.0009", 8000), ("1000:1000.01", 1000)] {
+            let error = format!("{:#}", still(text, hz).expect_err("refused"));
+            let [begins, ends] =
+                [format!("action 0 with limits {text} at {hz} ticks"), "too small beside its limits".into()];
+            assert!(error.starts_with(&begins) && error.ends_with(&ends), "{error}");
+        }
+        for (text, hz) in [("-1:1:0.0002", 1000), ("-1:1:0.001", 8000), ("-2e38:2e38", 1000), ("3:3", 1000)] {
+            assert_eq!(still(text, hz).expect("a rate"), [""; 0], "{text}");
+        }
+    }
 
     #[test]
     fn limits_are_read_or_refused() {

@@ -34,7 +34,7 @@ mod limits {
     use actq_firmware_demo::deadline;
 
     /// Ticks per second.
-    pub(crate) const TICK_HZ: u32 = if cfg!(feature = "tick-8khz") { 8000 } else { 1000 };
+    pub(crate) const TICK_HZ: u32 = deadline::tick_hz(cfg!(feature = "tick-8khz"));
     /// Allowed ticks without an observation, or without an action, before the safe action.
     pub(crate) const DEADLINE: RangeInclusive<u32> = deadline::allowed(TICK_HZ);
     /// Largest age of an observation, relative to the fastest one, in µs.

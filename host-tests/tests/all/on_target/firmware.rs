@@ -134,6 +134,7 @@ fn failed_builds_are_reported_and_leave_no_file() -> Result<()> {
         image("good", &itself, &["is the image itself"]),
         limited("good", "1:-1", &["--limits \"1:-1\"", "the lower limit exceeds the upper one"]),
         limited("good", &path("limits"), &["--limits has 2 lines, the image has 6 actions"]),
+        limited("good", "-1:1:0.0001", &["good: action 0 with limits -1:1:0.0001 at 1000 ticks", "larger RATE"]),
         limited("bounded", "1001:1002", &["--limits leaves no value for action 0", "limits to -1000:1000"]),
     ])?;
     assert_eq!(there()?, before);
