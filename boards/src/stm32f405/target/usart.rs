@@ -38,8 +38,8 @@ impl Uart for Usart {
         if !state.rxne().bit() && !wrong {
             return None;
         }
-        // Reading the state and then the byte clears the flags. An overrun lost the byte after this one, which also
-        // counts as lost.
+        // Reading the state and then the byte clears the flags. An overrun lost the byte after this one, which is
+        // dropped, too.
         let byte = self.0.dr().read().dr().bits() as u8;
         Some(if wrong { Err(UartError) } else { Ok(byte) })
     }
