@@ -46,6 +46,8 @@ impl Pwm {
     ) -> Self {
         rcc.ahb1enr().modify(|_, w| w.gpioaen().set_bit().gpioben().set_bit());
         rcc.apb2enr().modify(|_, w| w.tim1en().set_bit());
+        // A peripheral's clock starts some cycles after it is enabled (errata sheet ES0182).
+        let _ = rcc.apb2enr().read();
         let top = (timer_hz / (2 * PWM_HZ)) as u16;
         let dead = (DEAD_NS * (timer_hz / 1_000_000)).div_ceil(1000).min(MAX_DEAD) as u8;
         // SAFETY: every value is in its field's range.
