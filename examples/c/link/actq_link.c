@@ -152,6 +152,15 @@ int actq_link_read_status(const actq_link_message *message, actq_link_status *st
     return 1;
 }
 
+int actq_link_read_acknowledgement(const actq_link_message *message, uint32_t *of, uint8_t *refusal) {
+    if (message->kind != ACTQ_LINK_ACKNOWLEDGEMENT || message->length != 9) {
+        return 0;
+    }
+    *of = get32(message->payload);
+    *refusal = message->payload[4];
+    return 1;
+}
+
 int actq_link_read_action(const actq_link_message *message, uint32_t *of, int *applied, float *values, size_t room,
                           size_t *count) {
     if (message->kind != ACTQ_LINK_ACTION || message->length < 5 || (message->length - 5) % 4 != 0) {

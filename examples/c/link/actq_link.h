@@ -66,8 +66,10 @@ size_t actq_link_ask_status(actq_link *link, uint32_t micros, uint8_t *wire);
 /* Takes a byte; returns 1 if it ends a frame that holds a message. */
 int actq_link_push(actq_link *link, uint8_t byte, actq_link_message *message);
 
-/* Each returns 1 if the message is of its kind. Up to `room` values of the action are written; `count` gets their number. */
+/* Each returns 1 if the message is of its kind. An acknowledgement's `refusal` is 0 if the request `of` was done. Up to
+ * `room` values of the action are written; `count` gets their number. */
 int actq_link_read_status(const actq_link_message *message, actq_link_status *status);
+int actq_link_read_acknowledgement(const actq_link_message *message, uint32_t *of, uint8_t *refusal);
 int actq_link_read_action(const actq_link_message *message, uint32_t *of, int *applied, float *values, size_t room,
                           size_t *count);
 

@@ -1,5 +1,6 @@
 /* Arms a controller at a Unix socket, sends it observations until it has applied some actions, and disarms it.
  *
+ * It arms once, and only from the disarmed state: a controller that stopped has had a reason, which somebody must see.
  * Usage: link-client SOCKET ACTIONS. A serial port differs only in how it is opened. */
 #define _POSIX_C_SOURCE 200809L
 
@@ -48,6 +49,9 @@ int main(int count, char **arguments) {
     static float observation[ACTQ_LINK_PAYLOAD / 4];
     actq_link_status status = {0};
     long applied = 0;
+    /* The request to arm; the rounds without its answer. */
+    uint32_t request = 0;
+    int is_requested = 0, is_armed = 0, unanswered = 0;
     actq_link_init(&link, micros() / 1000u);
     /* Until the controller says that it is disarmed: what is sent last may be lost when a socket closes. */
     while (applied < wanted || status.state != ACTQ_LINK_DISARMED) {
@@ -56,6 +60,10 @@ int main(int count, char **arguments) {
         }
         put(line, wire, actq_link_ask_status(&link, micros(), wire));
         put(line, wire, actq_link_observation(&link, micros(), observation, status.observation, wire, NULL));
+        if (is_requested && !is_armed && ++unanswered > 500) {
+            fprintf(stderr, "no answer to the request to arm\n");
+            return 1;
+        }
         /* 20 ms for answers. */
         struct pollfd ready = {.fd = line, .events = POLLIN};
         for (const uint32_t begun = micros(); micros() - begun < 20000u;) {
@@ -67,14 +75,30 @@ int main(int count, char **arguments) {
                     continue;
                 }
                 uint32_t of;
+                uint8_t refusal;
                 int is_applied;
                 float action[32];
                 size_t values;
                 if (actq_link_read_action(&message, &of, &is_applied, action, 32, &values)) {
                     applied += is_applied;
-                } else if (actq_link_read_status(&message, &status) && applied < wanted &&
-                           status.state != ACTQ_LINK_ARMED && status.refusal == 0) {
-                    put(line, wire, actq_link_arm(&link, micros(), status.token, wire));
+                } else if (actq_link_read_acknowledgement(&message, &of, &refusal) && is_requested && of == request) {
+                    if (refusal != 0) {
+                        fprintf(stderr, "the controller refuses to arm: refusal %u\n", (unsigned)refusal);
+                        return 1;
+                    }
+                    is_armed = 1;
+                } else if (actq_link_read_status(&message, &status) && applied < wanted) {
+                    if (status.state == ACTQ_LINK_ARMED) {
+                        is_armed = 1;
+                    } else if (is_armed || status.state == ACTQ_LINK_LATCHED) {
+                        fprintf(stderr, "the controller is not armed: state %u, fault %u\n", (unsigned)status.state,
+                                (unsigned)status.fault);
+                        return 1;
+                    } else if (!is_requested && status.refusal == 0) {
+                        request = link.sequence;
+                        is_requested = 1;
+                        put(line, wire, actq_link_arm(&link, micros(), status.token, wire));
+                    }
                 }
             }
         }

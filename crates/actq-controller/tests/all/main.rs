@@ -1,6 +1,8 @@
 //! The controller's decisions, separately and together.
 
 mod answers;
+#[cfg(unix)]
+mod c_client;
 mod endpoint;
 mod foc;
 mod guard;
