@@ -15,10 +15,15 @@
 #include <time.h>
 #include <unistd.h>
 
-static uint32_t micros(void) {
+static uint64_t micros_of(clockid_t clock) {
     struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint32_t)((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u);
+    clock_gettime(clock, &now);
+    return (uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u;
+}
+
+/* The time of day, so that a later run repeats no time of this one, also after the machine's start. */
+static uint32_t micros(void) {
+    return (uint32_t)micros_of(CLOCK_REALTIME);
 }
 
 static void put(int line, const uint8_t *wire, size_t length) {
@@ -52,7 +57,8 @@ int main(int count, char **arguments) {
     /* The request to arm; the rounds without its answer. */
     uint32_t request = 0;
     int is_requested = 0, is_armed = 0, unanswered = 0;
-    actq_link_init(&link, micros() / 1000u);
+    /* Whole milliseconds before the cut to 32 bits: ahead of every number of an earlier run, for 49 days. */
+    actq_link_init(&link, (uint32_t)(micros_of(CLOCK_REALTIME) / 1000u));
     /* Until the controller says that it is disarmed: what is sent last may be lost when a socket closes. */
     while (applied < wanted || status.state != ACTQ_LINK_DISARMED) {
         if (applied >= wanted) {
@@ -66,7 +72,7 @@ int main(int count, char **arguments) {
         }
         /* 20 ms for answers. */
         struct pollfd ready = {.fd = line, .events = POLLIN};
-        for (const uint32_t begun = micros(); micros() - begun < 20000u;) {
+        for (const uint64_t begun = micros_of(CLOCK_MONOTONIC); micros_of(CLOCK_MONOTONIC) - begun < 20000u;) {
             uint8_t bytes[256];
             const ssize_t length = poll(&ready, 1, 20) > 0 ? read(line, bytes, sizeof bytes) : 0;
             for (ssize_t i = 0; i < length; i++) {

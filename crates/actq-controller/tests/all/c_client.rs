@@ -6,7 +6,7 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use actq_controller::breadcrumb::Record;
 use actq_controller::endpoint::Facts;
@@ -75,6 +75,8 @@ struct Controller {
     applied: u32,
     /// A second receiver of the host's frames.
     heard: Receiver<FRAME>,
+    /// Number and time of each.
+    frames: Vec<[u32; 2]>,
     /// Requests to arm.
     arms: u32,
 }
@@ -93,8 +95,8 @@ impl Controller {
         let facts = Facts { image: 0xabcd, slot: BUILT_IN, timing: Timing::default(), breadcrumb };
         let settings = Settings { status_period: 100, flash_while_armed: false, quiet: 1000 };
         let endpoint = Endpoint::new(Guard::full(&[], u32::MAX), facts, settings);
-        let (heard, begun) = (Receiver::new(), Instant::now());
-        Self { safety, endpoint, begun, faults_after, applied: 0, heard, arms: 0 }
+        let (heard, frames, begun) = (Receiver::new(), Vec::new(), Instant::now());
+        Self { safety, endpoint, begun, faults_after, applied: 0, heard, frames, arms: 0 }
     }
 
     fn turn(&mut self, line: &mut UnixStream) {
@@ -103,6 +105,7 @@ impl Controller {
         let len = line.read(&mut bytes).unwrap_or(0);
         for byte in &bytes[..len] {
             if let Some(received) = self.heard.push(*byte) {
+                self.frames.push([received.sequence, received.micros]);
                 self.arms += u32::from(matches!(received.message, Message::Arm { .. }));
             }
             let answer = self.endpoint.receive(*byte, micros, &mut self.safety, &mut NoUpdate, &mut out);
@@ -142,4 +145,21 @@ fn the_c_client_never_arms_again() {
     let (output, controller) = client.run(State::Latched, None);
     assert_eq!(error(&output), "the controller is not armed: state 2, fault 9\n");
     assert_eq!((controller.arms, controller.safety.state()), (0, State::Latched));
+}
+
+/// Numbers in milliseconds and times in microseconds of the time of day: a later run repeats none.
+#[test]
+fn the_c_client_repeats_no_number_and_no_time() {
+    const MINUTE: u32 = 60_000;
+    let Some(client) = Client::build("c-numbers") else { return };
+    let mut last = None::<u32>;
+    for _ in 0..2 {
+        let (_, controller) = client.run(State::Disarmed, None);
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).expect("after 1970");
+        let [number, micros] = controller.frames[0];
+        assert!((now.as_millis() as u32).wrapping_sub(number) < MINUTE, "{number}");
+        assert!((now.as_micros() as u32).wrapping_sub(micros) < 1000 * MINUTE, "{micros}");
+        assert!(last.is_none_or(|last| number.wrapping_sub(last).wrapping_sub(1) < 1 << 31), "{number} after {last:?}");
+        last = controller.frames.last().map(|[number, _]| *number);
+    }
 }
