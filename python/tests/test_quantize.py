@@ -206,3 +206,17 @@ def test_one_onnx_file_with_metadata_is_a_bundle(mlp, tmp_path):
         actq.import_policy(path, accept_profile=True)
     with pytest.raises(actq.Error, match="mjlab.onnx: a bundle takes no output, states, observe and rate_hz"):
         actq.import_policy(path, accept_profile=True, output="action")
+
+
+def test_outliers_and_other_axes_are_said(mlp, observations, caplog):
+    policy = actq.import_policy(mlp)
+    quantize = lambda given, **options: actq.quantize(policy, given, bpw=3, steps=5, progress=False, **options)  # noqa: E731
+    spiked = observations.copy()
+    quantize(spiked)
+    assert "is far outside" not in caplog.text and "all its other values" not in caplog.text
+    spiked[100, 3] = 1e6
+    quantize(spiked)
+    assert "recordings: observation dimension 3 is 1.000e6 in episode 0, step 100, where all its other values" in caplog.text
+    spiked[100, 3] = np.finfo(np.float32).max
+    with pytest.raises(actq.Error, match="recordings: episode 0, step 100: .* whose square f32 cannot hold"):
+        quantize(spiked)

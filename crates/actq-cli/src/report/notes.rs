@@ -2,7 +2,7 @@
 
 use actq::around::Around;
 use actq::budget::Budget;
-use actq::data::{Dataset, Range, Recordings, runs};
+use actq::data::{Dataset, Range, Recordings, outside_note, runs};
 use actq::measure::check::{Cause, Check, Checked};
 use actq::measure::eval::{ActivationShare, ErrorReport};
 use actq::methods::distill::balance::MixedUnits;
@@ -125,7 +125,7 @@ fn line(name: &str, report: &ErrorReport, recorded: usize, which: &str) -> Strin
 
 /// Returns all notes on the errors of an image made with `options`.
 pub fn of_check(check: &Check, options: &Options) -> Vec<String> {
-    [not_held_out(check, options), overfit_warning(check), error_warning(check, options)]
+    [check.heavy.clone(), not_held_out(check, options), overfit_warning(check), error_warning(check, options)]
         .into_iter()
         .flatten()
         .collect()
@@ -147,7 +147,7 @@ fn not_held_out(check: &Check, options: &Options) -> Option<String> {
 /// Returns a warning if the held-out error is far above the calibration error.
 pub fn overfit_warning(check: &Check) -> Option<String> {
     let (heldout, calib) = (check.heldout.as_ref()?.report.nmse, check.calib.as_ref()?.report.nmse);
-    (heldout > OVERFIT_RATIO * calib && heldout > calib + OVERFIT_DIFFERENCE).then(|| {
+    (!check.outliers && heldout > OVERFIT_RATIO * calib && heldout > calib + OVERFIT_DIFFERENCE).then(|| {
         let frames = check.frames_to_record().map_or(String::new(), |frames| format!(", about {frames} steps in all"));
         format!(
             "the held-out error is {:.1} times the calibration error: the image fits the calibration recording better than \
@@ -161,6 +161,7 @@ pub fn overfit_warning(check: &Check) -> Option<String> {
 pub fn error_warning(check: &Check, options: &Options) -> Option<String> {
     let useless = useless(check.nmse()?)?;
     let remedy = match check.cause() {
+        Cause::Outliers => "frames unlike all others may cause it: leave them out, as the notes say".to_owned(),
         Cause::Activations => "most of it comes from rounding the activations: pass --activations 16".to_owned(),
         Cause::Recording => {
             let frames = check.frames_to_record().map_or(String::new(), |frames| format!(", about {frames} in all"));
@@ -210,7 +211,8 @@ pub fn of_recordings(recordings: &Recordings) -> Vec<String> {
     let Some(range) = recordings.calib.as_ref().map(Range::of) else { return Vec::new() };
     let outside = recordings.heldout.as_ref().and_then(|heldout| range.warning(heldout));
     let single = recordings.calib.as_ref().and_then(single_steps);
-    [single, range.constant_note(), outside].into_iter().flatten().collect()
+    let far = [&recordings.calib, &recordings.heldout].map(|recording| recording.as_ref().and_then(outside_note));
+    [single, range.constant_note(), outside].into_iter().chain(far).flatten().collect()
 }
 
 /// Returns a warning for each matrix that reads observations of very different units without balance.
@@ -249,7 +251,15 @@ mod tests {
         let activations = ActivationShare { share: 0.125, int16: vec![0, 4], linear: 5 };
         let checked = |nmse: f64, recorded: usize| Checked { report: report(nmse), recorded };
         let calib = calib.map(|nmse| checked(nmse, 30));
-        Check { heldout: Some(checked(heldout, 7)), parts: 0, learned: true, calib, activations }
+        Check {
+            heldout: Some(checked(heldout, 7)),
+            parts: 0,
+            learned: true,
+            calib,
+            activations,
+            heavy: None,
+            outliers: false,
+        }
     }
 
     fn options() -> Options {
@@ -261,6 +271,7 @@ mod tests {
         let warning = overfit_warning(&check(Some(0.002), 0.0084)).expect("a warning");
         assert!(warning.starts_with("the held-out error is 4.2 times the calibration error: "), "{warning}");
         // Less than three times; less than 0.002 above; no calibration recording.
+        assert_eq!(overfit_warning(&Check { outliers: true, ..check(Some(0.002), 0.0084) }), None);
         for (calib, heldout) in [(Some(0.01), 0.029), (Some(1e-5), 0.002), (None, 0.5)] {
             assert_eq!(overfit_warning(&check(calib, heldout)), None, "{calib:?} {heldout}");
         }
@@ -284,6 +295,8 @@ mod tests {
         let rounded = ActivationShare { share: 0.6, int16: Vec::new(), linear: 5 };
         let activations = advice(&Check { activations: rounded, ..check(Some(0.3), 0.3) }, &options());
         assert!(activations.ends_with("rounding the activations: pass --activations 16"), "{activations}");
+        let outliers = advice(&Check { outliers: true, ..check(Some(0.1), 0.3) }, &options());
+        assert!(outliers.contains("leave them out") && !outliers.contains("record more"), "{outliers}");
         let recording = advice(&check(Some(0.1), 0.3), &options());
         assert!(recording.ends_with("record more steps for --calib, about 75 in all"), "{recording}");
         let weights = check(Some(0.25), 0.3);

@@ -25,6 +25,11 @@ impl Moments {
         &self.second - mean * mean.transpose()
     }
 
+    /// Returns whether f32 can hold the squares of all values.
+    pub(crate) fn fits_f32(&self) -> bool {
+        self.second.diagonal().iter().all(|square| square * self.count as f64 <= f64::from(f32::MAX))
+    }
+
     /// Returns the moments of some elements.
     pub fn of(&self, elements: &[usize]) -> Self {
         Self {

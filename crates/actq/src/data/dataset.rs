@@ -10,7 +10,7 @@ use ndarray::{Array2, Array3, ArrayView1, Axis, s};
 use super::arrays::Arrays;
 use super::checked::{CheckedArrays, Contents};
 use super::sizes::Sizes;
-use crate::error::{Context, Result, ensure};
+use crate::error::{Context, Result, bail, ensure};
 use crate::graph::{Evaluator, Graph};
 use crate::import::values::Tensor;
 use crate::numbers::square;
@@ -96,21 +96,27 @@ impl Dataset {
         array.index_axis(Axis(0), episode).index_axis(Axis(0), step).to_vec()
     }
 
-    /// Refuses a recording on which the f32 network gives an action that is not finite.
-    pub(crate) fn require_finite_actions(&self, graph: &Graph) -> Result<()> {
-        let mut own = Self { action: None, ..self.clone() };
-        own.fill_actions(graph);
-        for episode in 0..own.length.len() {
-            for step in 0..own.length[episode] {
-                let action = own.action_at(episode, step).unwrap_or_default();
-                let wrong = action.iter().position(|value| !value.is_finite());
-                ensure!(
-                    wrong.is_none(),
-                    "{}: episode {episode}, step {step}: the f32 policy gives {} as action {}; leave out the step, or limit its values",
-                    self.path.display(),
-                    action[wrong.unwrap_or_default()],
-                    wrong.unwrap_or_default()
-                );
+    /// Refuses a recording on which the f32 network gives an action that is not finite, or a linear operation reads a
+    /// value whose square is not.
+    pub(crate) fn require_finite(&self, graph: &Graph) -> Result<()> {
+        let mut evaluator = Evaluator::new(graph);
+        for episode in 0..self.length.len() {
+            evaluator.start(self.start(episode).as_deref());
+            for (step, obs) in self.episode(episode).enumerate() {
+                let mut wrong = None;
+                let action = evaluator.step(&obs, &mut |matrix, input| {
+                    let value = input.iter().find(|value| !(**value * **value).is_finite());
+                    wrong = wrong.or(value.map(|value| (matrix, *value)));
+                });
+                let at = || format!("{}: episode {episode}, step {step}", self.path.display());
+                let remedy = "leave out the step, or limit its values";
+                if let Some(i) = action.iter().position(|value| !value.is_finite()) {
+                    bail!("{}: the f32 policy gives {} as action {i}; {remedy}", at(), action[i]);
+                }
+                if let Some((matrix, value)) = wrong {
+                    let name = &graph.matrices[matrix].name;
+                    bail!("{}: {name} reads {value:.1e}, whose square f32 cannot hold; {remedy}", at());
+                }
             }
         }
         Ok(())

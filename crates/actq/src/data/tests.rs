@@ -11,6 +11,7 @@ use crate::calibrate::moments;
 use crate::calibrate::windows::Windows;
 use crate::graph::Graph;
 use crate::import::values::{Tensor, Values};
+use crate::methods::{Method, PreparedMethod};
 use crate::testing::{dataset, lstm, mlp};
 
 const SIZES: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 0 };
@@ -459,6 +460,80 @@ fn dimensions_outside_the_range_are_named() {
     assert!(note.starts_with("observation dimensions 3, 7-9 never change in calib.npz, "), "{note}");
     let moving = recorded("calib.npz", Array3::from_shape_fn((1, 9, 2), |(_, s, _)| s as f32));
     assert_eq!(Range::of(&moving).constant_note(), None);
+}
+
+/// A recording of three values of different units, and a contact that is seldom other than 0.
+fn ordinary(episodes: usize, steps: usize) -> Dataset {
+    let obs = Array3::from_shape_fn((episodes, steps, 4), |(e, s, v)| {
+        let wave = ((e * steps + s) as f32 * 0.37 + v as f32).sin();
+        [wave, 0.01 * wave, 5.0 + 40.0 * wave, f32::from(u8::from(s == 3))][v]
+    });
+    recorded("calib.npz", obs)
+}
+
+#[test]
+fn values_far_outside_all_others_are_named() {
+    for (episodes, steps) in [(2, 10), (3, 700)] {
+        assert_eq!(outside_note(&ordinary(episodes, steps)), None);
+    }
+    let note = |places: &[(usize, f32)]| {
+        let mut dataset = ordinary(3, 700);
+        places.iter().for_each(|(v, value)| dataset.obs[[1, 100 + 7 * v, *v]] = *value);
+        outside_note(&dataset)
+    };
+    let one = note(&[(0, -1e4)]).expect("a note");
+    assert!(
+        one.starts_with("calib.npz: observation dimension 0 is -1.000e4 in episode 1, step 100, where all its "),
+        "{one}"
+    );
+    let two = note(&[(0, 1e4), (1, 1e8), (3, 1e5)]).expect("a note");
+    assert!(two.contains("dimension 1 is 1.000e8 in episode 1, step 107"), "{two}");
+    assert!(two.contains(", and 2 values more are so far outside: "), "{two}");
+    // Not above the ordinary values of dimension 2, and without a gap.
+    assert_eq!(note(&[(0, 30.0), (1, 30.0)]), None);
+    let mut heavy = ordinary(3, 700);
+    (0..20).for_each(|i| heavy.obs[[0, 30 * i, 0]] = libm::powf(2.0, i as f32));
+    assert_eq!(outside_note(&heavy), None);
+    // A sensor that fails in many frames; padding.
+    let mut often = ordinary(3, 700);
+    (0..18).for_each(|i| often.obs[[2, 30 * i, 2]] = f32::MAX);
+    assert!(outside_note(&often).is_some_and(|note| note.contains("17 values more")));
+    often.length = vec![700, 700, 0];
+    assert_eq!(outside_note(&often), None);
+}
+
+#[test]
+fn a_frame_that_outweighs_all_others_is_named() {
+    let mut dataset = ordinary(3, 700);
+    dataset.action = Some(dataset.obs.clone());
+    assert_eq!(heavy_note(&dataset, &dataset), None);
+    for v in 0..3 {
+        dataset.action.as_mut().expect("actions")[[2, 7, v]] = 1e4;
+    }
+    // The place is that in the whole recording.
+    let thin = dataset.thinned(300, false);
+    assert_eq!(thin.frames(), 300);
+    let note = heavy_note(&thin, &dataset).expect("a note");
+    assert!(
+        note.starts_with("calib.npz: 7") && note.contains("% of the actions' variance comes from episode 2, step 7"),
+        "{note}"
+    );
+}
+
+#[test]
+fn values_whose_squares_f32_cannot_hold_are_refused() {
+    let graph = mlp();
+    let mut dataset = dataset(&graph, 2, 200);
+    let refused = |dataset: &Dataset, method| PreparedMethod::new(&graph, method, Some(dataset), |_| {}).map(drop);
+    refused(&dataset, Method::Distill).expect("ordinary values");
+    dataset.obs[[1, 7, 0]] = f32::MAX;
+    for method in [Method::Gptq, Method::Distill] {
+        let error = refused(&dataset, method).expect_err("a sentinel").to_string();
+        assert!(
+            error.contains("episode 1, step 7: ") && error.ends_with("leave out the step, or limit its values"),
+            "{error}"
+        );
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use actq_kernels::Image;
 
 use super::eval::{self, ActivationShare, ErrorReport};
-use crate::data::{Dataset, Recordings};
+use crate::data::{Dataset, Recordings, heavy_note, outside_note};
 use crate::error::Result;
 use crate::graph::Graph;
 use crate::methods::Method;
@@ -43,11 +43,17 @@ pub struct Check {
     pub calib: Option<Checked>,
     /// Error added by rounding the activations, on the held-out recording or else on the calibration recording.
     pub activations: ActivationShare,
+    /// Note on a frame that has most of the variance of a recording's actions.
+    pub heavy: Option<String>,
+    /// `true` if there is such a frame, or one with a value far outside of all others.
+    pub outliers: bool,
 }
 
 /// Largest part of an image's error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
+    /// Frames unlike all others, from which the image learned little else.
+    Outliers,
     /// The rounding of the activations.
     Activations,
     /// A recording that is too short, or too uniform: the error on frames that were not learned from is higher.
@@ -57,10 +63,11 @@ pub enum Cause {
 }
 
 impl Check {
-    /// Returns the cause of at least half of the error.
+    /// Returns the cause of at least half of the error; outliers, whatever their part, hide any other.
     pub fn cause(&self) -> Cause {
         let [heldout, calib] = [&self.heldout, &self.calib].map(|checked| checked.as_ref().map(|of| of.report.nmse));
         match (heldout, calib) {
+            _ if self.outliers => Cause::Outliers,
             _ if self.activations.share >= 0.5 => Cause::Activations,
             (Some(heldout), Some(calib)) if self.learned && heldout >= 2.0 * calib => Cause::Recording,
             _ => Cause::Weights,
@@ -122,8 +129,13 @@ pub fn check(
     let heldout = checked(recordings.heldout.as_ref(), MAX_HELDOUT_MACS)?;
     let Some((compared, of)) = heldout.as_ref().or(calib.as_ref()) else { return Ok(None) };
     let activations = eval::activation_share(image, compared, of.report.nmse)?;
+    let pairs = [(&heldout, &recordings.heldout), (&calib, &recordings.calib)];
+    let heavy = pairs.into_iter().find_map(|(compared, whole)| heavy_note(&compared.as_ref()?.0, whole.as_ref()?));
+    let recorded = [&recordings.calib, &recordings.heldout];
+    let outliers = heavy.is_some() || recorded.into_iter().flatten().any(|dataset| outside_note(dataset).is_some());
     let [heldout, calib] = [heldout, calib].map(|checked| checked.map(|(_, checked)| checked));
     let parts = held_out.as_ref().map_or(0, |held_out| held_out.parts);
     let of_parts = held_out.map(|HeldOut { report, .. }| Checked { recorded: report.steps, report });
-    Ok(Some(Check { heldout: heldout.or(of_parts), parts, learned: *method != Method::Rtn, calib, activations }))
+    let (heldout, learned) = (heldout.or(of_parts), *method != Method::Rtn);
+    Ok(Some(Check { heldout, parts, learned, calib, activations, heavy, outliers }))
 }

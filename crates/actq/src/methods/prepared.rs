@@ -84,7 +84,7 @@ impl<'a> PreparedMethod<'a> {
             calib.require_frames(MIN_COUNTED_FRAMES, "statistics of fewer frames are unreliable")?;
             Ok(calib)
         };
-        let mut moments = |dataset: &Dataset| {
+        let mut moments = |dataset: &Dataset| -> Result<_> {
             let most = if steps > 1 { (MAX_VECTORS / steps).min(dataset.frames()) } else { dataset.frames() };
             let most = allowance.map_or(most, |allowance| {
                 let timed = dataset.thinned(TIMED, false);
@@ -92,7 +92,11 @@ impl<'a> PreparedMethod<'a> {
             });
             let dataset = if steps > 1 { dataset.thinned(most, false) } else { Cow::Borrowed(dataset) };
             let all = dataset.frames().max(1) as f64;
-            (collect(graph, &dataset, &mut |frames| progress(frames as f64 / all)), dataset.frames())
+            let moments = collect(graph, &dataset, &mut |frames| progress(frames as f64 / all));
+            if moments.iter().any(|of| !of.fits_f32()) {
+                dataset.require_finite(graph)?;
+            }
+            Ok((moments, dataset.frames()))
         };
         let mut sampled = None;
         let mut say = |frames, inputs, outputs| sampled = Some(Sampled { frames, inputs, outputs });
@@ -100,13 +104,13 @@ impl<'a> PreparedMethod<'a> {
             Method::Rtn => Statistics::Rtn,
             Method::Gptq => {
                 let dataset = calib()?;
-                let (moments, inputs) = moments(dataset);
+                let (moments, inputs) = moments(dataset)?;
                 say(dataset.frames(), inputs, 0);
                 Statistics::Gptq(moments)
             }
             Method::Distill => {
                 let dataset = calib()?;
-                let moments = moments(dataset);
+                let moments = moments(dataset)?;
                 let inputs = moments.1;
                 let rows = RowStatistics::collect(graph, dataset, moments, allowance)?;
                 say(dataset.frames(), inputs, rows.outputs_of);

@@ -78,7 +78,7 @@ impl<'a> Quantizer<'a> {
     /// Returns why a method fails: a f32 policy that gives no finite actions, or its own error.
     fn cause(&self, error: Error) -> Error {
         let calib = self.recordings.calib.as_ref().filter(|_| error.budget().is_none());
-        let infinite = calib.and_then(|calib| calib.require_finite_actions(&self.policy.graph).err());
+        let infinite = calib.and_then(|calib| calib.require_finite(&self.policy.graph).err());
         infinite.unwrap_or(error)
     }
 

@@ -67,7 +67,7 @@ impl RowStatistics {
         let every = if allowance.is_some() { dataset.frames().div_ceil(frames.max(1)) } else { 1 };
         let windows = Windows::new(graph.clone(), dataset, every);
         if windows.output_variance.iter().any(|v| !v.is_finite()) {
-            dataset.require_finite_actions(graph)?;
+            dataset.require_finite(graph)?;
         }
         ensure!(
             windows.output_variance.iter().any(|v| *v > 0.0),
