@@ -103,6 +103,23 @@ def test_agents_of_cleanrl_give_their_mean():
             np.testing.assert_allclose(policy(observations), expected.numpy(), rtol=1e-5, atol=1e-5)
 
 
+def test_agents_that_choose_give_centred_scores():
+    class Chooser(torch.nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.critic, self.actor = linear(3, 1), linear(3, 4)
+
+        def get_action_and_value(self, x):
+            return torch.distributions.Categorical(logits=self.actor(x)).sample(), self.critic(x)
+
+    agent, observations = Chooser(), np.random.default_rng(1).normal(size=(20, 3)).astype(np.float32)
+    with torch.no_grad():
+        agent.actor.bias.add_(50)
+    scores = agent.actor(torch.from_numpy(observations)).detach().numpy()
+    expected = scores - scores.mean(axis=1, keepdims=True)
+    np.testing.assert_allclose(actq.import_policy(agent)(observations), expected, rtol=1e-4, atol=1e-4)
+
+
 def test_agents_with_more_than_an_actor_are_refused():
     class Trunk(Agent):
         def __init__(self):

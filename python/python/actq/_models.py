@@ -31,13 +31,18 @@ class Model(NamedTuple):
     #: Typical observations of one episode [frame, value], and what the model itself does at them.
     observations: Array
     predict: Callable[[Array], Array]
+    #: The model's values are scores of a choice, which the module centres.
+    is_choice: bool = False
 
     def compare(self, policy: Policy, name: str, limits: Limits) -> None:
         """Refuses a policy that gives other actions than the model within these limits."""
         low, high, _ = limits
         expected = np.clip(self.predict(self.observations), low or -np.inf, high or np.inf)
-        found = policy(self.observations)
-        error = np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-30)
+        # What all scores have in common is rounded with them.
+        largest = max(np.abs(expected).max(), 1e-30)
+        if self.is_choice:
+            expected = expected - expected.mean(axis=1, keepdims=True, dtype=np.float64)
+        error = np.abs(policy(self.observations) - expected).max() / largest
         if not error <= TOLERANCE:
             raise Error(f"{name}: the policy is off by {error:.1e} of the largest action that the model predicts; please report it")
 
@@ -130,10 +135,11 @@ def _of_sb3(model: Any, name: str) -> Model:
             # Of a choice, predict gives only the index of the largest score; the import compares it.
             parts = list(given.values()) if isinstance(given, dict) else [given]
             flat = np.concatenate([part.reshape(len(rows), -1) for part in parts], axis=1)
-            return np.asarray(step(torch.from_numpy(flat).to(policy.device)).detach().cpu().numpy())
+            given = step.observation(torch.from_numpy(flat).to(policy.device))
+            return np.asarray(step.scores(given).detach().cpu().numpy())
         return np.asarray(model.predict(given, deterministic=True)[0], np.float32).reshape(len(rows), -1)
 
-    return Model(module, (torch.zeros(1, mean.size),), None, None, observations, predict)
+    return Model(module, (torch.zeros(1, mean.size),), None, None, observations, predict, step.kind == "Discrete")
 
 
 def _stacked_frames(env: Any) -> int:
@@ -175,6 +181,17 @@ def _of_rsl_rl(runner: Any, name: str) -> Model:
     return Model(module, example, list(module.input_names), list(module.output_names), observations, predict)
 
 
+class _Scores(torch.nn.Module):
+    """The centred scores of an actor that chooses."""
+
+    def __init__(self, actor: Any) -> None:
+        super().__init__()
+        self.actor = actor
+
+    def forward(self, obs: torch.Tensor) -> Any:
+        return _sb3.centred(self.actor(obs))
+
+
 class _SacAction(torch.nn.Module):
     """The deterministic action of a SAC actor of CleanRL."""
 
@@ -205,13 +222,19 @@ def _of_clean_rl(agent: Any, name: str) -> Optional[Model]:
     else:
         return None
     first = next((layer for layer in module.modules() if isinstance(layer, torch.nn.Linear)), layers[0])
+    example = torch.zeros(1, first.in_features, device=device)
+    if not isinstance(module, _SacAction):
+        with torch.random.fork_rng([]):
+            is_choice = not agent.get_action_and_value(example)[0].is_floating_point()
+        module = _Scores(module) if is_choice else module
 
     def predict(rows: Array) -> Array:
         obs = torch.from_numpy(rows).to(device)
         if isinstance(module, _SacAction):
             return np.asarray(module(obs).detach().cpu().numpy())
         seen: List[Tuple[Any, Any]] = []
-        hook = module.register_forward_hook(lambda _, given, found: seen.append((given[0], found)))
+        actor = module.actor if isinstance(module, _Scores) else module
+        hook = actor.register_forward_hook(lambda _, given, found: seen.append((given[0], found)))
         with torch.random.fork_rng([]):
             agent.get_action_and_value(obs)
         hook.remove()
@@ -219,5 +242,4 @@ def _of_clean_rl(agent: Any, name: str) -> Optional[Model]:
             raise Error(f"{name}: the agent computes before its actor; pass a module that returns the mean action")
         return np.asarray(seen[0][1].detach().cpu().numpy())
 
-    example = torch.zeros(1, first.in_features, device=device)
-    return Model(module, (example,), None, None, drawn(first.in_features), predict)
+    return Model(module, (example,), None, None, drawn(first.in_features), predict, isinstance(module, _Scores))

@@ -21,9 +21,15 @@ def is_of(source: Any, name: str, package: str) -> bool:
     return any(base.__name__ == name and base.__module__.startswith(package) for base in type(source).__mro__)
 
 
+def centred(scores: torch.Tensor) -> torch.Tensor:
+    """Subtracts the mean of the scores of a choice. The largest stays the largest, and an image does not learn a part that is
+    common to all, as the value of a state."""
+    return scores - scores.mean(dim=-1, keepdim=True)
+
+
 class Deterministic(torch.nn.Module):
-    """What `policy.predict(obs, deterministic=True)` returns, before the limits of the action space. For Discrete, scores
-    whose largest is that action."""
+    """What `policy.predict(obs, deterministic=True)` returns, before the limits of the action space. For Discrete, centred
+    scores whose largest is that action."""
 
     low: torch.Tensor
     high: torch.Tensor
@@ -50,16 +56,18 @@ class Deterministic(torch.nn.Module):
     def forward(self, given: torch.Tensor) -> Any:
         policy, obs = self.policy, self.observation(given)
         if self.kind == "Discrete":
-            if hasattr(policy, "q_net") and isinstance(policy.q_net, torch.nn.Sequential):
-                return policy(obs)
-            if hasattr(policy, "q_net"):
-                return policy.q_net(obs)
-            features = policy.extract_features(obs, policy.pi_features_extractor)
-            return policy.action_net(policy.mlp_extractor.forward_actor(features))
+            return centred(self.scores(obs))
         action = policy._predict(obs, deterministic=True)
         if policy.squash_output:
             return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
         return action
+
+    def scores(self, obs: Any) -> Any:
+        policy = self.policy
+        if hasattr(policy, "q_net"):
+            return policy(obs) if isinstance(policy.q_net, torch.nn.Sequential) else policy.q_net(obs)
+        features = policy.extract_features(obs, policy.pi_features_extractor)
+        return policy.action_net(policy.mlp_extractor.forward_actor(features))
 
     def limits(self) -> Tuple[Array, Array]:
         """Returns lowest and highest actions; an action that is scaled to them has no others."""
