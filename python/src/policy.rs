@@ -98,6 +98,19 @@ impl Policy {
         self.policy.graph.state_len()
     }
 
+    /// Inputs and outputs of its source, as `actq import` prints them: what each is, and those that are left out. Empty
+    /// for other sources than ONNX and modules.
+    #[getter]
+    fn ports(&self) -> &str {
+        &self.policy.ports
+    }
+
+    /// Outputs of its source that are named action but cannot be a part of it, with the reasons.
+    #[getter]
+    fn refused(&self) -> Vec<String> {
+        self.policy.refused.clone()
+    }
+
     /// SHA-256 of the policy's files, as `Image.source` has it.
     #[getter]
     fn digest(&self) -> String {

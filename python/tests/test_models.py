@@ -206,3 +206,23 @@ def test_runners_of_rsl_rl_give_their_policy(tmp_path):
             given = [tensordict.TensorDict({"policy": proprioception, "height": scan}, [1]) for proprioception, scan in steps]
             expected = np.concatenate([own(x).numpy() for x in given])
         np.testing.assert_allclose(policy(rows), expected, rtol=1e-4, atol=1e-5)
+
+
+def test_what_a_policy_has_of_a_module_is_said(caplog):
+    class Parts(torch.nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.actor, self.force = linear(), linear()
+
+        def forward(self, x, y):
+            return self.force(x), self.actor(x + 2 * y)
+
+    with caplog.at_level("INFO", "actq"):
+        policy = actq.import_policy(Parts(), (torch.zeros(1, 3), torch.zeros(1, 3)), input_names=["b", "a"], output_names=["reaction_force", "action"])
+    assert policy.ports.splitlines() == [
+        "input     obs[0:3] = b",
+        "          obs[3:6] = a",
+        "output    action, 2 values",
+        "cut       outputs reaction_force: only the action is kept",
+    ]
+    assert policy.ports.rstrip() in caplog.text and policy.refused == []

@@ -13,12 +13,12 @@ use actq::import::contract::JsonContract;
 use actq::import::json::PolicyJson;
 use actq::import::{Importer, PolicySource};
 use actq::policy::Policy;
-use actq::text::printable;
+use actq::text::{count, printable};
 use prost::bytes::Bytes;
 
 use self::observation::{Observation, named_states, observed_inputs, refuse_integers};
 pub use self::options::ImportOptions;
-use self::output::{actions, choose, refuse_batch};
+use self::output::{actions, choose, refuse_batch, refused_actions};
 use crate::action;
 use crate::file::model::Model;
 use crate::lower::lower;
@@ -53,6 +53,8 @@ pub struct Imported {
     pub cut_inputs: Vec<String>,
     /// Outputs that are neither the action nor states.
     pub cut_outputs: Vec<String>,
+    /// Outputs named action that cannot be imported, with the reasons; another one is the action.
+    pub refused: Vec<(String, String)>,
     /// Number of nodes in the file.
     pub nodes: usize,
     /// Keys of the action contract that come from the file's last nodes.
@@ -163,7 +165,40 @@ impl Imported {
     ///
     /// As [`PolicySource::policy`].
     pub fn policy(&self, folder: &Path, file: &Path) -> Result<Policy> {
-        Ok(Policy { guards: self.guards.clone(), ..self.source.policy(folder, file)? })
+        let refused = self.refused.iter().map(|(name, why)| {
+            let chosen = &self.output.0;
+            format!("output {name:?} is named action, too, and is left out, as it cannot be imported: {why}. The policy is {chosen:?} alone")
+        });
+        let (guards, refused) = (self.guards.clone(), refused.collect());
+        Ok(Policy { guards, refused, ports: self.ports() + &self.cut(), ..self.source.policy(folder, file)? })
+    }
+
+    /// Describes the observed inputs in order, the states and the action output, a line for each.
+    pub fn ports(&self) -> String {
+        let mut text = String::new();
+        let mut at = 0;
+        for (i, (name, len)) in self.inputs.iter().enumerate() {
+            let head = if i == 0 { "input" } else { "" };
+            let integers = if self.integers.contains(name) { ", integers" } else { "" };
+            text += &format!("{head:9} obs[{at}:{}] = {name}{integers}\n", at + len);
+            at += len;
+        }
+        for (from, to, len) in &self.states {
+            text += &format!("state     {from} -> {to}, {}; kept by the policy, zero at reset\n", count(*len, "value"));
+        }
+        let chunk = self.source.json.chunk.map_or(String::new(), |chunk| format!(": a chunk of {chunk} actions"));
+        text + &format!("output    {}, {}{chunk}\n", self.output.0, count(self.output.1, "value"))
+    }
+
+    /// Names the inputs and outputs that are left out, a line for each of the two.
+    pub fn cut(&self) -> String {
+        let cut = [
+            ("inputs", &self.cut_inputs, "the action does not depend on them"),
+            ("outputs", &self.cut_outputs, "only the action is kept"),
+        ];
+        let line =
+            |(what, names, why): (&str, &Vec<String>, &str)| format!("cut       {what} {}: {why}\n", names.join(", "));
+        cut.into_iter().filter(|(_, names, _)| !names.is_empty()).map(line).collect()
     }
 }
 
@@ -172,6 +207,7 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
     options.check(&model.graph)?;
     let Followed { mut exprs, outputs, errors } = follow_outputs(model, options)?;
     let cells = Cells::find(model, &mut exprs, &outputs, &options.states)?;
+    let refused = if options.output.is_none() { refused_actions(&errors) } else { Vec::new() };
     let output = &outputs[choose(&exprs, &cells, &outputs, errors, options)?];
     let is_constant = |i: &usize| matches!(output.value.elements()[*i], Element::Known(_));
     let constant = (0..output.value.len()).filter(is_constant).collect();
@@ -236,6 +272,7 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         states,
         output: (action, values),
         constant,
+        refused,
         nodes: model.graph.nodes.len(),
         contract: last,
         bounded,

@@ -38,6 +38,11 @@ pub struct Policy {
     pub around: Option<Around>,
     /// Nodes of its source that replace or limit NaN and infinity, with what they do. The network has none of these.
     pub guards: Vec<String>,
+    /// Inputs and outputs of its source, a line for what each is, and for those that are left out; empty if it has no
+    /// others.
+    pub ports: String,
+    /// Outputs of its source that are named action but cannot be a part of it, with the reasons.
+    pub refused: Vec<String>,
     /// Weights of all its matrices as they were trained; the divisor of bits per weight.
     pub weights: usize,
     /// Trained values ([`Graph::parameters`]), counted before what depends on the time alone became tables.
@@ -64,6 +69,8 @@ impl Policy {
             graph,
             around: None,
             guards: Vec::new(),
+            ports: String::new(),
+            refused: Vec::new(),
             digest: [0; 32],
         }
     }

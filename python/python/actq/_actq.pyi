@@ -49,6 +49,13 @@ class Policy:
     def state_len(self) -> int:
         """Values of the recurrent state; 0 without one."""
     @property
+    def ports(self) -> str:
+        """Inputs and outputs of its source, as `actq import` prints them: what each is, and those that are left out. Empty for
+        other sources than ONNX and modules."""
+    @property
+    def refused(self) -> list[str]:
+        """Outputs of its source that are named action but cannot be a part of it, with the reasons."""
+    @property
     def digest(self) -> str:
         """SHA-256 of the policy's files, as `Image.source` has it."""
     def __call__(self, observations: npt.ArrayLike) -> _Floats:

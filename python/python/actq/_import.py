@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 from numbers import Real
 from pathlib import Path
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
     Source = Union[PathLike, torch.nn.Module, torch.jit.ScriptModule]
     Example = Union[torch.Tensor, Tuple[torch.Tensor, ...]]
+
+log = logging.getLogger("actq")
 
 #: Begins the error without torch.
 NEEDS_TORCH = "modules and TorchScript files need"
@@ -70,6 +73,8 @@ def import_policy(
     max_step: largest change from one action to the next, a number, or one for each. A bundle takes none.
     rate_hz: actions in a second. A policy folder and a bundle state theirs.
 
+    Of ONNX and modules, the log `actq` has the inputs in order, the output, and what is left out (level INFO).
+
     Copies of a module run on drawn observations, and the policy must give their actions. The module does not change.
 
     Raises `actq.Error` with the node, tensor, file or key that cannot be imported.
@@ -96,10 +101,11 @@ def import_policy(
             for key, value in given.items():
                 if value is not None:
                     raise _actq.Error(f"{path}: only a module or a TorchScript file takes {key}")
-            return _actq.import_path(
+            policy = _actq.import_path(
                 path, output=output, states=pairs, observe=observe, limits=limits, rate_hz=rate_hz,
                 accept_profile=accept_profile, answers=_toml(answers), profile=_text("profile", profile),
             )  # fmt: skip
+            return _logged(policy)
         if not path.is_file():
             raise _actq.Error(f"{path}: there is no such file")
         name = name or path.stem
@@ -131,6 +137,15 @@ def import_policy(
     )  # fmt: skip
     if model is not None:
         model.compare(policy, name, limits)
+    return _logged(policy)
+
+
+def _logged(policy: Policy) -> Policy:
+    """Says what a policy has of its source."""
+    for note in policy.refused:
+        log.warning(note)
+    if policy.ports:
+        log.info(policy.ports.rstrip())
     return policy
 
 

@@ -38,6 +38,7 @@ pub fn run(
     refuse_foreign(&args.out)?;
     let progress = Progress::new(args.run.quiet, "reading")?;
     let source = load(&args.policy_dir)?;
+    print(&source.ports)?;
     let has_calib = !calib.is_empty() || Recording::Calib.find(&args.policy_dir)?.is_some();
     if args.policy_dir.is_file() && !has_calib && method != Some(Method::Rtn) {
         bail!("{}: {}", args.policy_dir.display(), notes::how_to_record(&source));

@@ -8,18 +8,7 @@ use actq_onnx::Imported;
 pub fn summary(imported: &Imported, policy: &Policy) -> String {
     let list = |names: &[String]| names.join(", ");
     let mut text = format!("file      {}, by {}\n", count(imported.nodes, "node"), imported.producer);
-    let mut at = 0;
-    for (i, (name, len)) in imported.inputs.iter().enumerate() {
-        let head = if i == 0 { "input" } else { "" };
-        let integers = if imported.integers.contains(name) { ", integers" } else { "" };
-        text += &format!("{head:9} obs[{at}:{}] = {name}{integers}\n", at + len);
-        at += len;
-    }
-    for (from, to, len) in &imported.states {
-        text += &format!("state     {from} -> {to}, {}; kept by the policy, zero at reset\n", count(*len, "value"));
-    }
-    let chunk = if policy.chunk > 1 { format!(": a chunk of {} actions", policy.chunk) } else { String::new() };
-    text += &format!("output    {}, {}{chunk}\n", imported.output.0, count(imported.output.1, "value"));
+    text += &imported.ports();
     if !imported.contract.is_empty() {
         text += &format!("action    contract with {}, from the last nodes\n", imported.contract.join(", "));
     }
@@ -44,15 +33,7 @@ pub fn summary(imported: &Imported, policy: &Policy) -> String {
         text += "          the image has none of these: a step with NaN or infinity in its observation is refused, and the application \
                  must replace such values before the step\n";
     }
-    for (what, names, why) in [
-        ("inputs", &imported.cut_inputs, "the action does not depend on them"),
-        ("outputs", &imported.cut_outputs, "only the action is kept"),
-    ] {
-        if !names.is_empty() {
-            text += &format!("cut       {what} {}: {why}\n", list(names));
-        }
-    }
-    text
+    text + &imported.cut()
 }
 
 /// Formats successive equal names as one name with their count.

@@ -47,14 +47,14 @@ pub fn how_to_record(policy: &Policy) -> String {
     )
 }
 
-/// Returns notes on a policy: actions or targets without limits, and what its source does with values that are not
-/// finite.
+/// Returns notes on a policy: actions or targets without limits, what its source does with values that are not finite,
+/// and actions of its source that it does not have.
 pub fn of_policy(policy: &Policy) -> Vec<String> {
     let limits = match &policy.around {
         Some(around) => targets_without_limits(around),
         None => without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))),
     };
-    limits.into_iter().chain(guards(&policy.guards)).collect()
+    limits.into_iter().chain(guards(&policy.guards)).chain(policy.refused.iter().cloned()).collect()
 }
 
 /// Returns a note on what a policy's source does with values that are not finite.

@@ -60,6 +60,12 @@ pub(super) fn choose(
     }
 }
 
+/// Names the outputs named action that cannot be imported, with the reasons.
+pub(super) fn refused_actions(errors: &[(String, Error)]) -> Vec<(String, String)> {
+    let named = errors.iter().filter(|(name, _)| is_action(name));
+    named.map(|(name, error)| (printable(name).into_owned(), format!("{error:#}"))).collect()
+}
+
 /// Returns the refused output named action, or else the first refused one.
 fn refused(errors: Vec<(String, Error)>) -> Option<(String, Error)> {
     let at = errors.iter().position(|(name, _)| is_action(name)).unwrap_or(0);
@@ -113,8 +119,8 @@ fn is_action(name: &str) -> bool {
         words.push(c);
     }
     let words = words.to_ascii_lowercase();
-    let is_about = |word: &str| ABOUT.contains(&word);
-    words.contains("action") && !words.split(|c: char| !c.is_ascii_alphanumeric()).any(is_about)
+    let words: Vec<&str> = words.split(|c: char| !c.is_ascii_alphanumeric()).collect();
+    words.iter().any(|word| word.starts_with("action")) && !words.iter().any(|word| ABOUT.contains(word))
 }
 
 /// Refuses a batch of several observations, whose actions would look like a chunk.
@@ -156,7 +162,9 @@ mod tests {
 
     #[test]
     fn names_about_actions_are_not_actions() {
-        for name in ["action", "actions", "Action_Mean", "deterministic_action", "masked_actions", "elastic_action"] {
+        for name in
+            ["action", "actions", "Action_Mean", "deterministic_action", "masked_actions", "elastic_action", "action0"]
+        {
             assert!(is_action(name), "{name}");
         }
         for name in [
@@ -171,6 +179,9 @@ mod tests {
             "ActionLogProb",
             "action.sigma",
             "q_action",
+            "reaction_force",
+            "transaction_id",
+            "fractions",
         ] {
             assert!(!is_action(name), "{name}");
         }

@@ -186,6 +186,8 @@ fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) 
         graph: without_ignored(&graph),
         around: None,
         guards: Vec::new(),
+        ports: String::new(),
+        refused: Vec::new(),
         digest,
     };
     policy.check()?;

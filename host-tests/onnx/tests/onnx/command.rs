@@ -98,6 +98,36 @@ fn import_writes_a_folder_and_overwrites_nothing() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn quantize_says_what_it_takes_of_a_file() -> Result<()> {
+    let dir = TempDir::new()?;
+    let [model, image] = ["model.onnx", "image.actq"].map(|name| dir.path().join(name));
+    let mut file = File::default();
+    [("velocity", 2), ("unused", 1), ("position", 4)].iter().for_each(|(name, n)| file.input(name, &[1, *n]));
+    file.write(&[], "reaction_force := Identity(gemm(velocity, 2, 2))");
+    file.write(&[], "action_mean := Tanh(Add(gemm(velocity, 3, 2), gemm(position, 3, 4)))");
+    file.write(&[], "discrete_action := ArgMax(action_mean)");
+    [("discrete_action", 1), ("reaction_force", 2), ("action_mean", 3)]
+        .iter()
+        .for_each(|(name, n)| file.output(name, &[1, *n]));
+    fs::write(&model, file.bytes())?;
+    let made = actq(&["quantize", text(&model), "--method", "rtn", "--out", text(&image)]).output()?;
+    let (printed, noted) = (succeeded(&made)?, String::from_utf8_lossy(&made.stderr));
+    for line in [
+        "input     obs[0:2] = velocity\n          obs[2:6] = position\n",
+        "output    action_mean, 3 values\n",
+        "cut       inputs unused: ",
+        "cut       outputs discrete_action, reaction_force: ",
+    ] {
+        ensure!(printed.contains(line), "{line}: {printed}");
+    }
+    ensure!(
+        noted.contains("note: output \"discrete_action\" is named action, too, and is left out, as it cannot be"),
+        "{noted}"
+    );
+    Ok(())
+}
+
 /// Writes a network that replaces NaN, then has one layer of 4 by 4 with its weights in another file, from `offset` on.
 fn write_layer(model: &Path, [input, output]: [&str; 2], location: &str, offset: usize) -> Result<()> {
     let entry = |key: &str, value: String| encoded(&proto::Entry { key: Some(key.to_owned()), value: Some(value) });
