@@ -47,8 +47,8 @@ pub(crate) struct Request {
 }
 
 impl Request {
-    /// Returns the budget: 3 bits for every weight if none is given.
-    fn budget(&self) -> PyResult<Budget> {
+    /// Returns the budget; without one, the method's default.
+    fn budget(&self, method: &Method) -> PyResult<Budget> {
         let budgets = [
             self.bits.map(|bits| Ok(Budget::Width(width("bits", bits)?))),
             self.bpw.map(|bits| Ok(Budget::BitsPerWeight(positive("bpw", bits)?))),
@@ -60,7 +60,7 @@ impl Request {
             self.max_nmse.map(|limit| Ok(Budget::MaxNmse(positive("max_nmse", limit)?))),
         ];
         let mut given = budgets.into_iter().flatten();
-        let budget = given.next().unwrap_or(Ok(Budget::Width(Width::W3)));
+        let budget = given.next().unwrap_or_else(|| Ok(method.default_budget(!self.widths.is_empty())));
         if given.next().is_some() {
             return Err(error!(
                 "more than one budget is given; pass one of bits, bpw, flash, ms and max_nmse, or flash and ms"
@@ -96,6 +96,7 @@ impl Request {
         if minutes.is_some_and(|minutes| minutes > MAX_MINUTES) {
             return Err(error!("minutes is {}; use at most {MAX_MINUTES}, a week", minutes.unwrap_or_default()));
         }
+        let budget = self.budget(&method)?;
         let options = Options {
             group: self.group.unwrap_or(method.default_group()),
             activations: match self.activations {
@@ -114,7 +115,7 @@ impl Request {
             relative: self.relative,
             seed: self.seed,
             forced: forced.collect::<PyResult<_>>()?,
-            ..Options::new(method, self.budget()?)
+            ..Options::new(method, budget)
         };
         options.check().and_then(|()| options.check_length()).or_raise()?;
         Ok(options)
@@ -171,6 +172,7 @@ pub(crate) fn quantize(
         let alone = found.buffer();
         let image = alone.image(Path::new("image"))?;
         let mut notes = notes::of_policy(&policy);
+        notes.extend(notes::one_width(&options));
         if let Some(check) = check::check(&policy, image, &recordings, &options.method, held_out)? {
             notes.push(notes::errors(&check).trim_end().to_owned());
             warnings.extend(notes::of_check(&check, &options));

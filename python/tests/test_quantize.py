@@ -220,3 +220,11 @@ def test_outliers_and_other_axes_are_said(mlp, observations, caplog):
     spiked[100, 3] = np.finfo(np.float32).max
     with pytest.raises(actq.Error, match="recordings: episode 0, step 100: .* whose square f32 cannot hold"):
         quantize(spiked)
+
+
+def test_the_default_of_distill_is_bits_per_weight(mlp, observations):
+    policy, options = actq.import_policy(mlp), {"steps": 5, "progress": False}
+    assert actq.quantize(policy, observations, **options) == actq.quantize(policy, observations, bpw=3, **options)
+    forced = {"widths": {"w1": 8}, **options}
+    assert actq.quantize(policy, observations, **forced) == actq.quantize(policy, observations, bits=3, **forced)
+    assert actq.quantize(policy, method="rtn", progress=False) == actq.quantize(policy, method="rtn", bits=3, progress=False)

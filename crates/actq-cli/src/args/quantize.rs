@@ -65,10 +65,10 @@ pub struct QuantizeArgs {
 /// Budget of an image.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct BudgetArgs {
-    /// Bits of every weight: 2, 3, 4 or 8 [default: 3]
+    /// Bits of every weight: 2, 3, 4 or 8 [default: 3 for rtn, gptq and beside --width and --protect]
     #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
     pub(crate) bits: Option<Width>,
-    /// Bits per weight of all weights, with scales and padding; each matrix gets a width
+    /// Bits per weight of all weights, with scales and padding; each matrix gets a width [default: 3 for distill]
     #[arg(long, value_name = "X", value_parser = positive)]
     pub(crate) bpw: Option<f64>,
     /// The most bytes of the image, as 98304, 96K or 1M (K is 1024 bytes, M is 1024 K)
@@ -91,15 +91,16 @@ pub(crate) struct BudgetArgs {
 }
 
 impl BudgetArgs {
-    /// Returns the budget: 3 bits for every weight if none is given.
-    pub(crate) fn budget(&self) -> Budget {
+    /// Returns the budget of an image for a core; `None` if none is given.
+    pub(crate) fn budget(&self, core: Option<Core>) -> Option<Budget> {
         let Self { bits, bpw, flash, ms, clock } = *self;
         let limits = [
+            bits.map(Budget::Width),
             bpw.map(Budget::BitsPerWeight),
             ms.map(|milliseconds| Budget::Time(TimeLimit { milliseconds, clock_hz: clock, image_bytes: flash })),
             flash.map(Budget::ImageBytes),
         ];
-        limits.into_iter().flatten().next().unwrap_or(Budget::Width(bits.unwrap_or(Width::W3)))
+        limits.into_iter().flatten().next()
     }
 }
 

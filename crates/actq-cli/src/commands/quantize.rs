@@ -62,7 +62,7 @@ pub fn run(
     note(notes::of_recordings(&recordings));
     note(recorded::use_policy(&mut recordings, &source.graph).iter().map(ToString::to_string));
     options.minutes = minutes_of_image(&source, &recordings, &options);
-    note(notes::of_policy(&source));
+    note(notes::of_policy(&source).into_iter().chain(notes::one_width(&options)));
     let started = Instant::now();
     start_threads(args.run.threads)?;
     progress.begin("calibrating");
@@ -180,8 +180,10 @@ fn own_path(args: &QuantizeArgs, source: &Policy, network: &ImageBuffer, shares:
 
 /// Returns the options of the command line.
 fn options(args: &QuantizeArgs, method: Method) -> Options {
-    let budget = args.max_nmse.map_or_else(|| args.budget.budget(), Budget::MaxNmse);
     let protected = args.protect.iter().map(|name| (name.clone(), Width::W8));
+    let forced: Vec<_> = args.width.iter().cloned().chain(protected).collect();
+    let budget = args.max_nmse.map(Budget::MaxNmse).or_else(|| args.budget.budget(args.core));
+    let budget = budget.unwrap_or_else(|| method.default_budget(!forced.is_empty()));
     Options {
         group: args.group.unwrap_or(method.default_group()),
         activations: match args.activations {
@@ -194,7 +196,7 @@ fn options(args: &QuantizeArgs, method: Method) -> Options {
         minutes: args.learn.minutes,
         relative: args.learn.distill.relative,
         seed: args.run.seed,
-        forced: args.width.iter().cloned().chain(protected).collect(),
+        forced,
         ..Options::new(method, budget)
     }
 }

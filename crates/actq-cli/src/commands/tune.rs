@@ -86,7 +86,10 @@ fn options(args: &TuneArgs) -> Options {
         minutes,
         relative,
         seed: args.run.seed,
-        ..Options::new(Method::Distill, args.budget.budget())
+        ..Options::new(
+            Method::Distill,
+            args.budget.budget(None).unwrap_or_else(|| Method::Distill.default_budget(false)),
+        )
     }
 }
 

@@ -10,6 +10,7 @@ use actq::methods::{Effort, Method, Options};
 use actq::pipeline::{QuantizedPolicy, Reason, Unused};
 use actq::policy::Policy;
 use actq::text::count;
+use actq_kernels::Width;
 
 /// Ratio of held-out to calibration error above which there is a warning, if [`OVERFIT_DIFFERENCE`] is exceeded, too.
 const OVERFIT_RATIO: f64 = 3.0;
@@ -206,6 +207,16 @@ pub fn unused_budget(found: &QuantizedPolicy, options: &Options) -> Option<Strin
     Some(format!("the image uses {} of {} {unit}: {why}", rounded(used), rounded(allowed)))
 }
 
+/// Returns a note if one width is asked for of a method that divides bits better.
+pub fn one_width(options: &Options) -> Option<String> {
+    let Budget::Width(width) = options.budget else { return None };
+    let is_divided = options.method == Method::Distill && options.forced.is_empty() && width != Width::W8;
+    is_divided.then(|| {
+        let bits = width.bits();
+        format!("method distill gives each row its own bits by --bpw {bits}: fewer bytes than --bits {bits}, and mostly a smaller error")
+    })
+}
+
 /// Returns all warnings about the recordings, before quantization.
 pub fn of_recordings(recordings: &Recordings) -> Vec<String> {
     let Some(range) = recordings.calib.as_ref().map(Range::of) else { return Vec::new() };
@@ -305,6 +316,20 @@ mod tests {
         assert!(advice(&weights, &quick).ends_with("or learn longer (--steps, --effort)"));
         let rounding = Options::new(Method::Rtn, Budget::BitsPerWeight(2.0));
         assert!(advice(&Check { learned: false, ..check(Some(0.1), 0.3) }, &rounding).ends_with("(--method distill)"));
+    }
+
+    #[test]
+    fn one_width_of_distill_names_the_better_budget() {
+        let of = |method, budget| one_width(&Options::new(method, budget));
+        let note = of(Method::Distill, Budget::Width(Width::W3)).expect("a note");
+        assert!(note.contains("by --bpw 3: fewer bytes than --bits 3"), "{note}");
+        for (method, budget) in [
+            (Method::Distill, Budget::BitsPerWeight(3.0)),
+            (Method::Distill, Budget::Width(Width::W8)),
+            (Method::Gptq, Budget::Width(Width::W3)),
+        ] {
+            assert_eq!(of(method, budget), None);
+        }
     }
 
     #[test]

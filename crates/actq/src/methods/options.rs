@@ -48,6 +48,15 @@ impl Method {
         }
     }
 
+    /// Returns the budget if none is given. Method distill divides bits among rows; the others give all weights one
+    /// width, and so does distill beside widths that the caller forces.
+    pub fn default_budget(&self, is_forced: bool) -> Budget {
+        match self {
+            Self::Distill if !is_forced => Budget::BitsPerWeight(3.0),
+            _ => Budget::Width(Width::W3),
+        }
+    }
+
     /// Returns the fewest frames that the method takes.
     pub fn least_frames(&self) -> usize {
         match self {
@@ -253,6 +262,14 @@ impl Options {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_distill_divides_bits_by_default() {
+        assert_eq!(Method::Distill.default_budget(false), Budget::BitsPerWeight(3.0));
+        for (method, is_forced) in [(Method::Distill, true), (Method::Gptq, false), (Method::Rtn, false)] {
+            assert_eq!(method.default_budget(is_forced), Budget::Width(Width::W3));
+        }
+    }
 
     #[test]
     fn a_matrix_has_one_forced_width() {
