@@ -222,6 +222,15 @@ def test_outliers_and_other_axes_are_said(mlp, observations, caplog):
         quantize(spiked)
 
 
+def test_steps_on_the_first_axis_are_said(mlp, caplog):
+    random, walk = np.random.default_rng(4), np.zeros((8, 100, 12), np.float32)
+    for step in range(1, 100):
+        walk[:, step] = 0.95 * walk[:, step - 1] + 0.3 * random.normal(size=(8, 12))
+    for given, is_said in [(walk, False), (np.swapaxes(walk, 0, 1), True)]:
+        actq.quantize(actq.import_policy(mlp), given, bpw=3, steps=5, progress=False)
+        assert ("recordings looks like [step, robot, value]" in caplog.text) == is_said
+
+
 def test_the_default_of_distill_is_bits_per_weight(mlp, observations):
     policy, options = actq.import_policy(mlp), {"steps": 5, "progress": False}
     assert actq.quantize(policy, observations, **options) == actq.quantize(policy, observations, bpw=3, **options)

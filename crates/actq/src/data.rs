@@ -2,6 +2,7 @@
 //! files.
 
 mod arrays;
+mod axes;
 mod checked;
 #[cfg(test)]
 mod damaged;
@@ -21,6 +22,7 @@ mod tests;
 mod thinning;
 
 pub use arrays::arrays;
+pub use axes::axes_note;
 pub use dataset::Dataset;
 pub(crate) use dataset::mean_and_variance;
 pub use joined::{Learned, MAX_FRAMES, Share, joined, longest_piece};

@@ -36,7 +36,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         note([invalid + ". Its network is read by the operator's definition"]);
     }
     let calib = args.calib.as_ref().map(|path| Dataset::load(path, Sizes::of(&policy))).transpose()?;
-    note(calib.as_ref().and_then(notes::single_steps));
+    note(calib.as_ref().and_then(notes::of_axes));
     note(policy.refused.iter().cloned());
     note(notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))));
     let [calib_npz, others @ ..] = Recording::Calib.paths(&args.out);

@@ -2,7 +2,7 @@
 
 use actq::around::Around;
 use actq::budget::Budget;
-use actq::data::{Dataset, Range, Recordings, outside_note, runs};
+use actq::data::{Dataset, Range, Recordings, axes_note, outside_note, runs};
 use actq::measure::check::{Cause, Check, Checked};
 use actq::measure::eval::{ActivationShare, ErrorReport};
 use actq::methods::distill::balance::MixedUnits;
@@ -221,9 +221,9 @@ pub fn one_width(options: &Options) -> Option<String> {
 pub fn of_recordings(recordings: &Recordings) -> Vec<String> {
     let Some(range) = recordings.calib.as_ref().map(Range::of) else { return Vec::new() };
     let outside = recordings.heldout.as_ref().and_then(|heldout| range.warning(heldout));
-    let single = recordings.calib.as_ref().and_then(single_steps);
+    let axes = recordings.calib.as_ref().and_then(of_axes);
     let far = [&recordings.calib, &recordings.heldout].map(|recording| recording.as_ref().and_then(outside_note));
-    [single, range.constant_note(), outside].into_iter().chain(far).flatten().collect()
+    [axes, range.constant_note(), outside].into_iter().chain(far).flatten().collect()
 }
 
 /// Returns a warning for each matrix that reads observations of very different units without balance.
@@ -239,8 +239,13 @@ pub fn mixed_units(mixed: &[MixedUnits]) -> Vec<String> {
     mixed.iter().map(text).collect()
 }
 
+/// Returns a note if the axes of a recording may be others than episodes and steps.
+pub(crate) fn of_axes(recording: &Dataset) -> Option<String> {
+    single_steps(recording).or_else(|| axes_note(recording))
+}
+
 /// Returns a note if every episode has one step, as in an array of frames with a batch axis.
-pub fn single_steps(recording: &Dataset) -> Option<String> {
+fn single_steps(recording: &Dataset) -> Option<String> {
     let episodes = recording.length.len();
     (episodes > 1 && recording.length.iter().all(|steps| *steps <= 1)).then(|| {
         format!(

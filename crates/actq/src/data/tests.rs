@@ -2,7 +2,7 @@ use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use actq_testkit::{Dtype, safetensors};
+use actq_testkit::{Dtype, Random, safetensors};
 use ndarray::{Array1, Array2, Array3, ArrayD, IxDyn, ShapeBuilder as _, s};
 use tempfile::TempDir;
 
@@ -518,6 +518,35 @@ fn a_frame_that_outweighs_all_others_is_named() {
         note.starts_with("calib.npz: 7") && note.contains("% of the actions' variance comes from episode 2, step 7"),
         "{note}"
     );
+}
+
+#[test]
+fn steps_on_the_axis_of_episodes_are_noticed() {
+    let mut random = Random::new(3);
+    // Episodes of values that follow each other slowly.
+    let mut walk = |episodes: usize, steps: usize| {
+        let mut obs = Array3::zeros((episodes, steps, 3));
+        for (e, v) in (0..episodes).flat_map(|e| (0..3).map(move |v| (e, v))) {
+            let mut value = 0.0;
+            for s in 0..steps {
+                value = 0.95 * value + 0.3 * (random.unit() - 0.5);
+                obs[[e, s, v]] = 10f32.powi(v as i32) * value;
+            }
+        }
+        obs
+    };
+    let obs = walk(8, 300);
+    assert_eq!(axes_note(&recorded("calib.npz", obs.clone())), None);
+    let mut robots = recorded("calib.npz", obs.clone().permuted_axes([1, 0, 2]));
+    let note = axes_note(&robots).expect("a note");
+    assert!(note.starts_with("calib.npz looks like [step, robot, value]: ") && note.contains("swapaxes"), "{note}");
+    // Lengths say what the axes are.
+    robots.length[5] = 7;
+    assert_eq!(axes_note(&robots), None);
+    // Episodes that hardly differ, and frames that do not follow each other.
+    let noise = walk(8, 300);
+    let alike = Array3::from_shape_fn((8, 300, 3), |(e, s, v)| obs[[0, s, v]] + 0.03 * noise[[e, s, v]]);
+    assert_eq!(axes_note(&recorded("calib.npz", alike)), None);
 }
 
 #[test]
