@@ -37,7 +37,7 @@ impl Deployment {
         let joined = Joined::of(plan)?;
         let mut policy = Policy::of(name, without_ignored(&joined.graph));
         policy.around = Some(around::around(plan, &joined)?);
-        policy.rate_hz = rate_hz;
+        (policy.rate_hz, policy.has_rate) = (rate_hz, true);
         policy.contract = ActionContract::default();
         policy.check()?;
         let columns = columns(plan, &joined)?;

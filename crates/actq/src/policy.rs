@@ -30,6 +30,8 @@ pub struct Policy {
     pub act_len: usize,
     /// Control rate in Hz.
     pub rate_hz: f32,
+    /// `true` if its source states the rate; else it is [`DEFAULT_RATE_HZ`].
+    pub has_rate: bool,
     /// Action contract.
     pub contract: ActionContract,
     /// The network; a policy of a folder is read without what it ignores ([`without_ignored`](crate::graph::without_ignored)).
@@ -63,6 +65,7 @@ impl Policy {
             execute: 1,
             act_len: graph.len_of(graph.output()),
             rate_hz: DEFAULT_RATE_HZ,
+            has_rate: false,
             contract: ActionContract::default(),
             weights: graph.weights(),
             parameters: graph.parameters(),

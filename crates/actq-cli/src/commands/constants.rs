@@ -11,7 +11,8 @@ use anyhow::{Context as _, Result, bail, ensure};
 use crate::args::ConstantsArgs;
 use crate::outputs::files::refuse_unlike;
 use crate::report::constants::{Language, source};
-use crate::terminal::{print, reserve};
+use crate::report::inspect::may_be_default;
+use crate::terminal::{note, print, reserve};
 
 /// Writes an image's constants as source code.
 pub(crate) fn run(args: &ConstantsArgs) -> Result<()> {
@@ -38,6 +39,12 @@ pub(crate) fn run(args: &ConstantsArgs) -> Result<()> {
     let source = source(language, &image, prefix, gains)?;
     refuse_unlike(&args.out, &source, args.force)?;
     outputs.write(&[source])?;
+    if may_be_default(&image) {
+        note([format!(
+            "the rate is {} Hz, also the default of policies without a rate; check that it is the rate of your policy",
+            image.rate_hz()
+        )]);
+    }
     print(&format!("{shown}: constants of {}\n", args.image.display()))
 }
 

@@ -41,18 +41,21 @@ pub(super) fn kind(image: &Image<'_>) -> String {
     }
 }
 
+/// Returns whether an image may have its rate by default: it does not say whether its policy stated one; a bundle does.
+pub fn may_be_default(image: &Image<'_>) -> bool {
+    image.rate_hz() == DEFAULT_RATE_HZ && image.ports().next().is_none()
+}
+
 /// Formats the report that `actq inspect` prints.
 pub fn report(image: &Image<'_>) -> String {
     let mut text = String::new();
     let digest = hex(&image.digest());
     let kind = kind(image);
     let (obs, act) = (count(image.obs_len(), "observation"), count(image.act_len(), "action"));
-    // An image does not say whether its policy stated the rate; a bundle does.
-    let is_default = image.rate_hz() == DEFAULT_RATE_HZ && image.ports().next().is_none();
     let rate = format!(
         "{} Hz{}",
         image.rate_hz(),
-        if is_default { ", also the default of policies without a rate" } else { "" }
+        if may_be_default(image) { ", also the default of policies without a rate" } else { "" }
     );
     let _ = writeln!(text, "policy        {}", printable(image.name()));
     let _ = writeln!(text, "source        sha256 {digest}");

@@ -48,14 +48,19 @@ pub fn how_to_record(policy: &Policy) -> String {
     )
 }
 
-/// Returns notes on a policy: actions or targets without limits, what its source does with values that are not finite,
+/// Returns notes on a policy: actions or targets without limits, a rate that its source does not state, what its source does with values that are not finite,
 /// and actions of its source that it does not have.
 pub fn of_policy(policy: &Policy) -> Vec<String> {
     let limits = match &policy.around {
         Some(around) => targets_without_limits(around),
         None => without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))),
     };
-    limits.into_iter().chain(guards(&policy.guards)).chain(policy.refused.iter().cloned()).collect()
+    limits
+        .into_iter()
+        .chain(default_rate(policy))
+        .chain(guards(&policy.guards))
+        .chain(policy.refused.iter().cloned())
+        .collect()
 }
 
 /// Returns a note on what a policy's source does with values that are not finite.
@@ -66,6 +71,17 @@ pub(crate) fn guards<'a>(guards: impl IntoIterator<Item = &'a String>) -> Option
             "{}. The image has none of these: a step with NaN or infinity in its observation is refused, and the application must \
              replace such values before the step",
             all.join("; ")
+        )
+    })
+}
+
+/// Returns a note if a policy has the default rate because its source states none.
+pub(crate) fn default_rate(policy: &Policy) -> Option<String> {
+    (!policy.has_rate).then(|| {
+        format!(
+            "the policy states no control rate, and the image has {} Hz, the default: pass --rate-hz HZ to actq import, or set \
+             control_hz in policy.json",
+            policy.rate_hz
         )
     })
 }

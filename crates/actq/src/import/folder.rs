@@ -180,6 +180,7 @@ fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) 
         execute,
         act_len: json.act_dim,
         rate_hz: positive(json.control_hz.unwrap_or(f64::from(DEFAULT_RATE_HZ)), "control_hz")?,
+        has_rate: json.control_hz.is_some(),
         contract: json.contract(kind)?,
         weights,
         parameters,

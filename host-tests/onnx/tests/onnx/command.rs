@@ -125,6 +125,10 @@ fn quantize_says_what_it_takes_of_a_file() -> Result<()> {
         noted.contains("note: output \"discrete_action\" is named action, too, and is left out, as it cannot be"),
         "{noted}"
     );
+    ensure!(
+        noted.contains("note: the policy states no control rate, and the image has 50 Hz, the default: "),
+        "{noted}"
+    );
     Ok(())
 }
 
