@@ -316,6 +316,15 @@ fn are_sides(before: &str, after: &str) -> bool {
             ["state", "states", "hidden", "memory", "history", "hist", "carry", "h", "h0", "h1", "hn"].contains(&part)
         })
     };
+    // Words that only together say what they are.
+    let opposite = [("init", "final"), ("initial", "final"), ("past", "present")];
+    let without = |name: &str, word: &str| {
+        let rest: Vec<String> = parts(name).filter(|part| part != word).collect();
+        (rest.len() < parts(name).count()).then(|| stem(&rest.join("_")))
+    };
+    if opposite.iter().any(|(a, b)| without(before, a).is_some_and(|rest| without(after, b) == Some(rest))) {
+        return true;
+    }
     let (from, to) = (stem(before), stem(after));
     // state_in and state_out have nothing else in their names; history and updated_history have more in one.
     let is_within = from.is_empty() || to.is_empty() || from.contains(&to) || to.contains(&from);
@@ -346,6 +355,9 @@ mod tests {
             ("h_t", "h_t1"),
             ("history", "updated_history"),
             ("lstm.hidden", "lstm.hidden.next"),
+            ("init_state", "final_state"),
+            ("past", "present"),
+            ("past_mem.0", "present_mem.0"),
         ] {
             assert!(are_sides(before, after), "{before} {after}");
         }
@@ -356,6 +368,8 @@ mod tests {
             ("state", "value"),
             ("robot_state", "goal_state"),
             ("history", "latent"),
+            ("present_position", "position"),
+            ("past_mem", "present_key"),
         ] {
             assert!(!are_sides(before, after), "{before} {after}");
         }
