@@ -2,8 +2,8 @@
 
 use actq::error::{Context as _, Result, ensure};
 
-use super::super::common::ACTION;
 use super::super::common::action::{add_zero, clip_to, padded};
+use super::super::common::{ACTION, counts};
 use super::Reader;
 use super::observation::{Ports, operand};
 use super::values::SEVERAL;
@@ -42,6 +42,13 @@ impl Reader<'_> {
                 (action.kind.with_context(|| format!("profile {}: the action has no kind", self.family))?, Vec::new())
             }
         };
+        if let Some(key) = &action.joints {
+            let path = self.values.path(key, "")?;
+            let places = document.peek(&path).and_then(counts);
+            if places.is_none_or(|places| places.into_iter().eq(0..n)) {
+                document.node(&path);
+            }
+        }
         let mut from = ACTION;
         if let Some(limit) = &action.limit {
             let (limit, at) = self.values.one(limit, "", 100.0)?;

@@ -218,6 +218,8 @@ pub(super) struct Action {
     pub(super) relative: bool,
     /// Key of limits after the scale, a pair for each value.
     pub(super) clip: Option<String>,
+    /// Key of the action's joints. Another list than all in order is a question, as nothing reads it.
+    pub(super) joints: Option<String>,
     /// Rule of the value that is fed back: "raw", "clipped" or "processed".
     pub(super) fed_back: Option<String>,
     /// Rule that is true if an action of fewer values than joints moves the last ones.
