@@ -114,7 +114,7 @@ def test_agents_that_choose_give_centred_scores():
 
     agent, observations = Chooser(), np.random.default_rng(1).normal(size=(20, 3)).astype(np.float32)
     with torch.no_grad():
-        agent.actor.bias.add_(50)
+        agent.actor[-1].bias.add_(50)
     scores = agent.actor(torch.from_numpy(observations)).detach().numpy()
     expected = scores - scores.mean(axis=1, keepdims=True)
     np.testing.assert_allclose(actq.import_policy(agent)(observations), expected, rtol=1e-4, atol=1e-4)

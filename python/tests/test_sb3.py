@@ -83,14 +83,15 @@ def test_an_image_does_not_learn_what_all_scores_have_in_common(algorithm, optio
     made = model(algorithm, spaces.Discrete(4), **options)
     layer = made.policy.get_submodule(last)
     with torch.no_grad():
-        layer.weight.mul_(0.1).add_(torch.randn(1, layer.in_features))
+        layer.weight.add_(10 * torch.randn(1, layer.in_features))
         layer.bias.add_(100)
-    observations = np.random.default_rng(0).normal(size=(300, 17)).astype(np.float32)
+    before, observations = layer.weight.clone(), np.random.default_rng(0).normal(size=(300, 17)).astype(np.float32)
     expected, _ = made.policy.predict(observations, deterministic=True)
     for policy in (actq.import_policy(made), actq.import_policy(made.policy, torch.zeros(1, 17))):
         assert np.abs(policy(observations).mean(axis=1)).max() < 1e-4 and len(set(expected)) > 1
         image = actq.quantize(policy, bits=8, method="rtn", activations=16, progress=False)
         assert (actq.Head(image)(observations).argmax(axis=1) == expected).mean() > 0.95
+    assert torch.equal(layer.weight, before), "the model stays as it is"
 
 
 def test_other_objects_are_refused_with_the_right_one(tmp_path):

@@ -31,18 +31,13 @@ class Model(NamedTuple):
     #: Typical observations of one episode [frame, value], and what the model itself does at them.
     observations: Array
     predict: Callable[[Array], Array]
-    #: The model's values are scores of a choice, which the module centres.
-    is_choice: bool = False
 
     def compare(self, policy: Policy, name: str, limits: Limits) -> None:
         """Refuses a policy that gives other actions than the model within these limits."""
         low, high, _ = limits
         expected = np.clip(self.predict(self.observations), low or -np.inf, high or np.inf)
-        # What all scores have in common is rounded with them.
-        largest = max(np.abs(expected).max(), 1e-30)
-        if self.is_choice:
-            expected = expected - expected.mean(axis=1, keepdims=True, dtype=np.float64)
-        error = np.abs(policy(self.observations) - expected).max() / largest
+        found = policy(self.observations)
+        error = np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-30)
         if not error <= TOLERANCE:
             raise Error(f"{name}: the policy is off by {error:.1e} of the largest action that the model predicts; please report it")
 
@@ -135,11 +130,10 @@ def _of_sb3(model: Any, name: str) -> Model:
             # Of a choice, predict gives only the index of the largest score; the import compares it.
             parts = list(given.values()) if isinstance(given, dict) else [given]
             flat = np.concatenate([part.reshape(len(rows), -1) for part in parts], axis=1)
-            given = step.observation(torch.from_numpy(flat).to(policy.device))
-            return np.asarray(step.scores(given).detach().cpu().numpy())
+            return np.asarray(step(torch.from_numpy(flat).to(policy.device)).detach().cpu().numpy())
         return np.asarray(model.predict(given, deterministic=True)[0], np.float32).reshape(len(rows), -1)
 
-    return Model(module, (torch.zeros(1, mean.size),), None, None, observations, predict, step.kind == "Discrete")
+    return Model(module, (torch.zeros(1, mean.size),), None, None, observations, predict)
 
 
 def _stacked_frames(env: Any) -> int:
@@ -181,17 +175,6 @@ def _of_rsl_rl(runner: Any, name: str) -> Model:
     return Model(module, example, list(module.input_names), list(module.output_names), observations, predict)
 
 
-class _Scores(torch.nn.Module):
-    """The centred scores of an actor that chooses."""
-
-    def __init__(self, actor: Any) -> None:
-        super().__init__()
-        self.actor = actor
-
-    def forward(self, obs: torch.Tensor) -> Any:
-        return _sb3.centred(self.actor(obs))
-
-
 class _SacAction(torch.nn.Module):
     """The deterministic action of a SAC actor of CleanRL."""
 
@@ -217,24 +200,21 @@ def _of_clean_rl(agent: Any, name: str) -> Optional[Model]:
         module = getattr(agent, "actor_mean", None) or getattr(agent, "actor", None)
         if not isinstance(module, torch.nn.Module):
             return None
+        if not hasattr(agent, "actor_mean") and not hasattr(agent, "actor_logstd"):
+            # The actor of a choice.
+            _sb3.centre(module)
     elif hasattr(agent, "get_action") and hasattr(agent, "action_scale"):
         module = _SacAction(agent)
     else:
         return None
     first = next((layer for layer in module.modules() if isinstance(layer, torch.nn.Linear)), layers[0])
-    example = torch.zeros(1, first.in_features, device=device)
-    if not isinstance(module, _SacAction):
-        with torch.random.fork_rng([]):
-            is_choice = not agent.get_action_and_value(example)[0].is_floating_point()
-        module = _Scores(module) if is_choice else module
 
     def predict(rows: Array) -> Array:
         obs = torch.from_numpy(rows).to(device)
         if isinstance(module, _SacAction):
             return np.asarray(module(obs).detach().cpu().numpy())
         seen: List[Tuple[Any, Any]] = []
-        actor = module.actor if isinstance(module, _Scores) else module
-        hook = actor.register_forward_hook(lambda _, given, found: seen.append((given[0], found)))
+        hook = module.register_forward_hook(lambda _, given, found: seen.append((given[0], found)))
         with torch.random.fork_rng([]):
             agent.get_action_and_value(obs)
         hook.remove()
@@ -242,4 +222,5 @@ def _of_clean_rl(agent: Any, name: str) -> Optional[Model]:
             raise Error(f"{name}: the agent computes before its actor; pass a module that returns the mean action")
         return np.asarray(seen[0][1].detach().cpu().numpy())
 
-    return Model(module, (example,), None, None, drawn(first.in_features), predict, isinstance(module, _Scores))
+    example = torch.zeros(1, first.in_features, device=device)
+    return Model(module, (example,), None, None, drawn(first.in_features), predict)

@@ -21,15 +21,19 @@ def is_of(source: Any, name: str, package: str) -> bool:
     return any(base.__name__ == name and base.__module__.startswith(package) for base in type(source).__mro__)
 
 
-def centred(scores: torch.Tensor) -> torch.Tensor:
-    """Subtracts the mean of the scores of a choice. The largest stays the largest, and an image does not learn a part that is
-    common to all, as the value of a state."""
-    return scores - scores.mean(dim=-1, keepdim=True)
+def centre(scores: Any) -> None:
+    """Makes the mean of the scores of a choice 0, if its module ends in a matrix. The largest stays the largest, and an image
+    does not learn a part that is common to all, as the value of a state."""
+    last = scores[-1] if isinstance(scores, torch.nn.Sequential) and len(scores) else scores
+    if type(last) is torch.nn.Linear:
+        with torch.no_grad():
+            for values in last.parameters():
+                values.copy_(values.double() - values.double().mean(dim=0))
 
 
 class Deterministic(torch.nn.Module):
-    """What `policy.predict(obs, deterministic=True)` returns, before the limits of the action space. For Discrete, centred
-    scores whose largest is that action."""
+    """What `policy.predict(obs, deterministic=True)` returns, before the limits of the action space. For Discrete, scores
+    whose largest is that action. It changes the policy, a copy: it centres the scores."""
 
     low: torch.Tensor
     high: torch.Tensor
@@ -48,6 +52,9 @@ class Deterministic(torch.nn.Module):
             raise Error(f"{name}: the policy is recurrent; pass a module of its actor that takes and returns its states")
         if self.kind not in ("Box", "Discrete") or self.kind == "Discrete" and not has_scores:
             raise Error(f"{name}: the actions are {space}; pass a module of the policy's actor that returns its scores")
+        if self.kind == "Discrete":
+            q_net = getattr(policy, "q_net", None)
+            centre(policy.action_net if q_net is None else getattr(q_net, "q_net", q_net))
         if self.kind == "Box" and policy.squash_output:
             for side in ("low", "high"):
                 values = torch.from_numpy(getattr(space, side).astype(np.float32)).to(policy.device)
@@ -56,18 +63,16 @@ class Deterministic(torch.nn.Module):
     def forward(self, given: torch.Tensor) -> Any:
         policy, obs = self.policy, self.observation(given)
         if self.kind == "Discrete":
-            return centred(self.scores(obs))
+            if hasattr(policy, "q_net") and isinstance(policy.q_net, torch.nn.Sequential):
+                return policy(obs)
+            if hasattr(policy, "q_net"):
+                return policy.q_net(obs)
+            features = policy.extract_features(obs, policy.pi_features_extractor)
+            return policy.action_net(policy.mlp_extractor.forward_actor(features))
         action = policy._predict(obs, deterministic=True)
         if policy.squash_output:
             return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
         return action
-
-    def scores(self, obs: Any) -> Any:
-        policy = self.policy
-        if hasattr(policy, "q_net"):
-            return policy(obs) if isinstance(policy.q_net, torch.nn.Sequential) else policy.q_net(obs)
-        features = policy.extract_features(obs, policy.pi_features_extractor)
-        return policy.action_net(policy.mlp_extractor.forward_actor(features))
 
     def limits(self) -> Tuple[Array, Array]:
         """Returns lowest and highest actions; an action that is scaled to them has no others."""
