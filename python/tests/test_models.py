@@ -218,7 +218,8 @@ def test_what_a_policy_has_of_a_module_is_said(caplog):
             return self.force(x), self.actor(x + 2 * y)
 
     with caplog.at_level("INFO", "actq"):
-        policy = actq.import_policy(Parts(), (torch.zeros(1, 3), torch.zeros(1, 3)), input_names=["b", "a"], output_names=["reaction_force", "action"])
+        given, outputs = (torch.zeros(1, 3), torch.zeros(1, 3)), ["reaction_force", "action"]
+        policy = actq.import_policy(Parts(), given, input_names=["b", "a"], output_names=outputs)
     assert policy.ports.splitlines() == [
         "input     obs[0:3] = b",
         "          obs[3:6] = a",

@@ -514,10 +514,7 @@ fn a_frame_that_outweighs_all_others_is_named() {
     let thin = dataset.thinned(300, false);
     assert_eq!(thin.frames(), 300);
     let note = heavy_note(&thin, &dataset).expect("a note");
-    assert!(
-        note.starts_with("calib.npz: 7") && note.contains("% of the actions' variance comes from episode 2, step 7"),
-        "{note}"
-    );
+    assert!(note.contains("% of the actions' variance comes from episode 2, step 7, "), "{note}");
 }
 
 #[test]
