@@ -58,6 +58,63 @@ def test_a_module_with_an_operator_of_the_newer_exporter_is_imported(observation
     near(actq.import_policy(module, torch.zeros(1, 12)), module, observations)
 
 
+def test_the_newer_exporter_gets_a_module_in_evaluation_mode():
+    pytest.importorskip("onnxscript", reason="onnxscript is not installed (requirements-optional.txt)")
+
+    class Value(nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.body = nn.Sequential(nn.RMSNorm(12), nn.BatchNorm1d(12), nn.Dropout(0.5))
+            self.out, self.value = nn.Linear(12, 4), nn.Linear(12, 1)
+
+        def forward(self, obs):
+            x = self.body(obs)
+            return {"action": self.out(x), "value": self.value(x)}
+
+    # The tracing exporter, which is tried first, sets the mode of all parts to that of the whole.
+    assert actq.import_policy(Value().eval(), torch.zeros(1, 12)).act_len == 4
+
+
+class Codes(torch.Tensor):
+    """Weights of 8 bits and their scale, with the operations of a Linear layer and no others, as torchao's."""
+
+    @staticmethod
+    def __new__(cls, codes, scale):
+        made = torch.Tensor._make_wrapper_subclass(cls, codes.shape, dtype=scale.dtype)
+        made.codes, made.scale = codes, scale
+        return made
+
+    def __tensor_flatten__(self):
+        return ["codes", "scale"], None
+
+    def __deepcopy__(self, memo):
+        return Codes(self.codes.clone(), self.scale.clone())
+
+    @classmethod
+    def __torch_function__(cls, function, types, args=(), kwargs=None):
+        if function is nn.functional.linear:
+            x, weight, bias = args
+            return function(x, weight.codes * weight.scale, bias)
+        with torch._C.DisableTorchFunctionSubclass():
+            return function(*args, **(kwargs or {}))
+
+    @classmethod
+    def __torch_dispatch__(cls, function, types, args=(), kwargs=None):
+        if function is torch.ops.aten.detach.default:
+            return Codes(args[0].codes, args[0].scale)
+        raise NotImplementedError(f"{function}")
+
+
+def test_quantized_weights_of_a_module_are_imported(observations):
+    torch.manual_seed(0)
+    module = nn.Sequential(nn.Linear(12, 32), nn.ELU(), nn.Linear(32, 4)).eval()
+    for layer in (module[0], module[2]):
+        scale = layer.weight.detach().abs().amax(dim=1, keepdim=True) / 127
+        codes = (layer.weight.detach() / scale).round().to(torch.int8)
+        layer.weight = nn.Parameter(Codes(codes, scale), requires_grad=False)
+    near(actq.import_policy(module, torch.zeros(1, 12)), module, observations)
+
+
 def test_a_torchscript_file_is_imported(observations, tmp_path):
     module = actor().eval()
     torch.jit.script(module).save(tmp_path / "actor.pt")

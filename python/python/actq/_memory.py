@@ -61,8 +61,17 @@ def values_of(module: Any) -> Dict[str, Tuple[Any, str, Any]]:
     return found
 
 
+def wrapped(tensor: torch.Tensor) -> List[torch.Tensor]:
+    """Returns the tensors inside a wrapper, as of quantized weights, which knows few operations itself."""
+    names, _ = getattr(tensor, "__tensor_flatten__", lambda: ([], None))()
+    return [getattr(tensor, name) for name in names]
+
+
 def _same(a: Any, b: Any, depth: int) -> bool:
     if isinstance(a, torch.Tensor) and isinstance(b, torch.Tensor):
+        inside, other = wrapped(a), wrapped(b)
+        if inside or other:
+            return len(inside) == len(other) and all(_same(x, y, depth) for x, y in zip(inside, other))
         return a.shape == b.shape and bool(((a == b) | ((a != a) & (b != b))).all())
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         return a.tobytes() == b.tobytes()

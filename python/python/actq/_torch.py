@@ -16,7 +16,7 @@ import torch
 
 from . import _actq, _sb3
 from ._actq import Error, Policy
-from ._memory import changed_values, depends_on, kept_tensors, values_of
+from ._memory import changed_values, depends_on, kept_tensors, values_of, wrapped
 from ._typing import Array, Limits
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ class Source:
         """Exports by the tracing exporter, which needs only torch, else by that of torch.export, which knows more
         operators."""
         module: Any = self.copied()
-        module = module if len(self.output_names) < 2 else Flat(module, self.name)
+        module = module if len(self.output_names) < 2 else Flat(module, self.name).eval()
         names: Dict[str, Any] = {"input_names": self.input_names or None, "output_names": self.output_names or None}
         file = io.BytesIO()
         try:
@@ -275,7 +275,7 @@ class Source:
         for _ in range(DRAWS):
             module = self.copied()
             for weight in [*module.parameters(), *module.buffers()]:
-                if weight.is_floating_point():
+                if weight.is_floating_point() and not wrapped(weight):
                     sign = torch.randint(2, weight.shape, generator=random).to(weight.device) * 2 - 1
                     weight.mul_(1 + torch.finfo(torch.float32).eps * sign.to(weight.dtype))
             own = np.abs(self.run(module, plan, plan["probes"]) - found).max(axis=1)
