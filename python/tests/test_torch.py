@@ -311,6 +311,18 @@ def test_memory_of_a_torchscript_file_is_refused(tmp_path):
         actq.import_policy(tmp_path / "filter.pt", torch.zeros(1, 6))
 
 
+def test_the_reasons_of_both_exporters_are_given():
+    pytest.importorskip("onnxscript", reason="onnxscript is not installed (requirements-optional.txt)")
+
+    class Whole(nn.Module):
+        def forward(self, obs):
+            eighths = (obs * 8).to(torch.int8)
+            return torch._int_mm(eighths.expand(32, 12)[:, :8], torch.ones(8, 8, dtype=torch.int8)).float()
+
+    with pytest.raises(actq.Error, match="torch cannot export the module: .*; nor can its newer exporter: .*_int_mm"):
+        actq.import_policy(Whole(), torch.zeros(1, 12))
+
+
 def test_a_failed_export_prints_no_graph(capfd, tmp_path):
     torch.jit.script(Cell()).save(tmp_path / "cell.pt")
     capfd.readouterr()

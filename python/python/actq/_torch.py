@@ -195,12 +195,15 @@ class Source:
             torch.onnx.export(module, self.inputs, file, opset_version=OPSET, dynamo=False, **names)  # type: ignore[arg-type]
             return file.getvalue()
         except Exception as error:
+            why = reason(error)
             if not self.is_script and find_spec("onnxscript") is not None:
-                with contextlib.suppress(Exception):
+                try:
                     program = torch.onnx.export(module, self.inputs, dynamo=True, verbose=False, **names)
                     assert program is not None, "without a file torch returns the program"
                     return bytes(program.model_proto.SerializeToString())
-            raise Error(f"{self.name}: torch cannot export the module: {reason(error)}") from error
+                except Exception as newer:
+                    why += f"; nor can its newer exporter: {reason(newer)}"
+            raise Error(f"{self.name}: torch cannot export the module: {why}") from error
 
     def run(self, module: Any, plan: Dict[str, Any], probes: Array) -> Array:
         """Runs a copy over observations [block, frame, value], with its states carried on; returns outputs [block, frame,
