@@ -56,7 +56,9 @@ pub(super) fn read(yaml: &Document, asset: &str, group: &str, joints: Joints) ->
     let terms = terms(yaml, group, &joints, &actions)?;
     // From release 3.0.0 on a group has an order, which the exporter leaves out.
     let group = format!("observations.{group}");
-    let has_order = yaml.keys(&group).iter().any(|item| no_delay(yaml, &format!("{group}.{item}.overloads")));
+    // Each term's delay is read.
+    let has_order =
+        yaml.keys(&group).iter().fold(false, |has, item| no_delay(yaml, &format!("{group}.{item}.overloads")) || has);
     let layout = has_order.then(|| Layout::Left(yaml.location(&group)));
     let decimation = yaml.number("scene.decimation")?;
     Ok(Policy { rate, decimation, joints, default, default_velocity, limits, gains, terms, layout, actions })
