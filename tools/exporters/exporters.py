@@ -58,7 +58,7 @@ def row(kind, form, make, act=None, width=OBS, discrete=False, episode=None, tol
     try:
         policy = actq.import_policy(source, **options)
     except actq.Error as error:
-        return outcome(kind, form, f"{'asks' if 'says profile' in str(error) else 'refused'}: {short(error)}")
+        return outcome(kind, form, f"{'asks' if 'open; write answers' in str(error) else 'refused'}: {short(error)}")
     rows = observations(policy.obs_len) if rows is None else np.asarray(rows, np.float32)
     try:
         expected = run_file(source, rows, policy) if expected is None else expected
@@ -84,7 +84,8 @@ def short(error):
     text = " ".join(str(error).split()) or type(error).__name__
     for place in (tempfile.gettempdir(), os.getcwd(), sys.prefix):
         text = text.replace(place + "/", "")
-    text = re.sub(r"\.tmp\w+/|\x1b\[\d*m", "", re.sub(r"0x[0-9a-f]+", "0x..", text))
+    # Of an error of the tracing exporter, what follows are places.
+    text = re.sub(r"\.tmp\w+/|\x1b\[\d*m|, scope: .*", "", re.sub(r"0x[0-9a-f]+", "0x..", text))
     return text if len(text) < 160 else text[:160] + " .."
 
 
@@ -631,25 +632,30 @@ def tianshou():
 def torchao():
     import torch
     from torch import nn
-    from torchao.quantization import Int4WeightOnlyConfig, Int8DynamicActivationInt8WeightConfig, Int8WeightOnlyConfig, quantize_
-    from torchao.quantization.qat import QATConfig
+    from torchao.quantization import Int8DynamicActivationInt8WeightConfig, Int8WeightOnlyConfig, IntxWeightOnlyConfig, quantize_
+    from torchao.quantization.granularity import PerGroup
+    from torchao.quantization.qat import IntxFakeQuantizeConfig, QATConfig
 
-    def quantized(config):
+    def quantized(*steps):
         torch.manual_seed(0)
         module = nn.Sequential(nn.Linear(OBS, 64), nn.ELU(), nn.Linear(64, ACT)).eval()
-        quantize_(module, config())
+        for config in steps:
+            quantize_(module, config)
         return module
 
-    for kind, config in [
-        ("int8 weights", Int8WeightOnlyConfig),
-        ("int8 weights and activations", Int8DynamicActivationInt8WeightConfig),
-        ("int4 weights", lambda: Int4WeightOnlyConfig(group_size=32)),
-        ("quantization-aware, int8 activations", lambda: QATConfig(Int8DynamicActivationInt8WeightConfig(), step="prepare")),
+    four = IntxWeightOnlyConfig(weight_dtype=torch.int4, granularity=PerGroup(4))
+    weights = IntxFakeQuantizeConfig(torch.int4, group_size=4)
+    for kind, *config in [
+        ("int8 weights", Int8WeightOnlyConfig()),
+        ("int4 weights, groups of 4", four),
+        ("int8 weights and activations", Int8DynamicActivationInt8WeightConfig()),
+        ("quantization-aware, int4 weights", QATConfig(weight_config=weights, step="prepare")),
+        ("quantization-aware, converted", QATConfig(four, step="prepare"), QATConfig(four, step="convert")),
     ]:
         made = []
 
         def module(made=made, config=config):
-            made[:] = made or [quantized(config)]
+            made[:] = made or [quantized(*config)]
             return made[0]
 
         act = acts(lambda x, module=module: module()(x))
@@ -979,6 +985,314 @@ def kinfer():
             return actions
 
         row(kind, "kinfer archive", make, act, width, accept_profile=True, answers={"packed.rate_hz": 50, "packed.target": "position"})
+
+
+@package
+def mjlab():
+    from dataclasses import asdict
+
+    import torch
+    from mjlab.envs import ManagerBasedRlEnv
+    from mjlab.rl import RslRlVecEnvWrapper
+    from mjlab.tasks.registry import load_env_cfg, load_rl_cfg, load_runner_cls
+
+    import mjlab.tasks
+
+    def still(frames=60):
+        """A motion file of the tracking task: a G1 that sways on the spot."""
+        from mjlab.asset_zoo.robots import get_g1_robot_cfg
+        from mjlab.entity import Entity
+
+        robot = Entity(get_g1_robot_cfg())
+        joints, bodies = len(robot.joint_names), len(robot.body_names)
+        phase = np.arange(frames)[:, None] / 50 + np.arange(joints)
+        upright = np.zeros((frames, bodies, 4))
+        upright[:, :, 0] = 1
+        zeros = np.zeros((frames, bodies, 3))
+        np.savez(
+            Path(tempfile.gettempdir(), "motion.npz"), joint_pos=0.1 * np.sin(phase), joint_vel=0.1 * np.cos(phase),
+            body_pos_w=zeros + [0, 0, 0.8], body_quat_w=upright, body_lin_vel_w=zeros, body_ang_vel_w=zeros,
+        )  # fmt: skip
+        return str(Path(tempfile.gettempdir(), "motion.npz"))
+
+    def scaled(cfg):
+        terms = cfg.observations["actor"].terms
+        terms["base_ang_vel"].scale, terms["joint_vel"].scale, terms["joint_vel"].clip = 0.25, 0.05, (-10.0, 10.0)
+        terms["command"].scale = (2.0, 2.0, 0.25)
+
+    def history(cfg):
+        cfg.observations["actor"].history_length = 3
+
+    def lstm(actor):
+        actor.class_name, actor.rnn_type, actor.rnn_hidden_dim, actor.rnn_num_layers = "RNNModel", "lstm", 16, 1
+
+    flat, rough = "Mjlab-Velocity-Flat-Unitree-Go1", "Mjlab-Velocity-Rough-Unitree-Go1"
+    for kind, task, change, network in [
+        ("Go1 flat", flat, None, None),
+        ("Go1 flat, scales and clips", flat, scaled, None),
+        ("Go1 flat, history of 3", flat, history, None),
+        ("Go1 flat, LSTM", flat, None, lstm),
+        ("Go1 rough, height scan", rough, None, None),
+        ("G1 tracking", "Mjlab-Tracking-Flat-Unitree-G1", None, None),
+    ]:
+        made, path = [], folder("mjlab")
+
+        def make(task=task, change=change, network=network, made=made, path=path):
+            cfg, agent = load_env_cfg(task), load_rl_cfg(task)
+            cfg.scene.num_envs, cfg.seed, cfg.terminations = 1, 0, {}
+            for term in cfg.observations["actor"].terms.values():
+                term.noise = None
+            if "Tracking" in task:
+                cfg.commands["motion"].motion_file = still()
+            change and change(cfg)
+            agent.logger, agent.upload_model = "tensorboard", False
+            agent.actor.hidden_dims, agent.critic.hidden_dims = (32, 16), (16,)
+            network and network(agent.actor)
+            torch.manual_seed(0)
+            env = RslRlVecEnvWrapper(ManagerBasedRlEnv(cfg=cfg, device="cpu"), clip_actions=agent.clip_actions)
+            runner = load_runner_cls(task)(env, asdict(agent), str(path), "cpu")
+            runner.alg.train_mode()
+            for _ in range(3):
+                runner.alg.get_policy().update_normalization(env.get_observations())
+            runner.alg.eval_mode()
+            with torch.no_grad():
+                # The action is fed back: a large one grows from step to step.
+                for weights in list(runner.alg.get_policy().mlp.parameters())[-2:]:
+                    weights.mul_(0.02)
+            runner.save(str(path / "model_0.pt"))
+            made[:] = [env, runner]
+            return str(path)
+
+        def episode(made=made):
+            env, runner = made
+            inner, act = env.unwrapped, runner.get_inference_policy("cpu")
+            robot, manager = inner.scene["robot"], inner.observation_manager
+            runner.alg.get_policy().reset() if runner.alg.get_policy().is_recurrent else None
+            obs, _ = env.reset()
+            rows, targets = [], []
+            for _ in range(12):
+                raw = [robot.data.joint_pos_biased, robot.data.joint_vel]
+                for name in manager.active_terms["actor"]:
+                    term = manager.get_term_cfg("actor", name)
+                    if name not in ("joint_pos", "joint_vel", "actions"):
+                        raw.append(term.func(inner, **term.params))
+                rows.append(torch.cat([part.reshape(-1) for part in raw]).numpy().copy())
+                with torch.inference_mode():
+                    obs, *_ = env.step(act(obs))
+                targets.append(inner.action_manager.get_term("joint_pos")._processed_actions[0].numpy().copy())
+            return rows, targets
+
+        answers = {"rate_hz": 50, **({"raw.height_scan": 187} if task == rough else {})}
+        # The metadata have three decimals.
+        row(kind, "runner.save", make, episode=episode, tolerance=1e-3, accept_profile=True, answers=answers)
+
+
+@package
+def holosoma():
+    import dataclasses
+    from types import SimpleNamespace as Stub
+
+    from holosoma.config_values.loco.g1.observation import g1_29dof_loco_single_wolinvel as preset
+    from holosoma.config_values.robot import g1_29dof as robot
+    from holosoma.managers.observation.manager import ObservationManager
+    from holosoma.utils.inference_helpers import attach_onnx_metadata, export_policy_as_onnx, get_control_gains_from_config
+    from holosoma.utils.safe_torch_import import torch
+
+    names = list(robot.dof_names)
+    default = torch.tensor([[robot.init_state.default_joint_angles[name] for name in names]])
+    scale, limit = float(robot.control.action_scale), robot.control.action_clip_value
+    # The simulator needs a GPU: the observation manager reads drawn values.
+    gait = Stub()
+    env = Stub(
+        num_envs=1, device="cpu", simulator=Stub(), base_quat=torch.tensor([[0.0, 0.0, 0.0, 1.0]]), default_dof_pos=default,
+        action_manager=Stub(), command_manager=Stub(get_state=lambda name: gait),
+    )  # fmt: skip
+
+    def draw(random, action, phase):
+        simulator = env.simulator
+        simulator.dof_pos = default + 0.1 * torch.randn(default.shape, generator=random)
+        simulator.dof_vel = torch.randn(default.shape, generator=random)
+        simulator.robot_root_states = torch.randn((1, 13), generator=random)
+        env.command_manager.commands = torch.randn((1, 3), generator=random)
+        env.action_manager.action, gait.phase = action, phase.float()
+        turn, command = simulator.robot_root_states[0, 10:13], env.command_manager.commands[0]
+        return {
+            "base_ang_vel": turn, "command_lin_vel": command[:2], "command_ang_vel": command[2:], "dof_pos": simulator.dof_pos[0],
+            "dof_vel": simulator.dof_vel[0], "projected_gravity": torch.tensor([0.0, 0.0, -1.0]),
+        }  # fmt: skip
+
+    for kind, frames in (("G1 walking preset", 1), ("G1 walking preset, history of 3", 3)):
+        group = dataclasses.replace(preset.groups["actor_obs"], enable_noise=False, history_length=frames)
+        cfg, made = dataclasses.replace(preset, groups={"actor_obs": group}), []
+
+        def make(cfg=cfg, made=made):
+            draw(torch.Generator(), torch.zeros_like(default), torch.zeros(1, 2))
+            manager = ObservationManager(cfg, env, device="cpu")
+            layout = manager.get_observation_layout(["actor_obs"])
+            length = sum(term["dim"] * term["history_length"] for term in layout)
+            torch.manual_seed(0)
+            network = torch.nn.Sequential(torch.nn.Linear(length, 16), torch.nn.ELU(), torch.nn.Linear(16, len(names))).eval()
+            path = str(folder("holosoma") / "policy.onnx")
+            export_policy_as_onnx(network, path, {"actor_obs": torch.zeros(1, length)})
+            stiffness, damping = get_control_gains_from_config(robot)
+            attach_onnx_metadata(path, {
+                "dof_names": names, "kp": stiffness, "kd": damping, "action_scale": scale, "command_ranges": {"lin_vel_x": [-1, 1]},
+                "observation_layout": layout, "observation_clip": cfg.clip_observations,
+            })  # fmt: skip
+            made[:] = [manager, network, layout]
+            return path
+
+        def episode(made=made):
+            manager, network, layout = made
+            random, action = torch.Generator().manual_seed(1), torch.zeros_like(default)
+            rows, targets, phase = [], [], torch.tensor([[0.0, np.pi]], dtype=torch.float64)
+            for _ in range(STEPS):
+                # A gait of one second, at 50 Hz.
+                phase = (phase + 2 * np.pi / 50 + np.pi) % (2 * np.pi) - np.pi
+                raw = draw(random, action, phase)
+                with torch.no_grad():
+                    action = network(manager.compute()["actor_obs"]).clamp(-limit, limit)
+                rows.append(torch.cat([raw[term["name"]] for term in layout if term["name"] in raw]).numpy())
+                targets.append((action * scale + default)[0].numpy())
+            return rows, targets
+
+        answers = {"rate_hz": 50, "gait_period": 1.0, "gravity": "vector", "default": default[0].tolist()}
+        row(kind, "attach_onnx_metadata", make, episode=episode, accept_profile=True, answers=answers)
+
+
+@package
+def isaaclab():
+    from types import SimpleNamespace as Stub
+
+    import isaaclab.envs.mdp as mdp
+    import torch
+    import yaml
+    from isaaclab.envs.utils.io_descriptors import export_articulations_data, export_scene_data
+    from isaaclab.managers import ActionManager, ObservationGroupCfg, ObservationManager, ObservationTermCfg
+    from isaaclab.utils import configclass
+    from isaaclab.utils.string import resolve_matching_names
+
+    names = [f"{leg}_{part}_joint" for part in ("hip", "thigh", "calf") for leg in ("FL", "FR", "RL", "RR")]
+    default = torch.tensor([[0.1, -0.1, 0.1, -0.1, 0.8, 0.8, 1.0, 1.0, -1.5, -1.5, -1.5, -1.5]])
+
+    class Data:
+        """The measurements of a robot: the simulator needs a GPU."""
+
+        def __getattr__(self, name):
+            # Tensors are behind a property.
+            return Stub(torch=torch.as_tensor(vars(self)["values"][name]))
+
+    class Found(list):
+        @property
+        def torch(self):
+            return torch.tensor(self)
+
+    class Robot:
+        joint_names, num_joints = names, len(names)
+
+        def __init__(self):
+            ones = torch.ones(1, len(names))
+            self.data = Data()
+            self.data.values = {
+                "default_joint_pos": default, "default_joint_vel": 0 * ones, "joint_damping": 0.5 * ones, "joint_stiffness": 25 * ones,
+                "joint_friction_coeff": 0 * ones, "joint_armature": 0 * ones,
+                "default_joint_pos_limits": torch.tensor([[[-3.0, 3.0]] * len(names)]),
+            }  # fmt: skip
+            self.draw(torch.Generator())
+
+        def find_joints(self, patterns, preserve_order=False, as_proxy=False):
+            found, matched = resolve_matching_names(patterns, names, preserve_order)
+            return Found(found) if as_proxy else found, matched
+
+        def draw(self, random):
+            def normal(length):
+                return torch.randn((1, length), generator=random)
+
+            self.data.values.update(
+                joint_pos=default + 0.1 * normal(len(names)), joint_vel=normal(len(names)), root_lin_vel_b=normal(3), root_ang_vel_b=normal(3),
+                projected_gravity_b=normal(3),
+            )  # fmt: skip
+
+    class Scene(dict):
+        @property
+        def articulations(self):
+            return {"robot": self["robot"]}
+
+    def term(function, **options):
+        return ObservationTermCfg(func=function, **options)
+
+    for kind, frames, order in (("Go2's terms", 0, "term"), ("Go2's terms, history of 3", 3, "term"), ("Go2's terms, history of 3, by time", 3, "time")):
+
+        @configclass
+        class Group(ObservationGroupCfg):
+            base_lin_vel = term(mdp.base_lin_vel, scale=2.0)
+            base_ang_vel = term(mdp.base_ang_vel, scale=0.25)
+            projected_gravity = term(mdp.projected_gravity)
+            velocity_commands = term(mdp.generated_commands, params={"command_name": "base_velocity"})
+            joint_pos = term(mdp.joint_pos_rel)
+            joint_vel = term(mdp.joint_vel_rel, scale=0.05, clip=(-20.0, 20.0))
+            actions = term(mdp.last_action)
+
+            def __post_init__(self, frames=frames, order=order):
+                self.history_length, self.history_order = frames, order
+
+        @configclass
+        class Observations:
+            policy: Group = Group()
+
+        @configclass
+        class Actions:
+            joint_pos = mdp.JointPositionActionCfg(asset_name="robot", joint_names=[".*"], scale=0.25, use_default_offset=True)
+
+        made = []
+
+        def make(Observations=Observations, Actions=Actions, made=made):
+            robot = Robot()
+            env = Stub(
+                num_envs=1, device="cpu", scene=Scene(robot=robot), sim=Stub(is_playing=lambda: True), physics_dt=0.005, step_dt=0.02, extras={},
+                cfg=Stub(decimation=4),
+            )  # fmt: skip
+            env.command = torch.zeros(1, 3)
+            env.command_manager = Stub(get_command=lambda name: env.command)
+            env.action_manager = ActionManager(Actions(), env)
+            env.observation_manager = ObservationManager(Observations(), env)
+            length = env.observation_manager.group_obs_dim["policy"][0]
+            torch.manual_seed(0)
+            network = torch.nn.Sequential(torch.nn.Linear(length, 16), torch.nn.ELU(), torch.nn.Linear(16, len(names))).eval()
+            path = folder("isaaclab")
+            torch.onnx.export(
+                network, (torch.zeros(1, length),), str(path / "policy.onnx"), input_names=["obs"], output_names=["actions"], dynamo=False
+            )
+            # As ManagerBasedEnv.export_IO_descriptors writes it.
+            described = {
+                "observations": env.observation_manager._collect_io_descriptors(),
+                "actions": env.action_manager._collect_io_descriptors(),
+                "articulations": export_articulations_data(env),
+                "scene": export_scene_data(env),
+            }
+            (path / "IO_descriptors.yaml").write_text(yaml.safe_dump(described))
+            made[:] = [env, robot, network]
+            return str(path)
+
+        def episode(made=made):
+            env, robot, network = made
+            random, rows, targets = torch.Generator().manual_seed(1), [], []
+            for _ in range(STEPS):
+                robot.draw(random)
+                env.command = torch.randn((1, 3), generator=random)
+                values = robot.data.values
+                read = ("joint_pos", "joint_vel", "root_lin_vel_b", "root_ang_vel_b", "projected_gravity_b")
+                rows.append(torch.cat([*(values[name][0] for name in read), env.command[0]]).numpy())
+                with torch.no_grad():
+                    action = network(env.observation_manager.compute(update_history=True)["policy"])
+                env.action_manager.process_action(action)
+                targets.append(env.action_manager.get_term("joint_pos").processed_actions[0].numpy().copy())
+            return rows, targets
+
+        form = "IO_descriptors.yaml"
+        row(kind, form, make, episode=episode, accept_profile=True)
+        if order == "time":
+            row(kind, "with answers", make, episode=episode, accept_profile=True, answers={"history.layout": "frame"})
 
 
 @package

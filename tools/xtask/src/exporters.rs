@@ -20,7 +20,7 @@ const SHARED: [&str; 6] =
 type Package = (&'static str, &'static [&'static str], &'static [&'static str]);
 
 /// Functions of `tools/exporters/exporters.py` with the releases that each needs.
-const PACKAGES: [Package; 15] = [
+const PACKAGES: [Package; 18] = [
     ("torch", &[], &[]),
     ("stable_baselines3", &["stable-baselines3==2.9.2", "sb3-contrib==2.9.2"], &[]),
     ("rsl_rl", &["rsl-rl-lib==5.5.1"], &[]),
@@ -36,6 +36,10 @@ const PACKAGES: [Package; 15] = [
     ("lerobot", LEROBOT, &["lerobot==0.6.1"]),
     ("kinfer", &[], &["kinfer==0.6.1"]),
     ("leapp", &["leapp==0.7.2"], &[]),
+    ("mjlab", &["mjlab==1.6.0"], &[]),
+    ("holosoma", HOLOSOMA, &["holosoma==0.0.3"]),
+    // Python 3.12 only.
+    ("isaaclab", ISAACLAB, &["isaaclab==3.0.0"]),
 ];
 
 /// The packages that LeRobot's policies and processors import; the package itself pins an older torch.
@@ -48,6 +52,22 @@ const LEROBOT: &[&str] = &[
     "safetensors==0.8.0",
     "torchvision==0.29.2",
 ];
+
+/// The packages that holosoma's observation manager and exporter import; the package itself requires an older numpy.
+const HOLOSOMA: &[&str] = &[
+    "loguru==0.7.3",
+    "omegaconf==2.4.0",
+    "pydantic==2.14.4",
+    "scipy==1.17.1",
+    "tensorboard==2.21.0",
+    "tensordict==0.15.3",
+    "trimesh==5.2.0",
+    "tyro==1.0.17",
+];
+
+/// The packages that Isaac Lab's managers import; the package itself pins an older torch, and simulators.
+const ISAACLAB: &[&str] =
+    &["gymnasium==1.4.0", "lazy_loader==0.6", "prettytable==3.18.0", "pyyaml==6.0.4", "warp-lang==1.17.0"];
 
 /// The request.
 #[derive(Args)]
