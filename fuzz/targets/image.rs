@@ -5,7 +5,7 @@ use std::task::Poll;
 
 use actq::runtime::{ImageBuffer, with_head};
 use actq_kernels::image::seal;
-use actq_kernels::cost;
+use actq_kernels::cost::Rates;
 use libfuzzer_sys::fuzz_target;
 
 /// Instructions of the longest step to run.
@@ -15,7 +15,7 @@ const SCRATCH_WORDS: usize = 1 << 20;
 fn run(bytes: &[u8]) {
     let buffer = ImageBuffer::new(bytes);
     let Ok(image) = buffer.image("fuzzed".as_ref()) else { return };
-    if image.scratch_words() > SCRATCH_WORDS || cost::of_step(&image).instructions > INSTRUCTIONS {
+    if image.scratch_words() > SCRATCH_WORDS || Rates::M4F.of_step(&image).instructions > INSTRUCTIONS {
         return;
     }
     let observation = vec![0.5; image.obs_len()];

@@ -56,6 +56,23 @@ test("a report has its sections, the bits of the host, and no error", { skip }, 
   assert.deepEqual(problems, []);
 });
 
+test("the flash map shows every part in the layouts of its core", { skip }, async () => {
+  const { page, problems } = await open("report.html");
+  const seen = new Map();
+  for (const name of await page.locator("#part option").allTextContents()) {
+    await page.selectOption("#part", { label: name });
+    const texts = await page.locator("#flash dd").allTextContents();
+    assert.ok(texts.length === 6 && texts.every((text) => text.length > 0 && !/NaN|undefined/.test(text)), `${name}: ${texts}`);
+    assert.match(texts[5], /^[\d.]+ (ms|us) at \d+ MHz, (predicted|an estimate)$/, name);
+    seen.set(name, `${texts[5]}, ${await page.locator("#flash").innerText()}`);
+  }
+  const of = (name) => [...seen].find(([part]) => part.startsWith(name))[1];
+  assert.match(of("RP2040"), /predicted.*repack --core m0/s);
+  assert.match(of("ESP32-C3"), /an estimate.*repack --core rv32imac/s);
+  assert.doesNotMatch(of("STM32F405"), /repack/);
+  assert.deepEqual(problems, []);
+});
+
 test("the diagram of a bundle leads from its raw inputs to its targets", { skip }, async () => {
   const { page, problems } = await open("bundle.html");
   const facts = JSON.parse(await page.textContent("#data")).facts;

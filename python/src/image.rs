@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use actq::emit::{Trained, retrained};
+use actq::emit::{Core, Trained, retrained};
 use actq::measure::size::{bits_per_weight, hex};
-use actq::measure::time::{CLOCK, StepTime};
+use actq::measure::time::CLOCK;
 use actq::runtime::ImageBuffer;
 use actq_boards::Target;
 use actq_cli::commands::{export_c, report};
@@ -158,10 +158,15 @@ impl Image {
     }
 
     /// Returns the report of `actq inspect`.
-    #[pyo3(signature = (*, clock = CLOCK))]
-    fn inspect<'py>(&self, py: Python<'py>, #[pyo3(from_py_with = given)] clock: f64) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (*, clock = CLOCK, core = None))]
+    fn inspect<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = given)] clock: f64,
+        #[pyo3(from_py_with = given)] core: Option<String>,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let image = self.image()?;
-        let time = time::report(&image, &StepTime::new(&image, positive("clock", clock)?));
+        let time = time::report(&image, core_of(core.as_deref())?, positive("clock", clock)?).or_raise()?;
         py.import("actq._report")?.getattr("Report")?.call1((format!("{}\n{time}", inspect::report(&image)),))
     }
 
@@ -179,24 +184,32 @@ impl Image {
         py.import("actq._report")?.getattr("Page")?.call1((page,))
     }
 
-    /// Predicts the cost of a step on a board, as a dict.
-    #[pyo3(signature = (board = "stm32f405".to_owned(), *, clock = CLOCK))]
+    /// Predicts the cost of a step on a board or a core, as a dict.
+    #[pyo3(signature = (board = None, *, clock = CLOCK, core = None))]
     fn cost<'py>(
         &self,
         py: Python<'py>,
-        #[pyo3(from_py_with = given)] board: String,
+        #[pyo3(from_py_with = given)] board: Option<String>,
         #[pyo3(from_py_with = given)] clock: f64,
+        #[pyo3(from_py_with = given)] core: Option<String>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let image = self.image()?;
+        let core = core_of(core.as_deref())?;
+        if let (Some(board), Some(_)) = (&board, core) {
+            return Err(error!("both board {board:?} and core are given; pass one of them"));
+        }
+        let board = board.unwrap_or_else(|| "stm32f405".to_owned());
         let known = Target::ALL.into_iter().filter(|target| target.has_assembler() && *target != Target::M55);
-        let Some(target) = known.clone().find(|target| target.board().name == board) else {
+        let target = known.clone().find(|target| target.board().name == board);
+        if core.is_none() && target.is_none() {
             let mut names: Vec<&str> = known.map(|target| target.board().name).collect();
             names.dedup();
-            return Err(error!("board {board:?} has no cost model; use one of {}", names.join(", ")));
-        };
-        let step = StepTime::new(&image, positive("clock", clock)?);
+            return Err(error!("board {board:?} has no cost model; use one of {}, or core", names.join(", ")));
+        }
+        let step = time::of_image(&image, core, positive("clock", clock)?).or_raise()?;
         let cost = PyDict::new(py);
-        cost.set_item("board", board)?;
+        cost.set_item("core", step.core.name())?;
+        cost.set_item("board", core.is_none().then_some(board))?;
         cost.set_item("clock_hz", clock)?;
         cost.set_item("milliseconds", step.milliseconds)?;
         cost.set_item("cycles", step.cycles)?;
@@ -204,7 +217,8 @@ impl Image {
         cost.set_item("macs", step.macs)?;
         cost.set_item("image_bytes", image.bytes())?;
         cost.set_item("scratch_bytes", 4 * image.scratch_words())?;
-        cost.set_item("scratch_limit", target.board().application.map(|application| 4 * application.scratch))?;
+        let application = target.filter(|_| core.is_none()).and_then(|target| target.board().application);
+        cost.set_item("scratch_limit", application.map(|application| 4 * application.scratch))?;
         Ok(cost)
     }
 
@@ -367,6 +381,15 @@ fn trained(levels: BTreeMap<String, Vec<i16>>, floats: BTreeMap<String, Vec<f32>
         }
     }
     Some(trained)
+}
+
+/// Returns the core of this name, if one is given.
+pub(crate) fn core_of(name: Option<&str>) -> PyResult<Option<Core>> {
+    let known = |name: &str| {
+        let names = Core::ALL.map(|(name, _)| format!("{name:?}")).join(", ");
+        Core::of_name(name).ok_or_else(|| error!("core is {name:?}; use one of {names}"))
+    };
+    name.map(known).transpose()
 }
 
 /// Refuses a number that is not above 0.

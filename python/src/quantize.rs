@@ -6,6 +6,7 @@ use std::sync::Arc;
 use actq::budget::{Budget, TimeLimit};
 use actq::data::{Recording, Recordings, Sizes, joined};
 use actq::emit::{Core, repack};
+use actq::graph::Graph;
 use actq::measure::{check, eval, recorded};
 use actq::methods::{Activations, Effort, MAX_MINUTES, Method, Options};
 use actq::pipeline::{Quantizer, check_budget, minutes_of_image};
@@ -19,7 +20,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::error::{OrRaise as _, error, given};
-use crate::image::{Image, positive};
+use crate::image::{Image, core_of, positive};
 use crate::policy::Policy;
 use crate::recordings::{Passed, passed};
 use crate::work;
@@ -48,19 +49,21 @@ pub(crate) struct Request {
 
 impl Request {
     /// Returns the budget; without one, the method's default.
-    fn budget(&self, method: &Method) -> PyResult<Budget> {
+    fn budget(&self, graph: &Graph, method: &Method) -> PyResult<Budget> {
         let budgets = [
             self.bits.map(|bits| Ok(Budget::Width(width("bits", bits)?))),
             self.bpw.map(|bits| Ok(Budget::BitsPerWeight(positive("bpw", bits)?))),
             self.flash.filter(|_| self.ms.is_none()).map(|bytes| Ok(Budget::ImageBytes(bytes))),
             self.ms.map(|milliseconds| {
                 let (milliseconds, clock_hz) = (positive("ms", milliseconds)?, positive("clock", self.clock)?);
-                Ok(Budget::Time(TimeLimit { milliseconds, clock_hz, image_bytes: self.flash }))
+                let core = self.core()?.unwrap_or(Core::M4f);
+                Ok(Budget::Time(TimeLimit { milliseconds, core, clock_hz, image_bytes: self.flash }))
             }),
             self.max_nmse.map(|limit| Ok(Budget::MaxNmse(positive("max_nmse", limit)?))),
         ];
         let mut given = budgets.into_iter().flatten();
-        let budget = given.next().unwrap_or_else(|| Ok(method.default_budget(!self.widths.is_empty())));
+        let group = self.group.unwrap_or(method.default_group());
+        let budget = given.next().unwrap_or_else(|| Ok(method.default_budget(graph, group, !self.widths.is_empty())));
         if given.next().is_some() {
             return Err(error!(
                 "more than one budget is given; pass one of bits, bpw, flash, ms and max_nmse, or flash and ms"
@@ -71,11 +74,7 @@ impl Request {
 
     /// Returns the core; `None` for the default layouts.
     fn core(&self) -> PyResult<Option<Core>> {
-        let known = |name: &String| {
-            let names = Core::ALL.map(|(name, _)| format!("{name:?}")).join(", ");
-            Core::of_name(name).ok_or_else(|| error!("core is {name:?}; use one of {names}"))
-        };
-        self.core.as_ref().map(known).transpose()
+        core_of(self.core.as_deref())
     }
 
     /// Returns the method; `None` for the default, which depends on the recordings.
@@ -90,13 +89,13 @@ impl Request {
     }
 
     /// Returns the options of a quantization by `method`.
-    pub(crate) fn options(&self, method: Method) -> PyResult<Options> {
+    pub(crate) fn options(&self, graph: &Graph, method: Method) -> PyResult<Options> {
         let forced = self.widths.iter().map(|(name, bits)| Ok((name.clone(), width(name, *bits)?)));
         let minutes = self.minutes.map(|minutes| positive("minutes", minutes)).transpose()?;
         if minutes.is_some_and(|minutes| minutes > MAX_MINUTES) {
             return Err(error!("minutes is {}; use at most {MAX_MINUTES}, a week", minutes.unwrap_or_default()));
         }
-        let budget = self.budget(&method)?;
+        let budget = self.budget(graph, &method)?;
         let options = Options {
             group: self.group.unwrap_or(method.default_group()),
             activations: match self.activations {
@@ -146,12 +145,8 @@ pub(crate) fn quantize(
         return Err(error!("{}", notes::how_to_record(&policy.policy)));
     }
     let core = request.core()?;
-    if request.ms.is_some() && core.is_some_and(|core| !core.has_default_layouts()) {
-        return Err(error!(
-            "ms with core: no time is predicted for cores with other layouts than the Cortex-M4; use bpw or flash"
-        ));
-    }
-    let options = request.options(method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }))?;
+    let options = request
+        .options(&policy.policy.graph, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }))?;
     let (mut options, policy, in_folder) = (options, policy.policy.clone(), folder.is_some());
     let (bytes, warnings, notes) = work::run(py, progress, move |worker| {
         check_budget(&policy, &options)?;

@@ -63,7 +63,7 @@ pub(crate) fn tune(
             policy.policy.name
         ));
     }
-    let options = request.options(Method::Distill)?;
+    let options = request.options(&policy.policy.graph, Method::Distill)?;
     let (policy, rollout) = (policy.policy.clone(), Arc::new(rollout));
     let (tuned, images) = work::run(py, progress, move |worker| {
         check_budget(&policy, &options)?;

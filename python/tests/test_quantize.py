@@ -231,9 +231,10 @@ def test_steps_on_the_first_axis_are_said(mlp, caplog):
         assert ("recordings looks like [step, robot, value]" in caplog.text) == is_said
 
 
-def test_the_default_of_distill_is_bits_per_weight(mlp, observations):
+def test_the_default_of_distill_has_the_size_of_three_bits(mlp, observations):
     policy, options = actq.import_policy(mlp), {"steps": 5, "progress": False}
-    assert actq.quantize(policy, observations, **options) == actq.quantize(policy, observations, bpw=3, **options)
+    three = actq.quantize(policy, observations, bits=3, **options)
+    assert 0.9 * len(three) < len(actq.quantize(policy, observations, **options)) <= len(three)
     forced = {"widths": {"w1": 8}, **options}
     assert actq.quantize(policy, observations, **forced) == actq.quantize(policy, observations, bits=3, **forced)
     assert actq.quantize(policy, method="rtn", progress=False) == actq.quantize(policy, method="rtn", bits=3, progress=False)

@@ -29,7 +29,7 @@ pub(crate) const AN386: Board = Board {
 pub(crate) const AN385: Board = Board {
     name: "mps2-an385",
     machine: &["-M", "mps2-an385"],
-    binaries: &["functions", "golden", "portable"],
+    binaries: &["functions", "golden", "portable", "runtime"],
     application: None,
     ..AN386
 };

@@ -3,6 +3,7 @@
 mod drive;
 mod quantities;
 
+use actq_kernels::cost::Core;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -144,7 +145,7 @@ impl Spec {
         let errors = self.max_nmse.iter().map(|nmse| Budget::MaxNmse(*nmse));
         let sizes = self.flash.iter().filter(|_| self.ms.is_empty()).map(|bytes| Budget::ImageBytes(*bytes));
         let time = |milliseconds: f64, image_bytes: Option<usize>| {
-            Budget::Time(TimeLimit { milliseconds, clock_hz: self.clock, image_bytes })
+            Budget::Time(TimeLimit { milliseconds, core: Core::M4f, clock_hz: self.clock, image_bytes })
         };
         let of_time = |ms: &f64| match &self.flash[..] {
             [] => vec![time(*ms, None)],

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use actq_kernels::Width;
+use actq_kernels::cost::Core;
 use serde::{Deserialize, Serialize};
 
 /// The budget of an image, in the unit that was asked for.
@@ -42,11 +43,38 @@ impl fmt::Display for Budget {
 pub struct TimeLimit {
     /// Milliseconds.
     pub milliseconds: f64,
-    /// The processor's clock in Hz.
+    /// The core.
+    #[serde(default = "m4f", skip_serializing_if = "is_m4f", with = "core_name")]
+    pub core: Core,
+    /// The core's clock in Hz.
     pub clock_hz: f64,
     /// The most bytes of the whole image; `None`: no limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image_bytes: Option<usize>,
+}
+
+fn m4f() -> Core {
+    Core::M4f
+}
+
+fn is_m4f(core: &Core) -> bool {
+    *core == Core::M4f
+}
+
+/// A core by its name.
+pub(crate) mod core_name {
+    use actq_kernels::cost::Core;
+    use serde::de::{Deserialize, Deserializer, Error as _};
+    use serde::ser::Serializer;
+
+    pub(crate) fn serialize<S: Serializer>(core: &Core, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(core.name())
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Core, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        Core::of_name(&name).ok_or_else(|| D::Error::custom(format!("no core {name:?}")))
+    }
 }
 
 /// The least used share of a budget, if more bits fit and reduce the error.
@@ -68,6 +96,8 @@ pub enum Rate {
         bytes: Option<usize>,
         /// Cycles.
         cycles: f64,
+        /// The core that takes them.
+        core: Core,
     },
 }
 
@@ -80,6 +110,11 @@ impl Rate {
             Self::Bytes(bytes) => bytes as f64,
             Self::Within { bytes, .. } => bytes.map_or(f64::INFINITY, |bytes| bytes as f64),
         }
+    }
+
+    /// Returns the core whose cycles are limited; without a limit a Cortex-M4 with FPU.
+    pub fn core(self) -> Core {
+        if let Self::Within { core, .. } = self { core } else { Core::M4f }
     }
 
     /// Returns the modelled cycles that rows may take, if they are limited.
@@ -162,7 +197,7 @@ mod tests {
 
     #[test]
     fn budgets_survive_serialization() {
-        let time = Budget::Time(TimeLimit { milliseconds: 1.5, clock_hz: 168e6, image_bytes: None });
+        let time = Budget::Time(TimeLimit { milliseconds: 1.5, core: Core::M4f, clock_hz: 168e6, image_bytes: None });
         for (budget, json) in [
             (Budget::Width(Width::W3), r#"{"width":3}"#),
             (Budget::BitsPerWeight(2.5), r#"{"bits_per_weight":2.5}"#),

@@ -6,8 +6,9 @@ mod repack;
 mod retrained;
 mod writer;
 
+pub use actq_kernels::cost::Core;
 pub use lower::{Program, lower};
 pub use raw_values::raw_values;
-pub use repack::{Core, repack};
+pub use repack::repack;
 pub use retrained::{Trained, retrained};
 pub use writer::{bytes_beside_blocks, image, image_around};

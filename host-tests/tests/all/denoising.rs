@@ -14,7 +14,7 @@ use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::{bits, rtn};
-use actq_kernels::cost;
+use actq_kernels::cost::Rates;
 use actq_kernels::image::{OpKind, header as h, op};
 use actq_kernels::ops::noise::normal;
 use actq_kernels::{Head, ImageError, StepError, Width};
@@ -406,7 +406,7 @@ fn impossible_images_are_refused() -> Result<()> {
 fn steps_cost_what_they_repeat() -> Result<()> {
     let of = |steps: usize| -> Result<u64> {
         let buffer = quantized(policy("flow", json!({"steps": steps})))?;
-        Ok(cost::of_step(&buffer.image("memory".as_ref())?).instructions)
+        Ok(Rates::M4F.of_step(&buffer.image("memory".as_ref())?).instructions)
     };
     let [one, two, ten] = [of(1)?, of(2)?, of(10)?];
     assert!(ten.abs_diff(one + 9 * (two - one)) <= 9, "{one}, {two}, {ten}");

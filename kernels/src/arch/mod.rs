@@ -86,6 +86,8 @@ pub use product::{Mismatch, Product};
 #[cfg(actq_scaling)]
 pub(crate) use scaling::scale;
 pub use tables::Tables;
+#[cfg(all(feature = "writer", feature = "scalar"))]
+pub(crate) use tables::{TABLE_WORDS, TWO_COLUMNS};
 
 use crate::activations::{Plan, Prepared, Scale};
 use crate::error::NotFinite;

@@ -7,7 +7,7 @@ use crate::meter::RUN;
 
 /// Words of a table: 256 halfwords.
 #[cfg(feature = "scalar")]
-pub(super) const TABLE_WORDS: usize = 128;
+pub(crate) const TABLE_WORDS: usize = 128;
 
 /// A table of sums.
 #[cfg(feature = "scalar")]
@@ -19,7 +19,7 @@ const MAX_TABLES: usize = 8;
 
 /// Words of two columns' activations with their start values.
 #[cfg(feature = "scalar")]
-pub(super) const TWO_COLUMNS: usize = 4;
+pub(crate) const TWO_COLUMNS: usize = 4;
 
 /// Most pairs of columns that are of use at a time.
 #[cfg(feature = "scalar")]

@@ -1,4 +1,5 @@
-//! The cost of a step on a Cortex-M4 with FPU (thumbv7em-none-eabihf, zero-wait memory), from the image alone.
+//! The cost of a step on a core, from the image alone: a Cortex-M4 with FPU (thumbv7em-none-eabihf, zero-wait memory), or
+//! for a writer any of [`Core::ALL`].
 //!
 //! [`CostItem`]s describe an operation by the loops of its code: calls of a GEMV, strips, passes through a kernel's
 //! loop, columns, prepared values, scaled rows, elements of a function. An item's **rate** is the cost of one of it.
@@ -13,10 +14,16 @@
 //! does not include them.
 
 pub(crate) mod budget;
+#[cfg(all(feature = "writer", feature = "scalar", feature = "helium"))]
+mod cores;
 mod item;
 #[allow(clippy::approx_constant, reason = "measured values, some of which happen to be near a constant")]
 mod rates;
+#[cfg(all(feature = "writer", feature = "scalar"))]
+mod scalar;
 
+#[cfg(all(feature = "writer", feature = "scalar", feature = "helium"))]
+pub use self::cores::{CORES, Core, rates_of};
 pub use self::item::CostItem;
 use self::item::{Gemv, Prepare, Strips};
 use self::rates::RATES;
@@ -66,14 +73,18 @@ const fn column(which: usize) -> [u32; CostItem::COUNT] {
     let (mut column, mut rated) = ([0; CostItem::COUNT], [false; CostItem::COUNT]);
     let mut i = 0;
     while i < RATES.len() {
-        let (item, rates) = RATES[i];
+        let (item, rates, _) = RATES[i];
         assert!(!rated[item.index()], "rates.rs has an item twice");
         rated[item.index()] = true;
-        let rate = rates[which] * ONE;
-        column[item.index()] = if rate < 0.0 { 0 } else { (rate + 0.5) as u32 };
+        column[item.index()] = thousand24ths(rates[which]);
         i += 1;
     }
     column
+}
+
+/// Converts a rate to 1024ths; negative ones count as 0.
+const fn thousand24ths(rate: f64) -> u32 {
+    if rate < 0.0 { 0 } else { (rate * ONE + 0.5) as u32 }
 }
 
 /// Expected instructions of each item, in 1024ths.
@@ -88,16 +99,83 @@ impl CostItem {
     }
 }
 
-/// Computes the cost of the items that `list` counts.
-fn total(list: impl FnOnce(&mut dyn FnMut(CostItem, usize))) -> Cost {
-    let mut sums = [0u64; 2];
-    list(&mut |item, count| {
-        for (sum, rates) in sums.iter_mut().zip([&INSTRUCTIONS, &CYCLES]) {
-            *sum += count as u64 * u64::from(rates.get(item.index()).copied().unwrap_or(0));
-        }
-    });
-    let [instructions, cycles] = sums.map(|sum| (sum + ONE as u64 / 2) / ONE as u64);
-    Cost { instructions, cycles }
+/// Modelled costs of one of each item on a core.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates {
+    /// Instructions, in 1024ths.
+    instructions: &'static [u32; CostItem::COUNT],
+    /// Cycles, in 1024ths.
+    cycles: &'static [u32; CostItem::COUNT],
+}
+
+impl Rates {
+    /// Those of a Cortex-M4 with FPU.
+    pub const M4F: Self = Self { instructions: &INSTRUCTIONS, cycles: &CYCLES };
+
+    /// Computes the cost of the items that `list` counts.
+    fn total(self, list: impl FnOnce(&mut dyn FnMut(CostItem, usize))) -> Cost {
+        let mut sums = [0u64; 2];
+        list(&mut |item, count| {
+            for (sum, rates) in sums.iter_mut().zip([self.instructions, self.cycles]) {
+                *sum += count as u64 * u64::from(rates.get(item.index()).copied().unwrap_or(0));
+            }
+        });
+        let [instructions, cycles] = sums.map(|sum| (sum + ONE as u64 / 2) / ONE as u64);
+        Cost { instructions, cycles }
+    }
+
+    /// Computes the cost of an operation in a step.
+    pub fn of_op(self, op: &Op<'_>) -> Cost {
+        self.total(|add| items(op, add))
+    }
+
+    /// Computes the cost of a linear operation with biases, from `cols` values to `rows`, whose blocks have these shapes,
+    /// each of another width. `in_order` is `false` if they have output steps. If it accumulates, its output is added to,
+    /// without biases.
+    pub fn of_linear(
+        self,
+        [rows, cols]: [usize; 2],
+        blocks: impl IntoIterator<Item = BlockShape>,
+        in_order: bool,
+        accumulate: bool,
+    ) -> Cost {
+        self.total(|add| {
+            let in_place = in_order && !accumulate;
+            begin_linear([rows, cols], (!in_place).then(|| OutputStart::of(accumulate, !accumulate)), add);
+            for shape in blocks {
+                prepare(shape, add);
+                block(shape, in_order, in_place, add);
+            }
+        })
+    }
+
+    /// Computes the cost of the elements of an operation that has no matrix, or of the units of a cell.
+    pub fn of_elements(self, kind: OpKind, len: usize) -> Cost {
+        self.total(|add| {
+            add(value(kind, kind.code()), len);
+            rest(kind, len % EIGHT, add);
+        })
+    }
+
+    /// Computes the cost of a step that evaluates the network. A step that continues a chunk costs the same without the
+    /// operations.
+    pub fn of_step(self, image: &Image<'_>) -> Cost {
+        let times = |i: usize| if i < image.first_denoising_op() { 1 } else { image.denoising_steps() as u64 };
+        self.of_frame(image) + image.ops().enumerate().map(|(i, op)| self.of_op(&op) * times(i)).sum()
+    }
+
+    /// Computes the cost of a step without the network's operations.
+    pub fn of_frame(self, image: &Image<'_>) -> Cost {
+        self.total(|add| frame(image, add))
+    }
+}
+
+impl Image<'_> {
+    /// Computes the expected cost of a step that evaluates the network, on a Cortex-M4 with FPU and zero-wait memory. A
+    /// step that continues a chunk costs less.
+    pub fn step_cost(&self) -> Cost {
+        Rates::M4F.of_step(self)
+    }
 }
 
 /// Computes the most that the items of `list` take, in 1024ths of an instruction.
@@ -105,58 +183,6 @@ pub(super) fn most(list: impl FnOnce(&mut dyn FnMut(CostItem, usize))) -> u32 {
     let mut sum = 0u32;
     list(&mut |item, count| sum = sum.saturating_add((count as u32).saturating_mul(item.most())));
     sum
-}
-
-/// Computes the cost of an operation in a step.
-pub fn of_op(op: &Op<'_>) -> Cost {
-    total(|add| items(op, add))
-}
-
-/// Computes the cost of a linear operation with biases, from `cols` values to `rows`, whose blocks have these shapes,
-/// each of another width. `in_order` is `false` if they have output steps. If it accumulates, its output is added to,
-/// without biases.
-pub fn of_linear(
-    [rows, cols]: [usize; 2],
-    blocks: impl IntoIterator<Item = BlockShape>,
-    in_order: bool,
-    accumulate: bool,
-) -> Cost {
-    total(|add| {
-        let in_place = in_order && !accumulate;
-        begin_linear([rows, cols], (!in_place).then(|| OutputStart::of(accumulate, !accumulate)), add);
-        for shape in blocks {
-            prepare(shape, add);
-            block(shape, in_order, in_place, add);
-        }
-    })
-}
-
-/// Computes the cost of the elements of an operation that has no matrix, or of the units of a cell.
-pub fn of_elements(kind: OpKind, len: usize) -> Cost {
-    total(|add| {
-        add(value(kind, kind.code()), len);
-        rest(kind, len % EIGHT, add);
-    })
-}
-
-/// Computes the cost of a step that evaluates the network. A step that continues a chunk costs the same without the
-/// operations.
-pub fn of_step(image: &Image<'_>) -> Cost {
-    let times = |i: usize| if i < image.first_denoising_op() { 1 } else { image.denoising_steps() as u64 };
-    of_frame(image) + image.ops().enumerate().map(|(i, op)| of_op(&op) * times(i)).sum()
-}
-
-impl Image<'_> {
-    /// Computes the expected cost of a step that evaluates the network, on a Cortex-M4 with FPU and zero-wait memory. A
-    /// step that continues a chunk costs less.
-    pub fn step_cost(&self) -> Cost {
-        of_step(self)
-    }
-}
-
-/// Computes the cost of a step without the network's operations.
-pub fn of_frame(image: &Image<'_>) -> Cost {
-    total(|add| frame(image, add))
 }
 
 /// Counts the items of a step without the network's operations.
@@ -351,15 +377,15 @@ pub(super) fn prepare(shape: BlockShape, add: &mut dyn FnMut(CostItem, usize)) {
 
 /// Counts the items of a block's products and their scaling. With `start`, the output starts from the biases.
 fn block(shape: BlockShape, in_order: bool, start: bool, add: &mut dyn FnMut(CostItem, usize)) {
-    let whole = match (in_order && start, shape.rows.is_multiple_of(QUAD)) {
-        (false, _) => 0,
-        (true, true) => shape.rows,
-        (true, false) => shape.rows & !(STRIP - 1),
-    };
+    // Tiles of columns make no difference in slices, whose budgets are those of a Cortex-M4.
+    #[cfg(all(feature = "writer", feature = "scalar"))]
+    if shape.lanes == crate::layout::Lanes::Scalar {
+        return scalar::block(shape, in_order, start, add);
+    }
+    let whole = if in_order && start { rows_in_place(shape) } else { 0 };
     if whole > 0 {
         add(CostItem::IN_PLACE, 1);
-        add(CostItem::SCALED_EIGHT, whole / STRIP);
-        add(CostItem::SCALED_REST, whole % STRIP);
+        scaled(whole, true, add);
         products(shape, whole, 1, add);
     }
     let left = shape.rows - whole;
@@ -368,12 +394,22 @@ fn block(shape: BlockShape, in_order: bool, start: bool, add: &mut dyn FnMut(Cos
         add(CostItem::STACK, 1);
         add(CostItem::RUN, runs);
         products(shape, left, runs, add);
-        if in_order {
-            add(CostItem::SCALED_EIGHT, left / STRIP);
-            add(CostItem::SCALED_REST, left % STRIP);
-        } else {
-            add(CostItem::SCALED_STEPPED, left);
-        }
+        scaled(left, in_order, add);
+    }
+}
+
+/// Returns the rows whose sums fit in the output: all but those of a last strip with padding.
+fn rows_in_place(shape: BlockShape) -> usize {
+    if shape.rows.is_multiple_of(QUAD) { shape.rows } else { shape.rows & !(STRIP - 1) }
+}
+
+/// Counts the items of scaling the sums of rows.
+fn scaled(rows: usize, in_order: bool, add: &mut dyn FnMut(CostItem, usize)) {
+    if in_order {
+        add(CostItem::SCALED_EIGHT, rows / STRIP);
+        add(CostItem::SCALED_REST, rows % STRIP);
+    } else {
+        add(CostItem::SCALED_STEPPED, rows);
     }
 }
 

@@ -67,7 +67,8 @@ class Policy:
 class Cost(TypedDict):
     """The predicted cost of a step that evaluates the network, and the memory that it needs."""
 
-    board: str
+    core: str
+    board: Optional[str]
     clock_hz: float
     milliseconds: float
     cycles: int
@@ -96,8 +97,9 @@ class Image:
 
         Raises `actq.Error` if the file exists and is something else, or cannot be written.
         """
-    def inspect(self, *, clock: float = 168e6) -> Report:
-        """Returns the report of `actq inspect`: operations, bits, memory, contract, time at `clock` in Hz."""
+    def inspect(self, *, clock: float = 168e6, core: Optional[str] = None) -> Report:
+        """Returns the report of `actq inspect`: operations, bits, memory, contract, time at `clock` in Hz on a `core` with
+        the image's layouts, by default "m4f"."""
     def report(self, policy: Optional[Policy] = None, *, recordings: Sequence[_Path] = ()) -> Page:
         """Returns the page of `actq report`, in which the image runs; a notebook shows it.
 
@@ -105,11 +107,11 @@ class Image:
         recording in the policy's folder. Raises `actq.Error` if one of them does not match the image.
         Only the command draws statistics, sweeps and rollouts (--stats, --store, --driven), and arrays must be saved first.
         """
-    def cost(self, board: str = "stm32f405", *, clock: float = 168e6) -> Cost:
-        """Predicts the cost of a step on a board at `clock` in Hz.
+    def cost(self, board: Optional[str] = None, *, clock: float = 168e6, core: Optional[str] = None) -> Cost:
+        """Predicts the cost of a step on a board, by default "stm32f405", or on a `core` as "m3", at `clock` in Hz.
 
-        The model is that of a Cortex-M4 with FPU and memory that never waits. Raises `actq.Error` for a board without
-        the kernels in assembler.
+        Memory never waits. On a board the model is that of a Cortex-M4 with FPU. Raises `actq.Error` for a board without
+        the kernels in assembler, and for a core with other layouts than the image's.
         """
     def export_c(
         self,

@@ -95,8 +95,8 @@ def quantize(
         - the path of an .npy, .npz or .safetensors file, or of a folder of them;
         - a list of these.
         Without them, those in the policy's folder.
-    bits: bits of every weight: 2, 3, 4 or 8. The default of "gptq", "rtn" and beside `widths` is 3.
-    bpw: bits per weight of all weights, with scales and padding. The default of "distill" is 3.
+    bits: bits of every weight: 2, 3, 4 or 8. The default is 3; "distill" divides as many bytes among the rows.
+    bpw: bits per weight of all weights, with scales and padding.
     flash: most bytes of the image, a number or a text as "96K".
     ms, clock: most milliseconds of a step on a Cortex-M4 at a clock in Hz, as predicted.
     max_nmse: largest error; searches the fewest bits that keep it. At most one of these budgets may be given, or flash and

@@ -80,7 +80,7 @@ def tune(
     env: a vector environment of Gymnasium. All of its robots step together; it stays open.
     recordings: observations of the f32 policy, as for `quantize`. Without them, an image of 8 bits of the policy is
         rolled out in `env` in its place.
-    bits, bpw, flash, ms, clock: the budget, as for `quantize`; the default is bpw=3.
+    bits, bpw, flash, ms, clock: the budget, as for `quantize`; the default is the size of bits=3.
     rounds: on-policy rounds after the first image, 1 to 100. N rounds make N + 1 rollouts.
     frames: frames of a rollout, of all robots together.
     observe: makes the policy's observations [n, n_obs] of the environment's; the default flattens arrays.

@@ -137,7 +137,7 @@ mod tests {
     use super::*;
     use crate::testing::lstm;
 
-    const PACKING: Packing = Packing { lanes: Lanes::Paired, group: 32 };
+    const PACKING: Packing = Packing { x_max: Lanes::PAIRED_X_MAX, group: 32 };
 
     /// Makes a chain of square matrices, each a layer of its own.
     fn chain(count: usize) -> Graph {

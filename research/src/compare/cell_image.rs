@@ -1,5 +1,6 @@
 //! Makes the image of a cell.
 
+use actq_kernels::cost::Core;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -220,7 +221,7 @@ impl<'a> Maker<'a> {
         let buffer = quantized.buffer();
         let image = buffer.image(Path::new("image in memory"))?;
         let report = eval::evaluate(image, self.subject.heldout()?)?;
-        let step = StepTime::new(&image, CLOCK);
+        let step = StepTime::new(&image, Core::M4f, CLOCK);
         let is_int8 = |q: &Quantized| q.group == 0 && q.widths.iter().all(|width| *width == Some(Width::W8));
         let is_int8 = quantized.outcomes.iter().all(|outcome| is_int8(&outcome.quantized) && outcome.x_max <= 127);
         Ok(Made {

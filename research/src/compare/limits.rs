@@ -1,5 +1,6 @@
 //! The budget of a cell.
 
+use actq::emit::Core;
 use std::cmp::Ordering;
 use std::fmt;
 
@@ -55,7 +56,9 @@ impl Limit {
         match self {
             Self::Bits(bits) => Budget::BitsPerWeight(bits),
             Self::Flash { flash } => Budget::ImageBytes(flash),
-            Self::Time { ms } => Budget::Time(TimeLimit { milliseconds: ms, clock_hz: CLOCK, image_bytes: None }),
+            Self::Time { ms } => {
+                Budget::Time(TimeLimit { milliseconds: ms, core: Core::M4f, clock_hz: CLOCK, image_bytes: None })
+            }
         }
     }
 
@@ -101,7 +104,10 @@ mod tests {
             ("1.5", Budget::BitsPerWeight(1.5)),
             ("12K", Budget::ImageBytes(12_288)),
             ("10001B", Budget::ImageBytes(10_001)),
-            ("0.25ms", Budget::Time(TimeLimit { milliseconds: 0.25, clock_hz: CLOCK, image_bytes: None })),
+            (
+                "0.25ms",
+                Budget::Time(TimeLimit { milliseconds: 0.25, core: Core::M4f, clock_hz: CLOCK, image_bytes: None }),
+            ),
         ] {
             let allowed = Limit::parse(text).expect("a budget");
             assert_eq!((allowed.budget(), allowed.to_string().as_str()), (budget, text));

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use actq::emit::Core;
 use actq::measure::time::CLOCK;
 use actq::pipeline::driven::DriveOutcome;
 use actq_cli::outputs::files;
@@ -99,7 +100,7 @@ fn head(header: &Header) -> Result<String> {
         "- {episodes} episodes with the seeds {seed0} to {}, seed {} of the quantizer\n\n{READING}\n\nms: predicted time of a step, {}.",
         seed0 + episodes.saturating_sub(1),
         options["seed"],
-        conditions(CLOCK)
+        conditions(Core::M4f, CLOCK)
     )?;
     Ok(text)
 }

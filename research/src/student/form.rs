@@ -2,6 +2,7 @@
 
 use actq::budget::Budget;
 use actq::emit;
+use actq::emit::Core;
 use actq::error::{Result, bail};
 use actq::graph::{Graph, WeightMatrix};
 use actq::measure::time::{CLOCK, StepTime};
@@ -85,7 +86,7 @@ pub fn taken(policy: &Policy, graph: &Graph, form: Form) -> Result<Taken> {
 /// As [`emit::image`].
 pub fn milliseconds(policy: &Policy, outcomes: &[Outcome]) -> Result<f64> {
     let buffer = ImageBuffer::new(&emit::image(policy, outcomes)?);
-    Ok(StepTime::new(&buffer.image("the rival's image".as_ref())?, CLOCK).milliseconds)
+    Ok(StepTime::new(&buffer.image("the rival's image".as_ref())?, Core::M4f, CLOCK).milliseconds)
 }
 
 /// Estimates the milliseconds of a step whose products are computed by CMSIS-NN ([`CMSIS_NN_CYCLES`]), all else as
@@ -171,6 +172,7 @@ mod tests {
             microseconds: 0.0,
         };
         let step = StepTime {
+            core: Core::M4f,
             clock_hz: 1e6,
             ops: vec![op(100, 150), op(0, 50)],
             macs: 100,

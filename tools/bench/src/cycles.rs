@@ -1,8 +1,8 @@
-//! Cycles of a Cortex-M4, modelled from counted instructions.
+//! Cycles of a core, modelled from counted instructions.
 //!
 //! The counter counts the executions of each instruction, and the jumps away from it. An instruction that was not
 //! jumped to follows the one before it in memory, so the pairs of neighbours, on which pipeline stalls depend, are
-//! known exactly as well. `instruction.rs` has the cost of each. It is a model.
+//! known exactly as well. `timing.rs` has the cost of each. It is a model.
 //!
 //! A board's flash has wait states. The counter plays every instruction and load in order through the caches of an
 //! STM32F4 (see `tools/xtask/insn-count`), so the missed lines are exact for initially empty caches. A line costs the
@@ -17,9 +17,11 @@ use actq_kernels::cost::Cost;
 use anyhow::{Context as _, Result, ensure};
 use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SectionKind, SymbolKind};
 
-use crate::instruction::{Class, Instruction, Kind, REFILL};
+use crate::Target;
+use crate::instruction::{Instruction, Kind, riscv};
 use crate::qemu::Region;
 use crate::stack::step::Step;
+use crate::timing::Timing;
 
 /// Bytes per line of the STM32F4's flash.
 const LINE: u64 = 16;
@@ -32,6 +34,7 @@ pub const CODE_LINES: u64 = 64;
 pub struct Code {
     sections: Vec<(u64, Vec<u8>)>,
     functions: Vec<Function>,
+    timing: Timing,
 }
 
 /// A function of a firmware.
@@ -46,8 +49,13 @@ pub struct Function {
 }
 
 impl Code {
-    /// Reads the code of an ELF file.
+    /// Reads the code of an ELF file for a Cortex-M4.
     pub fn read(elf: &Path) -> Result<Self> {
+        Self::of(Target::Fpu, elf)
+    }
+
+    /// Reads the code of an ELF file for a target.
+    pub fn of(target: Target, elf: &Path) -> Result<Self> {
         let data = std::fs::read(elf).with_context(|| format!("cannot read {}", elf.display()))?;
         let file = object::File::parse(&*data).with_context(|| format!("{}: not an ELF file", elf.display()))?;
         let code = file.sections().filter(|s| s.kind() == SectionKind::Text);
@@ -62,7 +70,7 @@ impl Code {
             })
             .collect();
         functions.sort_by_key(|f| f.address);
-        Ok(Self { sections, functions })
+        Ok(Self { sections, functions, timing: Timing::of(target) })
     }
 
     /// Returns the bytes of all code.
@@ -84,7 +92,11 @@ impl Code {
 
     fn instruction(&self, address: u64) -> Result<Instruction> {
         let first = self.half(address).with_context(|| format!("no code at {address:#x}"))?;
-        Ok(Instruction::decode(first, self.half(address + 2).unwrap_or(0)))
+        let second = self.half(address + 2).unwrap_or(0);
+        Ok(match self.timing {
+            Timing::Hazard3 => riscv::decode(first, second),
+            _ => Instruction::decode(first, second),
+        })
     }
 
     /// Visits every executed instruction of a region with its address and its cost.
@@ -98,11 +110,10 @@ impl Code {
                 _ => (None, 0),
             };
             ensure!(follows <= executed.count, "the counts at {:#x} contradict each other", executed.address);
-            let mut cycles = (executed.count - follows) * instruction.cycles();
-            cycles += follows * previous.map_or(0, |before| instruction.cycles_after(before));
-            if instruction.class == Class::Conditional {
-                cycles += executed.jumps * REFILL;
-            }
+            let timing = self.timing;
+            let mut cycles = (executed.count - follows) * timing.cycles(&instruction);
+            cycles += follows * previous.map_or(0, |before| timing.cycles_after(&instruction, before));
+            cycles += executed.jumps * timing.taken(&instruction);
             visit(executed.address, &instruction, Cost { instructions: executed.count, cycles });
             before = Some((executed.address + instruction.size, executed.count - executed.jumps, instruction));
         }
@@ -180,7 +191,7 @@ mod tests {
         let lines = |halves: &[u16]| {
             let bytes = halves.iter().flat_map(|h| h.to_le_bytes()).collect();
             let function = Function { name: "f".into(), address: 0x100, size: 48 };
-            Code { sections: vec![(0x100, bytes)], functions: vec![] }.longest_inner_loop(&function)
+            Code { sections: vec![(0x100, bytes)], functions: vec![], timing: Timing::M4 }.longest_inner_loop(&function)
         };
         assert_eq!(lines(&halves)?, 1);
         halves[16] = 0xd1f5; // bne.n to 0x10e
@@ -194,7 +205,7 @@ mod tests {
         let bytes = [0x9901u16, 0x4351, 0xd1fc].iter().flat_map(|h| h.to_le_bytes()).collect();
         let function = |name: &str, address, size| Function { name: name.into(), address, size };
         let functions = vec![function("first", 0x100, 4), function("second", 0x104, 2)];
-        let code = Code { sections: vec![(0x100, bytes)], functions };
+        let code = Code { sections: vec![(0x100, bytes)], functions, timing: Timing::M4 };
         let at = |address, jumps| Executed { address, count: 3, jumps };
         let executed = vec![at(0x100, 0), at(0x102, 0), at(0x104, 2)];
         let region =
@@ -202,7 +213,7 @@ mod tests {
         assert_eq!(code.by_kind(&region)?, [0, 3, 3, 0, 3, 0]);
         let costs = [
             ("first".to_owned(), Cost { instructions: 6, cycles: 3 * (2 + 1) }),
-            ("second".to_owned(), Cost { instructions: 3, cycles: 3 + 2 * REFILL }),
+            ("second".to_owned(), Cost { instructions: 3, cycles: 3 + 2 * 2 }),
         ];
         assert_eq!(code.by_function(&region)?, costs);
         assert_eq!((code.cycles(&region, 0)?, code.cycles(&region, 5)?), (16, 16 + 3 * 5 + 4 + 3 * 2));

@@ -72,14 +72,6 @@ pub fn harness_with(target: Target, image: &Path) -> Result<PathBuf> {
     Ok(harness_in_folder(target, image)?.join(HARNESS))
 }
 
-/// Returns the harness that runs `image`, and the image if it goes to the slot. A board without a slot has it built in.
-pub fn harness_for(target: Target, image: &Path) -> Result<(PathBuf, Option<&Path>)> {
-    match target {
-        Target::Riscv => Ok((harness_with(target, image)?, None)),
-        _ => Ok((harness(target)?, Some(image))),
-    }
-}
-
 fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
     let image = fs::canonicalize(image).with_context(|| format!("cannot read {}", image.display()))?;
     let image = ("ACTQ_IMAGE", &*image.to_string_lossy());

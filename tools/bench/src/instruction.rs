@@ -1,10 +1,6 @@
 //! Instructions of Armv7E-M with FPU (Thumb-2), as far as their cycles and the stack depend on them.
-//!
-//! The cycles of each class are from the Cortex-M4 Technical Reference Manual, tables 3-1 and 7-1, for memory without
-//! wait states.
 
-/// Cycles to refill the pipeline after a taken branch; the manual gives 1 to 3.
-pub(crate) const REFILL: u64 = 2;
+pub(crate) mod riscv;
 
 /// A class of instructions with the same timing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +43,8 @@ pub enum Class {
     FloatDivide,
     /// VMOV, VMRS and VMSR.
     FloatMove,
+    /// An instruction of Helium.
+    Vector,
 }
 
 /// A kind of instructions, for reports.
@@ -80,7 +78,7 @@ impl Class {
             Self::Load | Self::LoadDouble | Self::LoadMultiple(_) => Kind::Load,
             Self::Store | Self::StoreIndexed | Self::StoreDouble | Self::StoreMultiple(_) => Kind::Store,
             Self::Return(_) | Self::Branch | Self::Conditional => Kind::Branch,
-            Self::Float | Self::FloatAccumulate | Self::FloatDivide | Self::FloatMove => Kind::Float,
+            Self::Float | Self::FloatAccumulate | Self::FloatDivide | Self::FloatMove | Self::Vector => Kind::Float,
         }
     }
 }
@@ -94,7 +92,7 @@ pub struct Instruction {
     pub class: Class,
     /// Core registers written.
     pub writes: u32,
-    /// Core registers of the address.
+    /// Core registers of the address; of RISC-V all that it reads.
     pub address: u32,
     /// Single-precision registers written.
     pub float_writes: u64,
@@ -113,7 +111,7 @@ fn set(n: u32) -> u32 {
 }
 
 impl Instruction {
-    fn new(size: u64, class: Class) -> Self {
+    pub(crate) fn new(size: u64, class: Class) -> Self {
         Self { size, class, writes: 0, address: 0, float_writes: 0, float_reads: 0 }
     }
 
@@ -196,8 +194,11 @@ impl Instruction {
         let op = bits(first, 10, 4);
         // Comparisons have no result and set the flags.
         let alu = || new(Class::Alu).writes(if result == 15 && load { 0 } else { set(result) });
+        // The FPU's coprocessors are 10 and 11; vectors have the other numbers, or none.
+        let is_vector = bits(first, 11, 8) == 15 || !matches!(bits(second, 11, 8), 10 | 11);
         match bits(first, 12, 11) {
-            _ if bits(first, 12, 11) != 2 && op & 0x40 != 0 => Self::decode_float(first, second),
+            1 | 3 if op & 0x40 != 0 && is_vector => new(Class::Vector),
+            1 | 3 if op & 0x40 != 0 => Self::decode_float(first, second),
             1 if op & 0x64 == 0 => {
                 let list = u32::from(second);
                 let class = match (load, list >> 15) {
@@ -291,40 +292,6 @@ impl Instruction {
             },
         };
         Self { float_writes, float_reads, ..new(class) }
-    }
-
-    /// Returns the cycles after a jump, except for a taken conditional branch.
-    pub(crate) fn cycles(&self) -> u64 {
-        match self.class {
-            Class::Alu | Class::Multiply | Class::IfThen | Class::Float | Class::FloatMove => 1,
-            Class::Store | Class::Conditional => 1,
-            Class::MultiplyAccumulate | Class::Load | Class::StoreIndexed => 2,
-            Class::LoadDouble | Class::StoreDouble | Class::FloatAccumulate => 3,
-            Class::Divide => 7,
-            Class::FloatDivide => 14,
-            Class::LoadMultiple(n) | Class::StoreMultiple(n) => 1 + u64::from(n),
-            Class::Return(n) => 1 + u64::from(n) + REFILL,
-            Class::Branch => 1 + REFILL,
-        }
-    }
-
-    /// Returns the cycles after `before`.
-    pub(crate) fn cycles_after(&self, before: &Self) -> u64 {
-        let memory = matches!(self.class.kind(), Kind::Load | Kind::Store);
-        let address_comes_late = before.writes & self.address != 0;
-        let computed = matches!(before.class.kind(), Kind::Alu | Kind::Multiply) || before.class == Class::FloatMove;
-        let single = matches!(self.class, Class::Load | Class::StoreIndexed);
-        let mut cycles = self.cycles();
-        if single && before.class == Class::Load && !address_comes_late {
-            cycles -= 1; // pipelined
-        }
-        if memory && computed && address_comes_late {
-            cycles += 1;
-        }
-        if before.class == Class::Float && before.float_writes & self.float_reads != 0 {
-            cycles += 1;
-        }
-        cycles
     }
 }
 

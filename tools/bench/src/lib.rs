@@ -18,6 +18,7 @@ pub mod profile;
 pub mod qemu;
 mod shared;
 pub mod stack;
+pub mod timing;
 pub mod uart;
 
 use std::path::PathBuf;

@@ -113,6 +113,49 @@ impl Builder {
         Ok(emit::image(&policy, &outcomes)?)
     }
 
+    /// Returns an image of which every linear operation that has biases, and whose output already holds values, accumulates:
+    /// the format has such operations, and no graph lowers to one. It makes chunks of single values: then outputs do not
+    /// share the work area, and those of one length follow each other in the same words.
+    pub fn accumulating(self, name: &str) -> Result<Vec<u8>> {
+        let (mut policy, outcomes) = self.finish(name.to_owned(), false);
+        (policy.kind, policy.chunk, policy.act_len) = (Kind::Chunk, policy.act_len, 1);
+        let mut bytes = emit::image(&policy, &outcomes)?;
+        let name = Path::new(name);
+        let count = ImageBuffer::new(&bytes).image(name)?.op_count();
+        let first = word(&bytes, h::W_OPS) as usize;
+        let mut changed = 0;
+        for record in (first..).step_by(h::OP_WORDS).take(count) {
+            if word(&bytes, record) as u8 == op::LINEAR && word(&bytes, record + 2) != 0 {
+                let mut with = bytes.clone();
+                with[4 * record + 1] = 1;
+                seal(&mut with).context("cannot seal the image: it is too long")?;
+                // Refused if nothing was written there.
+                if ImageBuffer::new(&with).image(name).is_ok() {
+                    (bytes, changed) = (with, changed + 1);
+                }
+            }
+        }
+        ensure!(changed > 0, "the image has no operation that can accumulate");
+        // The actions differ from those of the self-test vector.
+        let buffer = ImageBuffer::new(&bytes);
+        let image = buffer.image(name)?;
+        let mut at = 4 * word(&bytes, h::W_SELF_TEST) as usize;
+        with_head::<_, anyhow::Error>(image, |head| {
+            for step in 0..image.self_test_steps() {
+                let (observation, _) = image.self_test(step).context("the self-test has such a step")?;
+                let observation: Vec<f32> =
+                    observation.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect();
+                let action: Vec<u8> = head.step(&observation)?.iter().flat_map(|value| value.to_le_bytes()).collect();
+                at += 4 * observation.len();
+                bytes[at..][..action.len()].copy_from_slice(&action);
+                at += action.len();
+            }
+            Ok(())
+        })?;
+        seal(&mut bytes).context("cannot seal the image: it is too long")?;
+        Ok(bytes)
+    }
+
     /// Adds a node with its own part of the observation.
     pub fn node_of_part(&mut self, len: usize, kind: impl Into<NodeKind>) -> Result<ValueId> {
         let input = self.part(len)?;
@@ -232,43 +275,4 @@ pub fn with_wrong_self_test(image: &[u8]) -> Result<Vec<u8>> {
 
 fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[4 * at + i]))
-}
-
-/// Changes every linear operation of the image that has biases, and whose output already holds values, to accumulate:
-/// the format has such operations, and no graph lowers to one.
-pub fn accumulating(bytes: &[u8]) -> Result<Vec<u8>> {
-    let name = Path::new("accumulating");
-    let mut bytes = bytes.to_vec();
-    let count = ImageBuffer::new(&bytes).image(name)?.op_count();
-    let first = word(&bytes, h::W_OPS) as usize;
-    let mut changed = 0;
-    for record in (first..).step_by(h::OP_WORDS).take(count) {
-        if word(&bytes, record) as u8 == op::LINEAR && word(&bytes, record + 2) != 0 {
-            let mut with = bytes.clone();
-            with[4 * record + 1] = 1;
-            seal(&mut with).context("cannot seal the image: it is too long")?;
-            // Refused if nothing was written there.
-            if ImageBuffer::new(&with).image(name).is_ok() {
-                (bytes, changed) = (with, changed + 1);
-            }
-        }
-    }
-    ensure!(changed > 0, "the image has no operation that can accumulate");
-    // The actions differ from those of the self-test vector.
-    let buffer = ImageBuffer::new(&bytes);
-    let image = buffer.image(name)?;
-    let mut at = 4 * word(&bytes, h::W_SELF_TEST) as usize;
-    with_head::<_, anyhow::Error>(image, |head| {
-        for step in 0..image.self_test_steps() {
-            let (observation, _) = image.self_test(step).context("the self-test has such a step")?;
-            let observation: Vec<f32> = observation.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect();
-            let action: Vec<u8> = head.step(&observation)?.iter().flat_map(|value| value.to_le_bytes()).collect();
-            at += 4 * observation.len();
-            bytes[at..][..action.len()].copy_from_slice(&action);
-            at += action.len();
-        }
-        Ok(())
-    })?;
-    seal(&mut bytes).context("cannot seal the image: it is too long")?;
-    Ok(bytes)
 }

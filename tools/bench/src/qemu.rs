@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail, ensure};
 use tempfile::NamedTempFile;
 
 use crate::bits;
-use crate::firmware::{cargo_build, harness_for, symbol};
+use crate::firmware::{cargo_build, harness, symbol};
 
 /// Returns QEMU's command for `elf`, an image in the slot if one is given, and arguments of the firmware.
 pub fn command(elf: &Path, slot: Option<&Path>, arguments: &str) -> Result<Command> {
@@ -122,10 +122,10 @@ impl Server {
 /// have the same bits.
 pub fn same_bits(target: Target, bytes: &[u8], observations: &[Vec<f32>]) -> Result<()> {
     let file = slot(bytes)?;
-    let (elf, slot) = harness_for(target, file.path())?;
+    let elf = harness(target)?;
     let buffer = ImageBuffer::new(bytes);
     let image = buffer.image(file.path())?;
-    let mut server = Server::start(command_on(target, &elf, slot, "serve")?, image.act_len())?;
+    let mut server = Server::start(command_on(target, &elf, Some(file.path()), "serve")?, image.act_len())?;
     with_head(image, |head| {
         for (step, observation) in observations.iter().enumerate() {
             if step == observations.len() / 2 {

@@ -121,8 +121,14 @@ fn main() -> ExitCode {
         Command::Peers(options) => {
             measure(&[Target::Fpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M55], "peers", options)
         }
-        Command::Fit(options) => measure(&[Target::Fpu], "fit", options),
-        Command::Budgets(options) => measure(&[Target::Fpu, Target::M33], "budgets", options),
+        Command::Fit(options) => measure(
+            &[Target::Fpu, Target::NoFpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M55],
+            "fit",
+            options,
+        ),
+        Command::Budgets(options) => {
+            measure(&[Target::Fpu, Target::M33, Target::NoDsp, Target::V6m, Target::Riscv], "budgets", options)
+        }
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -11,6 +11,10 @@ use super::values::{clock, core, npz, steps};
 pub(crate) struct InspectArgs {
     /// The image
     pub(crate) image: PathBuf,
+    /// The core of the predicted time, with the image's layouts: m0, m3, rv32imac, rv32zb, m4, m4f, m7, m33 or m55
+    /// [default: m4f]
+    #[arg(long, value_name = "CORE", value_parser = core, conflicts_with = "widths")]
+    pub(crate) core: Option<Core>,
     /// The processor's clock, in Hz or as 168M
     #[arg(long, value_name = "HZ", default_value = "168M", value_parser = clock, conflicts_with = "widths")]
     pub(crate) clock: f64,

@@ -65,16 +65,16 @@ pub struct QuantizeArgs {
 /// Budget of an image.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct BudgetArgs {
-    /// Bits of every weight: 2, 3, 4 or 8 [default: 3 for rtn, gptq and beside --width and --protect]
+    /// Bits of every weight: 2, 3, 4 or 8 [default: 3; distill divides as many bytes among the rows]
     #[arg(long, value_name = "N", conflicts_with = "bpw", value_parser = width)]
     pub(crate) bits: Option<Width>,
-    /// Bits per weight of all weights, with scales and padding; each matrix gets a width [default: 3 for distill]
+    /// Bits per weight of all weights, with scales and padding; each matrix gets a width
     #[arg(long, value_name = "X", value_parser = positive)]
     pub(crate) bpw: Option<f64>,
     /// The most bytes of the image, as 98304, 96K or 1M (K is 1024 bytes, M is 1024 K)
     #[arg(long, value_name = "SIZE", conflicts_with_all = ["bits", "bpw"], value_parser = size)]
     pub(crate) flash: Option<usize>,
-    /// The most milliseconds of a step on a Cortex-M4, as predicted; with --flash, both are kept
+    /// The most milliseconds of a step, as predicted, on the core of --core or a Cortex-M4; with --flash, both are kept
     #[arg(long, value_name = "X", conflicts_with_all = ["bits", "bpw"], value_parser = positive)]
     pub(crate) ms: Option<f64>,
     /// The processor's clock for --ms, in Hz or as 168M
@@ -97,7 +97,10 @@ impl BudgetArgs {
         let limits = [
             bits.map(Budget::Width),
             bpw.map(Budget::BitsPerWeight),
-            ms.map(|milliseconds| Budget::Time(TimeLimit { milliseconds, clock_hz: clock, image_bytes: flash })),
+            ms.map(|milliseconds| {
+                let core = core.unwrap_or(Core::M4f);
+                Budget::Time(TimeLimit { milliseconds, core, clock_hz: clock, image_bytes: flash })
+            }),
             flash.map(Budget::ImageBytes),
         ];
         limits.into_iter().flatten().next()

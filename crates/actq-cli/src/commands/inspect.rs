@@ -1,6 +1,5 @@
 //! `actq inspect`
 
-use actq::measure::time::StepTime;
 use actq::pipeline::stats::Stats;
 use actq::runtime::ImageBuffer;
 use anyhow::Result;
@@ -15,10 +14,9 @@ pub(crate) fn run(args: &InspectArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     if !args.widths {
-        let step = StepTime::new(&image, args.clock);
         return print(&match args.json {
-            true => serde_json::to_string(&step)? + "\n",
-            false => format!("{}\n{}", inspect::report(&image), time::report(&image, &step)),
+            true => serde_json::to_string(&time::of_image(&image, args.core, args.clock)?)? + "\n",
+            false => format!("{}\n{}", inspect::report(&image), time::report(&image, args.core, args.clock)?),
         });
     }
     let stats = args.stats.as_deref().map(|path| Stats::read(path, &image)).transpose()?;

@@ -5,9 +5,10 @@ use std::time::Instant;
 
 use actq::budget::Budget;
 use actq::data::{Recording, Recordings, Share, Sizes, driven_by, files_of};
-use actq::emit::{Core, repack};
+use actq::emit::repack;
+use actq::graph::Graph;
 use actq::measure::size::{Beside, file_bits_per_weight};
-use actq::measure::time::{CLOCK, StepTime};
+use actq::measure::time::CLOCK;
 use actq::measure::{check, own, recorded};
 use actq::methods::{Activations, Method, Options};
 use actq::pipeline::stats::Stats;
@@ -15,7 +16,7 @@ use actq::pipeline::{HeldOut, QuantizedPolicy, Quantizer, check_budget, minutes_
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_kernels::Width;
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, bail};
 
 use crate::args::{ActivationArg, QuantizeArgs};
 use crate::importers::{self, learned as learned_from, load, policy_files};
@@ -43,14 +44,10 @@ pub fn run(
     if args.policy_dir.is_file() && !has_calib && method != Some(Method::Rtn) {
         bail!("{}: {}", args.policy_dir.display(), notes::how_to_record(&source));
     }
-    let mut options = options(args, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }));
+    let mut options =
+        options(args, &source.graph, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }));
     options.check()?;
     options.check_length()?;
-    let is_timed = matches!(options.budget, Budget::Time(_));
-    ensure!(
-        !is_timed || args.core.is_none_or(Core::has_default_layouts),
-        "--ms with --core: no time is predicted for cores with other layouts than the Cortex-M4; use --bpw or --flash"
-    );
     check_budget(&source, &options)?;
     let (calib, shares) = learned_from(&source, &calib)?.map(|l| (l.dataset, l.shares)).unzip();
     let shares = shares.unwrap_or_default();
@@ -126,9 +123,8 @@ fn report(
         quantizer.method().imagined().filter(|_| found.steps() > 0).map_or(String::new(), quantized::imagined);
     let learned = sampled + &imagined + &found.learning.as_ref().map_or(String::new(), quantized::learning);
     let time = match &found.time {
-        _ if !time::is_modelled(&image) => time::NOT_MODELLED.to_owned(),
         Some(step) => time::sentence(step),
-        None => time::sentence(&StepTime::new(&image, CLOCK)),
+        None => time::sentence(&time::of_image(&image, args.core, CLOCK)?),
     };
     let (parameters, bytes) = (source.parameters, found.image.len());
     let f32_bytes = 4 * parameters;
@@ -179,13 +175,14 @@ fn own_path(args: &QuantizeArgs, source: &Policy, network: &ImageBuffer, shares:
 }
 
 /// Returns the options of the command line.
-fn options(args: &QuantizeArgs, method: Method) -> Options {
+fn options(args: &QuantizeArgs, graph: &Graph, method: Method) -> Options {
+    let group = args.group.unwrap_or(method.default_group());
     let protected = args.protect.iter().map(|name| (name.clone(), Width::W8));
     let forced: Vec<_> = args.width.iter().cloned().chain(protected).collect();
     let budget = args.max_nmse.map(Budget::MaxNmse).or_else(|| args.budget.budget(args.core));
-    let budget = budget.unwrap_or_else(|| method.default_budget(!forced.is_empty()));
+    let budget = budget.unwrap_or_else(|| method.default_budget(graph, group, !forced.is_empty()));
     Options {
-        group: args.group.unwrap_or(method.default_group()),
+        group,
         activations: match args.activations {
             Some(ActivationArg::Int8) => Activations::Int8,
             Some(ActivationArg::Int16) => Activations::Int16,

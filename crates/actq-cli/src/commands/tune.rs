@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use actq::data::{Dataset, Recording, Sizes, files_of};
 use actq::error::Error;
+use actq::graph::Graph;
 use actq::methods::{Method, Options};
 use actq::pipeline::check_budget;
 use actq::pipeline::tune::{self, TunePlan};
@@ -21,9 +22,6 @@ use crate::threads::start_threads;
 
 /// Quantizes in on-policy rounds: rolls out, labels, and learns again.
 pub(crate) fn run(args: &TuneArgs) -> Result<()> {
-    let options = options(args);
-    options.check()?;
-    options.check_length()?;
     let calib = files_of(&args.calib)?;
     // Before the outputs, which may be in this folder.
     let folder = Folder::new(args.keep.as_deref())?;
@@ -41,6 +39,9 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
          `actq quantize --calib`",
         args.policy_dir.display()
     );
+    let options = options(args, &policy.graph);
+    options.check()?;
+    options.check_length()?;
     check_budget(&policy, &options)?;
     let sizes = Sizes::of(&policy);
     let calib = calibration(args, calib, sizes)?;
@@ -78,19 +79,12 @@ pub(crate) fn run(args: &TuneArgs) -> Result<()> {
 }
 
 /// Returns the options of the command line.
-fn options(args: &TuneArgs) -> Options {
+fn options(args: &TuneArgs, graph: &Graph) -> Options {
+    let method = Method::Distill;
+    let default = || method.default_budget(graph, method.default_group(), false);
+    let budget = args.budget.budget(None).unwrap_or_else(default);
     let LearnArgs { distill: DistillArgs { effort, steps, relative }, minutes } = args.learn;
-    Options {
-        effort,
-        steps,
-        minutes,
-        relative,
-        seed: args.run.seed,
-        ..Options::new(
-            Method::Distill,
-            args.budget.budget(None).unwrap_or_else(|| Method::Distill.default_budget(false)),
-        )
-    }
+    Options { effort, steps, minutes, relative, seed: args.run.seed, ..Options::new(method, budget) }
 }
 
 /// Reads the recordings of the f32 policy: the given files, or those in the policy folder.

@@ -1,5 +1,6 @@
 //! The table of a sweep.
 
+use actq::emit::Core;
 use actq_jobs::results::{Figures, Merged, MergedImage, MergedPolicy};
 
 use super::{table, time};
@@ -41,7 +42,7 @@ pub fn report(merged: &Merged) -> String {
     text + &format!(
         "bytes: the whole image in flash. ms: predicted time of a step, {}. bits: per weight, with scales and padding. -: no \
          image is within the limit.\n",
-        time::conditions(merged.clock_hz)
+        time::conditions(Core::M4f, merged.clock_hz)
     )
 }
 

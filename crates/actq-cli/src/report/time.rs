@@ -1,15 +1,49 @@
 //! The predicted time of a step.
 
+use actq::emit::Core;
 use actq::measure::time::StepTime;
 use actq_kernels::Image;
+use anyhow::{Result, ensure};
 
 use super::table::table;
 
-/// Formats the table that `actq inspect` prints, if the model has the image's layouts.
-pub fn report(image: &Image<'_>, step: &StepTime) -> String {
-    if !is_modelled(image) {
-        return NOT_MODELLED.to_owned();
+/// Formats the table that `actq inspect` prints for a core; without one for a Cortex-M4 with FPU, if the image has its
+/// layouts.
+///
+/// # Errors
+///
+/// If the image has the layouts of other cores.
+pub fn report(image: &Image<'_>, core: Option<Core>, clock_hz: f64) -> Result<String> {
+    match core {
+        None if !Core::M4f.has_layouts_of(image) => Ok(unknown(image)),
+        _ => Ok(steps(&of_image(image, core, clock_hz)?)),
     }
+}
+
+/// Predicts the step of an image on a core; without one on a Cortex-M4 with FPU.
+///
+/// # Errors
+///
+/// If the image has the layouts of other cores.
+pub fn of_image(image: &Image<'_>, core: Option<Core>, clock_hz: f64) -> Result<StepTime> {
+    let core = core.unwrap_or(Core::M4f);
+    ensure!(
+        core.has_layouts_of(image),
+        "the image has the layouts of {}, and no time is known for {}; `actq repack --core {}` converts it",
+        cores(image),
+        core.title(),
+        core.name()
+    );
+    Ok(StepTime::new(image, core, clock_hz))
+}
+
+/// Returns the names of the cores whose layouts the image has.
+fn cores(image: &Image<'_>) -> String {
+    let own = Core::ALL.into_iter().filter(|(_, core)| core.has_layouts_of(image));
+    own.map(|(name, _)| name).collect::<Vec<_>>().join(", ")
+}
+
+fn steps(step: &StepTime) -> String {
     let mut rows = table(&["op", "output", "runs", "MACs", "instructions", "per MAC", "cycles", "per MAC", "us"]);
     let mut row = |op: &str, output: String, runs: String, macs: usize, instructions: u64, cycles: u64, us: f64| {
         let per_mac = |n: u64| if macs == 0 { "-".to_owned() } else { format!("{:.3}", n as f64 / macs as f64) };
@@ -34,19 +68,18 @@ pub fn report(image: &Image<'_>, step: &StepTime) -> String {
 }
 
 /// Says why there is no time.
-pub const NOT_MODELLED: &str = "No time is predicted: the weights are in other layouts than those of the Cortex-M4.\n";
-
-/// Returns `true` if the model of the Cortex-M4 has the image's layouts.
-pub fn is_modelled(image: &Image<'_>) -> bool {
-    image.features().all(|feature| !["scalar", "helium"].contains(&feature))
+fn unknown(image: &Image<'_>) -> String {
+    format!("The weights are in the layouts of {}: name one with --core for the time of a step.\n", cores(image))
 }
 
 /// Formats the time of the step as a sentence.
 pub fn sentence(step: &StepTime) -> String {
-    format!("Predicted time of a step: {:.3} ms {}.\n", step.milliseconds, conditions(step.clock_hz))
+    let estimate = if step.core.is_modelled() { "" } else { " (an estimate)" };
+    let conditions = conditions(step.core, step.clock_hz);
+    format!("Predicted time of a step: {:.3} ms {conditions}{estimate}.\n", step.milliseconds)
 }
 
 /// Formats the conditions of all predicted times.
-pub fn conditions(clock_hz: f64) -> String {
-    format!("at {} MHz on a Cortex-M4 with FPU and zero-wait-state memory", clock_hz / 1e6)
+pub fn conditions(core: Core, clock_hz: f64) -> String {
+    format!("at {} MHz on {}, with zero-wait-state memory", clock_hz / 1e6, core.title())
 }

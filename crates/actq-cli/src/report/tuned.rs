@@ -1,5 +1,6 @@
 //! The table of `actq tune`.
 
+use actq::emit::Core;
 use std::path::Path;
 
 use actq::measure::time::CLOCK;
@@ -41,7 +42,7 @@ pub fn table(tuned: &Tuned) -> String {
     format!(
         "{rows}\n\nEpisodes and frames: of the recordings learned from. ms: predicted time of a step, {}.\n\
          f32 path: NMSE on {}. own path: NMSE on the image's own rollout.\n",
-        conditions(CLOCK),
+        conditions(Core::M4f, CLOCK),
         tuned.measured_on
     )
 }

@@ -2,6 +2,7 @@
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Learned, Recordings, Sizes};
+use actq::emit::Core;
 use actq::error::{Cause, Error, Result};
 use actq::measure::recorded;
 use actq::measure::time::{CLOCK, StepTime};
@@ -107,7 +108,7 @@ fn made(
     let result = JobResult {
         image: of_bytes(&quantized.image),
         bytes: image.bytes(),
-        cycles: StepTime::new(&image, CLOCK).cycles,
+        cycles: StepTime::new(&image, Core::M4f, CLOCK).cycles,
         bpw: actq::measure::size::bits_per_weight(&image),
         steps: quantized.steps(),
         frames,

@@ -1,70 +1,13 @@
 //! The same weights in the layouts of another core.
 
 use actq_kernels::activations::{Plan, max_prepared_words};
+use actq_kernels::cost::Core;
 use actq_kernels::image::{BlockRecord, Image, Matrix, MatrixRecord, Port, Records, RowBlock, header as h, op};
 use actq_kernels::layout::{BlockShape, Lanes, pack};
 
 use super::writer::sealed;
 use crate::error::{Context, Result, ensure};
 use crate::runtime::{ImageBuffer, with_head};
-
-/// A core that images are for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Core {
-    /// Cortex-M0, M0+.
-    M0,
-    /// Cortex-M3.
-    M3,
-    /// RV32IMAC.
-    Rv32imac,
-    /// RV32IMAC with Zba and Zbb.
-    Rv32zb,
-    /// Cortex-M4 without FPU.
-    M4,
-    /// Cortex-M4 with FPU.
-    M4f,
-    /// Cortex-M7.
-    M7,
-    /// Cortex-M33 with the DSP extension.
-    M33,
-    /// Cortex-M55 and M85, with Helium.
-    M55,
-}
-
-impl Core {
-    /// All cores with their names.
-    pub const ALL: [(&str, Self); 9] = [
-        ("m0", Self::M0),
-        ("m3", Self::M3),
-        ("rv32imac", Self::Rv32imac),
-        ("rv32zb", Self::Rv32zb),
-        ("m4", Self::M4),
-        ("m4f", Self::M4f),
-        ("m7", Self::M7),
-        ("m33", Self::M33),
-        ("m55", Self::M55),
-    ];
-
-    /// Returns the core of this name.
-    pub fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find_map(|(known, core)| (known == name).then_some(core))
-    }
-
-    /// Returns `true` if the core's layouts are the default, those of the DSP extension.
-    pub fn has_default_layouts(self) -> bool {
-        self.lanes(Lanes::PAIRED_X_MAX, 0) == Lanes::Paired
-    }
-
-    /// Returns the lanes of a matrix for the core. Activations of more than 8 bits have only the DSP extension's.
-    fn lanes(self, x_max: u16, group: usize) -> Lanes {
-        match self {
-            _ if x_max > Lanes::PAIRED_X_MAX => Lanes::of(x_max, group),
-            Self::M55 => Lanes::Helium,
-            Self::M0 | Self::M3 | Self::Rv32imac | Self::Rv32zb => Lanes::Scalar,
-            Self::M4 | Self::M4f | Self::M7 | Self::M33 => Lanes::of(x_max, group),
-        }
-    }
-}
 
 /// Returns the image with its weights in the layouts of `core`: the same codes and scales, the same actions. An image that
 /// has them already stays as it is, byte for byte.
@@ -76,11 +19,7 @@ pub fn repack(bytes: &[u8], core: Core) -> Result<Vec<u8>> {
     let buffer = ImageBuffer::new(bytes);
     let image = Image::new_checked(buffer.bytes()).context("the image to repack")?;
     let old: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
-    let is_packed = image.matrices().all(|matrix| {
-        let fits = |shape: BlockShape| shape.lanes == core.lanes(matrix.x_max, matrix.group);
-        matrix.blocks().all(|block| fits(block.block.shape()))
-    });
-    if is_packed {
+    if core.has_layouts_of(&image) {
         return Ok(bytes.to_vec());
     }
     let matrices = Repacked::of(&image, core)?;

@@ -1,7 +1,7 @@
 //! Predicted time on the target: the cost model (`actq_kernels::cost`) at a clock.
 
 use actq_kernels::Image;
-use actq_kernels::cost::{self, Cost};
+use actq_kernels::cost::{Core, Cost};
 use actq_kernels::image::Op;
 use serde::Serialize;
 
@@ -27,9 +27,13 @@ pub struct OpTime {
     pub microseconds: f64,
 }
 
-/// The cost of a step that evaluates the network, on a Cortex-M4 with FPU.
+/// The cost of a step that evaluates the network, on a core. It is known if the core
+/// [has the image's layouts](Core::has_layouts_of).
 #[derive(Clone, Debug, Serialize)]
 pub struct StepTime {
+    /// The core.
+    #[serde(serialize_with = "crate::budget::core_name::serialize")]
+    pub core: Core,
     /// The processor's clock in Hz.
     pub clock_hz: f64,
     /// Operations, and last the rest of a step.
@@ -48,7 +52,8 @@ pub struct StepTime {
 
 impl StepTime {
     /// Predicts the cost of a step.
-    pub fn new(image: &Image<'_>, clock_hz: f64) -> Self {
+    pub fn new(image: &Image<'_>, core: Core, clock_hz: f64) -> Self {
+        let rates = core.rates();
         let time = |op: &str, output, runs, macs, cost: Cost| OpTime {
             op: op.to_owned(),
             output,
@@ -61,12 +66,13 @@ impl StepTime {
         let of_op = |(i, op): (usize, Op<'_>)| {
             let runs = if i < image.first_denoising_op() { 1 } else { image.denoising_steps() };
             let macs = op.matrix().map_or(0, |matrix| matrix.rows * matrix.cols);
-            time(op.kind.name(), op.dst().len, runs, runs * macs, cost::of_op(&op) * runs as u64)
+            time(op.kind.name(), op.dst().len, runs, runs * macs, rates.of_op(&op) * runs as u64)
         };
-        let frame = time("step", image.act_len(), 1, 0, cost::of_frame(image));
+        let frame = time("step", image.act_len(), 1, 0, rates.of_frame(image));
         let ops: Vec<OpTime> = image.ops().enumerate().map(of_op).chain([frame]).collect();
-        let Cost { instructions, cycles } = cost::of_step(image);
+        let Cost { instructions, cycles } = rates.of_step(image);
         Self {
+            core,
             clock_hz,
             macs: ops.iter().map(|op| op.macs).sum(),
             ops,

@@ -6,6 +6,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use actq_kernels::Width;
+use actq_kernels::image::block_bytes;
 use actq_kernels::layout::{GROUPS, is_group};
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +18,7 @@ use super::quantized::Outcome;
 use crate::budget::{Budget, Rate};
 use crate::data::Dataset;
 use crate::error::{Result, ensure};
-use crate::graph::Graph;
+use crate::graph::{Graph, WeightMatrix};
 
 /// Method by which codes are chosen.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,13 +49,17 @@ impl Method {
         }
     }
 
-    /// Returns the budget if none is given. Method distill divides bits among rows; the others give all weights one
-    /// width, and so does distill beside widths that the caller forces.
-    pub fn default_budget(&self, is_forced: bool) -> Budget {
-        match self {
-            Self::Distill if !is_forced => Budget::BitsPerWeight(3.0),
-            _ => Budget::Width(Width::W3),
+    /// Returns the budget if none is given: 3 bits for every weight. Method distill divides as many bytes among the rows,
+    /// unless the caller forces widths.
+    pub fn default_budget(&self, graph: &Graph, group: usize, is_forced: bool) -> Budget {
+        const WIDTH: Width = Width::W3;
+        if *self != Self::Distill || is_forced {
+            return Budget::Width(WIDTH);
         }
+        let packing = Packing::of(Activations::Int8.limit(), group);
+        let bytes = |matrix: &WeightMatrix| block_bytes(packing.shape(WIDTH, matrix.rows, matrix.cols), false);
+        let all: usize = graph.matrices.iter().map(bytes).sum();
+        Budget::BitsPerWeight(8.0 * all as f64 / graph.weights().max(1) as f64)
     }
 
     /// Returns the fewest frames that the method takes.
@@ -265,9 +270,12 @@ mod tests {
 
     #[test]
     fn only_distill_divides_bits_by_default() {
-        assert_eq!(Method::Distill.default_budget(false), Budget::BitsPerWeight(3.0));
+        let graph = crate::testing::layers(&[48, 64, 12]);
+        let Budget::BitsPerWeight(bits) = Method::Distill.default_budget(&graph, 0, false) else { panic!("one width") };
+        // Scales and the padding of short rows count.
+        assert!(bits > 3.0 && bits < 4.5, "{bits}");
         for (method, is_forced) in [(Method::Distill, true), (Method::Gptq, false), (Method::Rtn, false)] {
-            assert_eq!(method.default_budget(is_forced), Budget::Width(Width::W3));
+            assert_eq!(method.default_budget(&graph, 0, is_forced), Budget::Width(Width::W3));
         }
     }
 

@@ -1,6 +1,7 @@
 //! Properties that decide the layout of rows, beside their widths.
 
 use actq_kernels::Width;
+use actq_kernels::cost::Core;
 use actq_kernels::layout::{BlockShape, Lanes};
 
 /// Bits of the activations.
@@ -43,8 +44,8 @@ impl Activations {
 /// Packing of rows, beside their widths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Packing {
-    /// Lanes of the activations.
-    pub lanes: Lanes,
+    /// Largest activation.
+    pub x_max: u16,
     /// Columns per u8 scale; 0 = none.
     pub group: usize,
 }
@@ -52,11 +53,16 @@ pub struct Packing {
 impl Packing {
     /// Returns the packing for activations up to this magnitude.
     pub fn of(x_max: u16, group: usize) -> Self {
-        Self { lanes: Lanes::of(x_max, group), group }
+        Self { x_max, group }
     }
 
-    /// Returns the shape of a block of rows.
+    /// Returns the shape of a block of rows, in the default layouts.
     pub fn shape(self, width: Width, rows: usize, cols: usize) -> BlockShape {
-        BlockShape { width, lanes: self.lanes, rows, cols, group: self.group }
+        BlockShape { width, lanes: Lanes::of(self.x_max, self.group), rows, cols, group: self.group }
+    }
+
+    /// Returns the shape in the layouts of a core.
+    pub fn shape_on(self, core: Core, shape: BlockShape) -> BlockShape {
+        BlockShape { lanes: core.lanes(self.x_max, self.group), ..shape }
     }
 }

@@ -8,6 +8,7 @@
 //! held out in turn. After that many tries, a smaller budget may still pass, and the tries show which range is open.
 //! The search assumes that errors fall with bits.
 
+use actq_kernels::cost::Core;
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -123,7 +124,7 @@ impl Attempts<'_, '_> {
             Ok(quantized) => {
                 let buffer = quantized.buffer();
                 let image = buffer.image(Path::new("image in memory"))?;
-                let milliseconds = StepTime::new(&image, CLOCK).milliseconds;
+                let milliseconds = StepTime::new(&image, Core::M4f, CLOCK).milliseconds;
                 let watch = |share: f64| watch.progress(&work, 0.5 + 0.5 * share);
                 let held_out = self.quantizer.held_out_error(&quantized, &options, watch)?;
                 let report = match &held_out {

@@ -9,6 +9,7 @@ use crate::emit;
 use crate::error::{Context, Result, ensure};
 use crate::measure::time::StepTime;
 use crate::methods::{Activations, Method, Options, Progress};
+use crate::runtime::ImageBuffer;
 
 /// Bits per weight above those of any image.
 const MAX_BITS: f64 = 10.0;
@@ -18,9 +19,10 @@ const TRIES: usize = 10;
 const REST_TRIES: usize = 2;
 const REST_MARGIN: f64 = 0.001;
 
-/// Predicts the step of an image.
+/// Predicts the step of an image in the layouts of the limit's core.
 fn predict(quantized: &QuantizedPolicy, limit: TimeLimit) -> Result<StepTime> {
-    Ok(StepTime::new(&quantized.buffer().image(Path::new("the new image"))?, limit.clock_hz))
+    let packed = ImageBuffer::new(&emit::repack(&quantized.image, limit.core)?);
+    Ok(StepTime::new(&packed.image(Path::new("the new image"))?, limit.core, limit.clock_hz))
 }
 
 /// Makes the image with the lowest expected error whose step keeps the limit; `options.budget` is ignored. Of methods
@@ -64,7 +66,7 @@ impl Draft<'_, '_> {
     /// Finds the cycles that rows may take: the limit less the cycles of everything else, which hardly depend on the
     /// rows.
     fn cycles(&self) -> Result<Rate> {
-        let TimeLimit { milliseconds, clock_hz, image_bytes } = self.limit;
+        let TimeLimit { milliseconds, core, clock_hz, image_bytes } = self.limit;
         // More than any step takes, and small enough for sums.
         let allowed = (milliseconds * clock_hz / 1e3).min(1e18);
         let bytes = image_bytes.map(|bytes| flash::room(self.quantizer, self.options, bytes)).transpose()?;
@@ -76,13 +78,13 @@ impl Draft<'_, '_> {
             let cycles = predict(&self.quantizer.image_of(network, rate)?, self.limit)?.cycles as f64;
             Ok((cycles, cycles - counted))
         };
-        let (fastest, mut rest) = taken(Rate::Within { bytes, cycles: 0.0 })?;
+        let (fastest, mut rest) = taken(Rate::Within { bytes, cycles: 0.0, core })?;
         self.check(1e3 * fastest / clock_hz)?;
         // A network of one row in every matrix lacks some operations.
         for _ in 0..REST_TRIES {
-            rest = taken(Rate::Within { bytes, cycles: (allowed - rest).max(0.0) })?.1.max(rest);
+            rest = taken(Rate::Within { bytes, cycles: (allowed - rest).max(0.0), core })?.1.max(rest);
         }
-        Ok(Rate::Within { bytes, cycles: (allowed - rest - REST_MARGIN * allowed).max(0.0) })
+        Ok(Rate::Within { bytes, cycles: (allowed - rest - REST_MARGIN * allowed).max(0.0), core })
     }
 
     /// Finds the most bits per weight.
@@ -113,10 +115,11 @@ impl Draft<'_, '_> {
     }
 
     fn check(&self, fastest: f64) -> Result<()> {
-        let TimeLimit { milliseconds, clock_hz, .. } = self.limit;
+        let TimeLimit { milliseconds, core, clock_hz, .. } = self.limit;
         ensure!(
             fastest <= milliseconds,
-            "the limit is {milliseconds} ms, but the fastest step takes {fastest:.4} ms at {} MHz; allow {:.3} ms or more",
+            "the limit is {milliseconds} ms, but the fastest step takes {fastest:.4} ms on {} at {} MHz; allow {:.3} ms or more",
+            core.title(),
             clock_hz / 1e6,
             (1e3 * fastest).ceil() / 1e3
         );
@@ -155,6 +158,8 @@ fn least_bits<T>(refused: Result<T>) -> Result<f64> {
 
 #[cfg(test)]
 mod tests {
+    use actq_kernels::cost::Core;
+
     use super::*;
     use crate::budget::Budget;
     use crate::data::Recordings;
@@ -167,11 +172,11 @@ mod tests {
             let recordings = Recordings { calib: Some(dataset(&graph, 4, 60)), heldout: None };
             let policy = Policy::of("small", graph);
             let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {}).expect("statistics");
-            let limit = TimeLimit { milliseconds: 1.0, clock_hz: 168e6, image_bytes: None };
+            let limit = TimeLimit { milliseconds: 1.0, core: Core::M4f, clock_hz: 168e6, image_bytes: None };
             let activations = Activations::Unmeasured;
             let options = Options { steps: Some(1), activations, ..Options::new(Method::Distill, Budget::Time(limit)) };
             let rest = |cycles: f64| {
-                let rate = Rate::Within { bytes: None, cycles };
+                let rate = Rate::Within { bytes: None, cycles, core: limit.core };
                 let network = quantizer.method.quantize(rate, &options, |_| {}).expect("a network");
                 let counted = network.cycles.expect("they are limited");
                 let image = quantizer.image_of(network, rate).expect("an image");

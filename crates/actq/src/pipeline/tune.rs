@@ -1,6 +1,7 @@
 //! On-policy rounds: an image is rolled out, the f32 policy labels what the image observed, and the next image also
 //! learns from that (DAgger: Ross, Gordon, Bagnell 2011, with the f32 policy as the expert).
 
+use actq_kernels::cost::Core;
 use std::path::Path;
 use std::time::Instant;
 
@@ -133,7 +134,7 @@ pub fn run(
             frames: sum(|share| share.kept),
             bpw: report.bpw,
             bytes: report.bytes,
-            milliseconds: StepTime::new(&image, CLOCK).milliseconds,
+            milliseconds: StepTime::new(&image, Core::M4f, CLOCK).milliseconds,
             nmse: report.nmse,
             own_nmse: eval::evaluate(image, &own_path).ok().map(|report| report.nmse),
             driven: driven.outcome,

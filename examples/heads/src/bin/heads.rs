@@ -1,6 +1,7 @@
 //! The cost of the heads: bytes, memory, instructions, time, polls.
 #![forbid(unsafe_code)]
 
+use actq_kernels::cost::Core;
 use std::path::{Path, PathBuf};
 
 use actq::budget::Budget;
@@ -77,7 +78,7 @@ fn report(head: &Head) -> Result<String> {
         let options = Options { group, ..Options::new(Method::Rtn, Budget::Width(width)) };
         let buffer = ImageBuffer::new(&quantize(&policy, &Recordings::default(), &options, ())?.image);
         let image = buffer.image(Path::new("memory"))?;
-        let time = StepTime::new(&image, CLOCK);
+        let time = StepTime::new(&image, Core::M4f, CLOCK);
         let half = 0.5 * CLOCK / TICKS * time.instructions as f64 / time.cycles as f64;
         let fits = |fits: bool| if fits { "fits" } else { "no" }.to_owned();
         let scratch = 4 * image.scratch_words();

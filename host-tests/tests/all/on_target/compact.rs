@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use actq_bench::cycles::Code;
+use actq_bench::profile::Harness;
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, firmware, ur3};
 use anyhow::{Result, ensure};
@@ -55,8 +56,8 @@ fn short_loops_take_little_more_time() -> Result<()> {
 #[test]
 fn polls_of_short_loops_stay_within_their_budget() -> Result<()> {
     let images = [distill(2.0), distill(3.0)];
-    let elf = firmware::compact_binary("harness")?;
-    let tried = polls_keep_their_budget(&elf, &ur3(), &images, |least| vec![least + least / 4, 40_000])?;
+    let harness = Harness::of(Target::Fpu, firmware::compact_binary("harness")?)?;
+    let tried = polls_keep_their_budget(&harness, &ur3(), &images, |least| vec![least + least / 4, 40_000])?;
     ensure!(tried == 4, "{tried} budgets");
     Ok(())
 }

@@ -12,10 +12,11 @@ use actq::pipeline::{Quantizer, quantize};
 use actq::policy::Policy;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
-use actq_bench::networks::{Builder, accumulating};
-use actq_bench::qemu::{self, Counter};
-use actq_bench::{Target, bits, firmware, profile, shared_policies, ur3};
-use actq_kernels::cost::{Cost, of_op, of_step};
+use actq_bench::networks::Builder;
+use actq_bench::profile::Harness;
+use actq_bench::qemu;
+use actq_bench::{Target, bits, shared_policies, ur3};
+use actq_kernels::cost::{Core, Cost, Rates};
 use actq_kernels::image::Kind;
 use actq_kernels::{StepError, Width};
 use anyhow::{Context, Result, bail, ensure};
@@ -64,7 +65,7 @@ fn near(what: &str, predicted: Cost, counted: &[Cost], limit: f64) -> Result<f64
 /// Predicts the step of every image, and compares with the mean over recorded observations. Returns the counted
 /// instructions per weight of the f32 policy.
 fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
-    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
+    let harness = Harness::build(Target::Fpu)?;
     let policy = Policy::load(dir)?;
     let observations = observations(dir, &policy)?;
     let mut per_mac = Vec::new();
@@ -72,11 +73,11 @@ fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
         let bytes = image(&policy, options)?;
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(dir)?;
-        let counted: Vec<Cost> = profile::steps(&elf, &counter, &bytes, &observations)?;
+        let counted: Vec<Cost> = harness.steps(&bytes, &observations)?;
         let evaluated: Vec<Cost> = counted.iter().step_by(image.execute()).copied().collect();
-        let predicted = of_step(&image);
+        let predicted = Rates::M4F.of_step(&image);
         let instructions = near(&format!("{}, {options:?}", policy.name), predicted, &evaluated, ERROR)?;
-        let time = StepTime::new(&image, CLOCK);
+        let time = StepTime::new(&image, Core::M4f, CLOCK);
         ensure!(time.cycles == predicted.cycles && time.instructions == predicted.instructions, "{time:?}");
         per_mac.push(instructions / policy.weights as f64);
     }
@@ -86,7 +87,7 @@ fn predictions_hold(dir: &Path, images: &[Options]) -> Result<Vec<f64>> {
 /// Chunks that are averaged, and chunks that blend into the next, of other sizes than those of the fit.
 #[test]
 fn steps_that_merge_chunks_match_the_prediction() -> Result<()> {
-    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
+    let harness = Harness::build(Target::Fpu)?;
     const OBSERVATION: usize = 24;
     let mut random = Random::new(6);
     let observations: Vec<Vec<f32>> = (0..STEPS).map(|_| (0..OBSERVATION).map(|_| random.normal()).collect()).collect();
@@ -102,9 +103,9 @@ fn steps_that_merge_chunks_match_the_prediction() -> Result<()> {
         policy.contract.playback = Playback { ensemble, overlap, deadline: None };
         let bytes = emit::image(&policy, &outcomes)?;
         let buffer = ImageBuffer::new(&bytes);
-        let predicted = of_step(&buffer.image(Path::new("chunks"))?);
+        let predicted = Rates::M4F.of_step(&buffer.image(Path::new("chunks"))?);
         // Before the second chunk there is none to blend with.
-        let counted = &profile::steps(&elf, &counter, &bytes, &observations)?[1..];
+        let counted = &harness.steps(&bytes, &observations)?[1..];
         near(&policy.name, predicted, counted, 0.03)?;
     }
     Ok(())
@@ -142,12 +143,11 @@ fn steps_of_shared_policies_match_the_prediction() -> Result<()> {
 /// Runs every image in polls of several budgets, which depend on the image's least one: each poll stays within its
 /// budget, and the actions have the host's bits. Returns the number of budgets that were not below the least.
 pub(super) fn polls_keep_their_budget(
-    elf: &Path,
+    harness: &Harness,
     dir: &Path,
     images: &[Options],
     budgets: impl Fn(u32) -> Vec<u32>,
 ) -> Result<usize> {
-    let counter = Counter::build()?;
     let policy = Policy::load(dir)?;
     let observations = observations(dir, &policy)?;
     let mut tried = 0;
@@ -163,7 +163,7 @@ pub(super) fn polls_keep_their_budget(
             let arguments = format!("poll {budget}");
             if budget < image.least_budget() {
                 let slot = qemu::slot(&bytes)?;
-                let command = qemu::command(elf, Some(slot.path()), &arguments)?;
+                let command = qemu::command(&harness.elf, Some(slot.path()), &arguments)?;
                 let output = qemu::run(command, &qemu::step_request(&observations[0]))?;
                 let refusal = StepError::Budget { needed: image.least_budget(), given: budget };
                 let stderr = String::from_utf8_lossy(&output.stderr);
@@ -171,7 +171,7 @@ pub(super) fn polls_keep_their_budget(
                 ensure!(stderr.trim_end() == format!("firmware: step: {refusal}"), "{}: {stderr}", at());
                 continue;
             }
-            let run = profile::regions(elf, &counter, &bytes, &arguments, &observations[..4]);
+            let run = harness.regions(&bytes, &arguments, &observations[..4]);
             let (costs, actions) = run.with_context(at)?;
             ensure!(bits(&actions.concat()) == bits(&expected.concat()), "{}: other bits", at());
             let largest = costs.iter().map(|c| c.instructions).max().unwrap_or(0);
@@ -191,7 +191,7 @@ fn budgets(least: u32) -> Vec<u32> {
 
 #[test]
 fn polls_stay_within_their_budget() -> Result<()> {
-    let tried = polls_keep_their_budget(&firmware::harness(Target::Fpu)?, &ur3(), &images(), budgets)?;
+    let tried = polls_keep_their_budget(&Harness::build(Target::Fpu)?, &ur3(), &images(), budgets)?;
     ensure!(tried >= 10, "only {tried} budgets were not below the least");
     Ok(())
 }
@@ -199,10 +199,10 @@ fn polls_stay_within_their_budget() -> Result<()> {
 #[test]
 fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
-    let elf = firmware::harness(Target::Fpu)?;
+    let harness = Harness::build(Target::Fpu)?;
     for name in ["go1_mlp", "g1_lstm256", "fetch_pickplace"] {
         let images = [distill(2.0), rtn(Width::W4, 32, Activations::Int8)];
-        polls_keep_their_budget(&elf, &policies.join(name), &images, budgets)?;
+        polls_keep_their_budget(&harness, &policies.join(name), &images, budgets)?;
     }
     Ok(())
 }
@@ -213,12 +213,12 @@ fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     let recordings = Recordings::load(&policy)?;
     let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     let within = |milliseconds| {
-        let budget = Budget::Time(TimeLimit { milliseconds, clock_hz: CLOCK, image_bytes: None });
+        let budget = Budget::Time(TimeLimit { milliseconds, core: Core::M4f, clock_hz: CLOCK, image_bytes: None });
         quantizer.quantize(&Options { budget, ..distill(1.0) }, ())
     };
     for milliseconds in [1.6, 2.4] {
         let found = within(milliseconds)?;
-        let step = StepTime::new(&found.buffer().image(Path::new("memory"))?, CLOCK);
+        let step = StepTime::new(&found.buffer().image(Path::new("memory"))?, Core::M4f, CLOCK);
         assert_eq!(found.time.map(|time| time.cycles), Some(step.cycles));
         assert!(step.milliseconds <= milliseconds, "{} ms for a budget of {milliseconds}", step.milliseconds);
         assert!(step.milliseconds > 0.97 * milliseconds, "{} ms for a budget of {milliseconds}", step.milliseconds);
@@ -234,7 +234,7 @@ fn a_budget_of_time_is_kept_and_used() -> Result<()> {
 fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
     const ROWS: usize = 64;
     const COLS: usize = 256;
-    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
+    let harness = Harness::build(Target::Fpu)?;
     for activations in [Activations::Int8, Activations::Int16] {
         let mut builder = Builder::new(COLS);
         let linear = |builder: &mut Builder, rows, widths: &dyn Fn(usize) -> Width| {
@@ -249,7 +249,7 @@ fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image(Path::new("mixed"))?;
         let observation = (0..COLS).map(|i| (i as f32).sin()).collect();
-        let parts = profile::parts(&elf, &counter, &image, &bytes, &[observation], u32::MAX)?.remove(0);
+        let parts = harness.parts(&image, &bytes, &[observation], u32::MAX)?.remove(0);
         let linear = image.ops().zip(&parts.ops).filter(|(op, _)| op.matrix().is_some());
         let counts: Vec<u64> = linear.map(|(_, cost)| cost.instructions).collect();
         let [alone @ .., in_order, stepped] = &counts[..] else { bail!("{counts:?}") };
@@ -266,26 +266,26 @@ fn mixed_widths_cost_little_more_than_their_blocks() -> Result<()> {
 fn polls_that_add_biases_stay_within_their_budget() -> Result<()> {
     const ROWS: usize = 1000;
     const COLS: usize = 8;
-    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
+    let harness = Harness::build(Target::Fpu)?;
     let mut builder = Builder::new(COLS);
     for _ in 0..2 {
         builder.linear((ROWS, COLS), Activations::Int8, |_| Some(Width::W2), 0, true)?;
     }
     builder.part(2)?;
-    let bytes = accumulating(&builder.image("biases")?)?;
+    let bytes = builder.accumulating("biases")?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(Path::new("biases"))?;
     let observations = [(0..COLS).map(|i| (i as f32).sin()).collect::<Vec<_>>()];
     for budget in [image.least_budget(), 2 * image.least_budget()] {
-        let (costs, _) = profile::regions(&elf, &counter, &bytes, &format!("poll {budget}"), &observations)?;
+        let (costs, _) = harness.regions(&bytes, &format!("poll {budget}"), &observations)?;
         let largest = costs.iter().skip(1).map(|c| c.instructions).max().unwrap_or(0);
         println!("{} polls of {budget}, the largest {largest}", costs.len() - 1);
         ensure!(largest <= u64::from(budget), "{largest} instructions in a poll with budget {budget}");
     }
-    let parts = profile::parts(&elf, &counter, &image, &bytes, &observations, u32::MAX)?.remove(0);
+    let parts = harness.parts(&image, &bytes, &observations, u32::MAX)?.remove(0);
     let linear = image.ops().zip(&parts.ops).filter(|(op, _)| op.matrix().is_some());
     for (op, counted) in linear {
-        near(&format!("{:?}", op.kind), of_op(&op), &[*counted], 0.03)?;
+        near(&format!("{:?}", op.kind), Rates::M4F.of_op(&op), &[*counted], 0.03)?;
     }
     Ok(())
 }

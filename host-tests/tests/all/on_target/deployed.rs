@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use actq::runtime::ImageBuffer;
+use actq_bench::Target;
 use actq_bench::descriptions::{Compared, compare};
-use actq_bench::qemu::{Counter, same_bits};
-use actq_bench::{Target, firmware, profile};
+use actq_bench::profile::Harness;
+use actq_bench::qemu::same_bits;
 use anyhow::{Context as _, Result, ensure};
 
 use crate::deployed::{Made, PUBLISHED, published};
@@ -55,14 +56,14 @@ fn steps_and_polls_match_the_prediction() -> Result<()> {
     let raw = &single(&Made::raw(24))[..24];
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image(Path::new("made"))?;
-    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
-    let counted = profile::steps(&elf, &counter, &bytes, raw)?;
+    let harness = Harness::build(Target::Fpu)?;
+    let counted = harness.steps(&bytes, raw)?;
     let mean = counted.iter().map(|cost| cost.instructions).sum::<u64>() as f64 / counted.len() as f64;
     let error = image.step_cost().instructions as f64 / mean - 1.0;
     println!("{mean:.0} instructions a step, predicted {:+.2}%", 100.0 * error);
     ensure!(error.abs() < 0.02, "{error}");
     let least = image.least_budget();
-    let (polls, _) = profile::regions(&elf, &counter, &bytes, &format!("poll {least}"), raw)?;
+    let (polls, _) = harness.regions(&bytes, &format!("poll {least}"), raw)?;
     // The first region of a step takes the observation.
     let longest = polls.iter().map(|cost| cost.instructions).max().context("no polls")?;
     println!("polls of {least} instructions: {} of them, {longest} at most", polls.len());

@@ -4,10 +4,11 @@ use actq::measure::time::{CLOCK, StepTime};
 use actq::methods::Activations;
 use actq::random::Random;
 use actq::runtime::{ImageBuffer, with_head};
-use actq_bench::qemu::Counter;
-use actq_bench::{Target, bits, firmware, profile, rtn};
+use actq_bench::profile::Harness;
+use actq_bench::{Target, bits, rtn};
 use actq_heads::{octo, oft};
 use actq_kernels::Width;
+use actq_kernels::cost::Core;
 use anyhow::{Result, bail, ensure};
 
 const TOKEN: usize = 384;
@@ -24,7 +25,7 @@ fn near(what: &str, predicted: u64, counted: u64) -> Result<()> {
 /// A chunk of Octo's head in 20 denoising steps and in 10: the common part runs once, the rest in each step.
 #[test]
 fn octos_head_matches_the_prediction_and_the_host() -> Result<()> {
-    let (elf, counter) = (firmware::harness(Target::Fpu)?, Counter::build()?);
+    let harness = Harness::build(Target::Fpu)?;
     let mut random = Random::new(3);
     let observation: Vec<f32> = (0..TOKEN).map(|_| random.normal()).collect();
     let mut chunks = Vec::new();
@@ -34,10 +35,10 @@ fn octos_head_matches_the_prediction_and_the_host() -> Result<()> {
         ensure!(bytes.len() < 750_000, "{} bytes", bytes.len());
         let buffer = ImageBuffer::new(&bytes);
         let image = buffer.image("octo".as_ref())?;
-        let (costs, actions) = profile::regions(&elf, &counter, &bytes, "serve", std::slice::from_ref(&observation))?;
+        let (costs, actions) = harness.regions(&bytes, "serve", std::slice::from_ref(&observation))?;
         let expected = with_head::<_, anyhow::Error>(image, |head| Ok(bits(head.step(&observation)?)))?;
         ensure!(bits(&actions[0]) == expected, "the bits differ in {steps} steps");
-        let time = StepTime::new(&image, CLOCK);
+        let time = StepTime::new(&image, Core::M4f, CLOCK);
         near(&format!("a chunk in {steps} steps"), time.instructions, costs[0].instructions)?;
         chunks.push([time.instructions, costs[0].instructions]);
     }
@@ -58,7 +59,7 @@ fn ofts_head_stores_its_matrices_once() -> Result<()> {
     let bytes = rtn(&policy, Width::W8, 0, Activations::Auto)?;
     let buffer = ImageBuffer::new(&bytes);
     let image = buffer.image("oft".as_ref())?;
-    let time = StepTime::new(&image, CLOCK);
+    let time = StepTime::new(&image, Core::M4f, CLOCK);
     ensure!(time.macs == 8 * policy.weights, "{} MACs", time.macs);
     let self_test = 4 * image.self_test_steps() * (image.obs_len() + image.act_len());
     ensure!(self_test <= 64 << 10, "{self_test} bytes of self-test");

@@ -7,7 +7,7 @@ use actq::graph::Denoising;
 use actq::graph::lowering::{Buffer, Lifetime, Slice, Step, StepData};
 use actq::graph::ops::{Concat, Gru, Iterate, Pointwise, Span, Table};
 use actq::methods::Activations;
-use actq_bench::networks::{self, Builder, Draw};
+use actq_bench::networks::{Builder, Draw};
 use actq_kernels::image::{Kind, OpKind};
 use actq_kernels::math::Function;
 use actq_kernels::ops::denoise::Coefficients;
@@ -91,7 +91,7 @@ pub(super) fn accumulating() -> Result<Vec<u8>> {
             builder.linear((rows, 40), Activations::Int8, |_| Some(Width::W2), 0, true)?;
         }
     }
-    networks::accumulating(&builder.image("accumulating")?)
+    builder.accumulating("accumulating")
 }
 
 /// An image of a flow or diffusion policy, with noise in each step or at the start only.

@@ -1,10 +1,12 @@
 //! An image's properties.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
+use actq::emit::{Core, repack};
 use actq::measure::size::{Beside, bits_per_weight, file_bits_per_weight, hex};
 use actq::measure::time::StepTime;
 use actq::pipeline::stats::Stats;
+use actq::runtime::ImageBuffer;
 use actq::text::printable;
 use actq_kernels::image::{Op, OpKind, Region};
 use actq_kernels::{Image, Port, PortKind};
@@ -12,9 +14,8 @@ use anyhow::Result;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use super::parts::RUNTIME;
+use super::parts::RUNTIMES;
 use crate::report::inspect::{CONTRACT, kind, playback, row};
-use crate::report::time::is_modelled;
 use crate::report::widths::Widths;
 
 /// Properties of an image.
@@ -46,12 +47,12 @@ pub struct Facts {
     pub bits_per_weight: f64,
     /// Bits per weight of the whole file.
     pub file_bits_per_weight: f64,
-    /// Bytes of code that runs any image.
-    pub runtime: usize,
     /// Bytes of scratch memory.
     pub scratch: usize,
-    /// Predicted cycles and clock in Hz; `None` for layouts without a model.
-    pub time: Option<(u64, f64)>,
+    /// The core whose layouts the image has, its predicted cycles, and the clock in Hz.
+    pub time: (&'static str, u64, f64),
+    /// What the image takes in the layouts of each core.
+    pub cores: BTreeMap<&'static str, OnCore>,
     /// Features that a build of the kernels needs.
     pub features: Vec<&'static str>,
     /// Settings of chunk playback.
@@ -70,6 +71,45 @@ pub struct Facts {
     pub contract: Vec<(&'static str, Vec<f32>)>,
     /// Names and values of the options that made the image; empty without its statistics.
     pub made: Vec<(&'static str, String)>,
+}
+
+/// What an image takes on a core, in its layouts.
+#[derive(Debug, Serialize)]
+pub struct OnCore {
+    /// How a sentence names it.
+    pub title: &'static str,
+    /// Bytes of the image.
+    pub bytes: usize,
+    /// Bytes of scratch memory.
+    pub scratch: usize,
+    /// Predicted cycles of a step.
+    pub cycles: u64,
+    /// `true` if the cycles follow the core's manual.
+    pub is_modelled: bool,
+    /// `true` if the image is in these layouts.
+    pub is_own: bool,
+    /// Bytes of code that runs any image.
+    pub runtime: usize,
+}
+
+impl OnCore {
+    /// # Errors
+    ///
+    /// If the image has no place in the core's layouts.
+    fn new(image: &Image<'_>, bytes: &[u8], core: Core, runtime: usize) -> Result<Self> {
+        let packed = repack(bytes, core)?;
+        let buffer = ImageBuffer::new(&packed);
+        let here = buffer.image("the image".as_ref())?;
+        Ok(Self {
+            title: core.title(),
+            bytes: packed.len(),
+            scratch: 4 * here.scratch_words(),
+            cycles: StepTime::new(&here, core, 1.0).cycles,
+            is_modelled: core.is_modelled(),
+            is_own: core.has_layouts_of(image),
+            runtime,
+        })
+    }
 }
 
 /// A raw input, or targets.
@@ -135,7 +175,11 @@ impl Facts {
     ///
     /// If the statistics are of another image.
     pub fn new(image: &Image<'_>, bytes: &[u8], stats: Option<&Stats>, clock_hz: f64) -> Result<Self> {
-        let step = StepTime::new(image, clock_hz);
+        let own = Core::ALL.into_iter().map(|(_, core)| core).filter(|core| core.has_layouts_of(image));
+        // Images of default layouts have those of several cores.
+        let core = own.min_by_key(|core| *core != Core::M4f).unwrap_or(Core::M4f);
+        let step = StepTime::new(image, core, clock_hz);
+        let on = |&(core, runtime): &(Core, usize)| Ok((core.name(), OnCore::new(image, bytes, core, runtime)?));
         let widths = Widths::new(image, stats)?;
         let distinct = actq::measure::size::distinct(image);
         let places: Vec<_> =
@@ -144,13 +188,12 @@ impl Facts {
             let own = op.matrix()?.blocks().next().map(|rows| rows.scales.as_ptr());
             places.iter().position(|place| *place == own)
         };
-        let is_timed = is_modelled(image);
         let mut flow = Flow::new(image);
         let ops = image.ops().zip(&step.ops).map(|(op, time)| OpFacts {
             name: op.kind.name().to_owned(),
             detail: row(&op).swap_remove(3),
             output: op.dst().len,
-            cycles: if is_timed { time.cycles } else { 0 },
+            cycles: time.cycles,
             matrix: place(&op),
             from: flow.next(&op),
         });
@@ -179,9 +222,9 @@ impl Facts {
             beside: [biases, self_test, tables],
             bits_per_weight: bits_per_weight(image),
             file_bits_per_weight: file_bits_per_weight(image),
-            runtime: RUNTIME,
             scratch: 4 * image.scratch_words(),
-            time: is_timed.then_some((step.cycles, clock_hz)),
+            time: (core.name(), step.cycles, clock_hz),
+            cores: RUNTIMES.iter().map(on).collect::<Result<_>>()?,
             features: image.features().collect(),
             playback: playback(image),
             self_test: image.self_test_steps(),

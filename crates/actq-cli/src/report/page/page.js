@@ -67,7 +67,7 @@ function trust() {
     sentences.push("No error is shown: the report was made without the policy and a recording.");
   }
   sentences.push(data.success ? "Success was measured in closed loop." : "An error on recordings does not replace a test in closed loop.");
-  sentences.push(facts.time ? "Times are predicted by a model of a Cortex-M4F with memory that never waits; nothing here was measured on hardware." : "No time is predicted for these layouts.");
+  sentences.push(`Times are predicted by a model of ${facts.cores[facts.time[0]]?.title ?? facts.time[0]} with memory that never waits; nothing here was measured on hardware.`);
   return sentences.join(" ");
 }
 function mean(values) {
@@ -80,7 +80,7 @@ document.getElementById("top").append(
   figures([
     ["image", `${integer(facts.bytes)} B`],
     ["bits per weight", facts.bits_per_weight.toFixed(3)],
-    ["a step, predicted", facts.time ? milliseconds(...facts.time) : "-"],
+    ["a step, predicted", milliseconds(...facts.time.slice(1))],
     ["scratch RAM", `${integer(facts.scratch)} B`],
     runs && [nmse === null ? "error of the actions (NMSE)" : "error of the raw output (NMSE)", error(nmse ?? mean(runs.actions.map(([ratio]) => ratio)))],
     data.own_path && ["error on its own path", error(data.own_path[0])],
@@ -182,7 +182,7 @@ if (sweep?.images.length) {
 const WIDTHS = [["0", "no bits", "--b0"], ["2", "2 bits", "--b2"], ["3", "3 bits", "--b3"], ["4", "4 bits", "--b4"], ["8", "8 bits", "--b8"]];
 const detail = el("div", { class: "detail", role: "status" }, "Choose a matrix for its name, shape, bits, scales, error and cycles.");
 function describe(op, i) {
-  const cycles = facts.time ? `${integer(op.cycles)} cycles predicted (${percent(op.cycles / facts.time[0])} of a step)` : "no time predicted";
+  const cycles = `${integer(op.cycles)} cycles predicted (${percent(op.cycles / facts.time[1])} of a step)`;
   if (op.matrix === null) return [el("strong", {}, `${op.name} ${op.detail}`), el("br"), `${op.output} values, ${cycles}`];
   const matrix = facts.matrices[op.matrix];
   const counts = WIDTHS.map(([digit, name]) => [[...matrix.widths].filter((d) => d === digit).length, name]).filter(([n]) => n > 0);
@@ -225,7 +225,7 @@ section("network", "Network", el("p", {}, facts.is_trained ? "Each block is a ma
   el("details", {}, el("summary", {}, "As a table"), table(["op", "detail", "output", "bits of the rows", "bytes", "cycles"], facts.ops.map((op) => {
     const matrix = op.matrix === null ? null : facts.matrices[op.matrix];
     const counts = matrix && WIDTHS.map(([digit]) => [digit, [...matrix.widths].filter((d) => d === digit).length]).filter(([, n]) => n).map(([d, n]) => `${n}\u00d7${d}`).join(" ");
-    return [op.name, op.detail, integer(op.output), counts ?? "", matrix ? integer(matrix.bytes) : "", facts.time ? integer(op.cycles) : "-"];
+    return [op.name, op.detail, integer(op.output), counts ?? "", matrix ? integer(matrix.bytes) : "", integer(op.cycles)];
   }), [2, 4, 5])));
 
 // d. Errors and traces.
@@ -373,8 +373,8 @@ async function start() {
 
 // e. The flash map.
 {
-  const custom = { name: "custom", core: "Cortex-M4F", has_dsp: true, is_modelled: true };
-  const select = el("select", { id: "part", onchange: () => flash() }, ...parts.map(({ name, core }, i) => el("option", { value: i }, `${name} (${core})`)), el("option", { value: "custom" }, "another size"));
+  const custom = { name: "custom", core: facts.time[0] in facts.cores ? facts.time[0] : "m4f" };
+  const select = el("select", { id: "part", onchange: () => flash() }, ...parts.map(({ name, core }, i) => el("option", { value: i }, `${name} (${facts.cores[core].title.replace(/^an? /, "")})`)), el("option", { value: "custom" }, "another size"));
   const number = (id, initial) => el("input", { type: "number", id, value: initial, min: 1, oninput: () => flash(), style: "width: 96px" });
   const [flashSize, ramSize, clock] = [number("flash-size", 256), number("ram-size", 64), number("mhz", 64)];
   const size = (input) => input.valueAsNumber || 0;
@@ -384,27 +384,26 @@ async function start() {
     const isCustom = select.value === "custom";
     own.hidden = !isCustom;
     const part = isCustom ? { ...custom, flash: 1024 * size(flashSize), ram: 1024 * size(ramSize), megahertz: size(clock) } : parts[Number(select.value)];
-    const free = part.flash - facts.bytes - facts.runtime;
+    const { title, bytes, scratch, cycles, runtime, is_modelled, is_own } = facts.cores[part.core];
+    const free = part.flash - bytes - runtime;
     const block = (bytes, colour) => el("i", { style: `--c: var(${colour}); flex: ${Math.max(bytes, 0)} 0 0` });
-    const fits = free >= 0 && facts.scratch <= part.ram;
-    const isScalar = facts.features.includes("scalar");
+    const fits = free >= 0 && scratch <= part.ram;
     const notes = [];
     if (free < 0) notes.push(`${integer(-free)} bytes of flash are missing.`);
-    if (facts.scratch > part.ram) notes.push(`${integer(facts.scratch - part.ram)} bytes of RAM are missing.`);
+    if (scratch > part.ram) notes.push(`${integer(scratch - part.ram)} bytes of RAM are missing.`);
     if (part.is_external) notes.push("The flash is a chip of its own; this is its usual size.");
-    if (isScalar ? part.has_dsp : !part.has_dsp && facts.matrices.some((matrix) => matrix.x_max <= 127 && matrix.bytes > 0)) notes.push(`The image has the layouts of other cores and is slow on this one; actq repack converts it.`);
-    if (facts.time && !part.is_modelled) notes.push("There is no model of this core's cycles.");
-    if (facts.time && part.is_modelled) notes.push("Predicted for memory that never waits; flash with wait states takes longer.");
-    const time = facts.time && part.is_modelled && part.megahertz > 0 ? `${milliseconds(facts.time[0], 1e6 * part.megahertz)} at ${part.megahertz} MHz, predicted` : "not predicted";
+    if (!is_own) notes.push(`These figures are those of the image in the layouts of ${title}, which actq repack --core ${part.core} writes.`);
+    notes.push("Predicted for memory that never waits; flash with wait states takes longer.");
+    const time = part.megahertz > 0 ? `${milliseconds(cycles, 1e6 * part.megahertz)} at ${part.megahertz} MHz, ${is_modelled ? "predicted" : "an estimate"}` : "no clock";
     place.replaceChildren(
-      el("div", { class: "flash", role: "img", "aria-label": `image ${facts.bytes} bytes, runtime ${facts.runtime} bytes, free ${Math.max(0, free)} bytes` }, block(facts.bytes, "--image"), block(facts.runtime, "--b4"), block(Math.max(0, free), "--card")),
+      el("div", { class: "flash", role: "img", "aria-label": `image ${bytes} bytes, runtime ${runtime} bytes, free ${Math.max(0, free)} bytes` }, block(bytes, "--image"), block(runtime, "--b4"), block(Math.max(0, free), "--card")),
       legend([["image", "var(--image)"], ["runtime", "var(--b4)"], ["free", "var(--card)"]]),
-      figures([["fits", fits ? "yes" : "no"], ["image", `${integer(facts.bytes)} B`], ["runtime", `${integer(facts.runtime)} B`], ["flash left", free < 0 ? "none" : `${integer(free)} B`], ["RAM left for stack and program", facts.scratch > part.ram ? "none" : `${integer(part.ram - facts.scratch)} B`], ["a step", time]]),
+      figures([["fits", fits ? "yes" : "no"], ["image", `${integer(bytes)} B`], ["runtime", `${integer(runtime)} B`], ["flash left", free < 0 ? "none" : `${integer(free)} B`], ["RAM left for stack and program", scratch > part.ram ? "none" : `${integer(part.ram - scratch)} B`], ["a step", time]]),
       el("p", {}, notes.join(" ")));
   }
   flash();
   section("flash", "Flash map", el("div", { class: "row" }, el("label", { for: "part" }, "Part"), select, own), place,
-    el("p", { class: "soft" }, `The runtime is the code that checks and runs any image, ${integer(facts.runtime)} bytes on a Cortex-M4F; a build for this image alone is smaller, and other cores differ. The image has ${integer(facts.beside[0])} bytes of biases, ${integer(facts.beside[1])} of self-test and ${integer(facts.beside[2])} of header and tables.`));
+    el("p", { class: "soft" }, `The runtime is the code that checks and runs any image; a build for this image alone is smaller. The image has ${integer(facts.beside[0])} bytes of biases, ${integer(facts.beside[1])} of self-test and ${integer(facts.beside[2])} of header and tables.`));
 }
 
 // f. Raw inputs to targets: a graph of what each value comes from, in columns by its distance from the inputs.

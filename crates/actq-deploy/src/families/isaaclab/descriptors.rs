@@ -57,8 +57,10 @@ pub(super) fn read(yaml: &Document, asset: &str, group: &str, joints: Joints) ->
     // From release 3.0.0 on a group has an order, which the exporter leaves out.
     let group = format!("observations.{group}");
     // Each term's delay is read.
-    let has_order =
-        yaml.keys(&group).iter().fold(false, |has, item| no_delay(yaml, &format!("{group}.{item}.overloads")) || has);
+    let mut has_order = false;
+    for item in yaml.keys(&group) {
+        has_order |= no_delay(yaml, &format!("{group}.{item}.overloads"));
+    }
     let layout = has_order.then(|| Layout::Left(yaml.location(&group)));
     let decimation = yaml.number("scene.decimation")?;
     Ok(Policy { rate, decimation, joints, default, default_velocity, limits, gains, terms, layout, actions })

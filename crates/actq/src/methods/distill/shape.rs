@@ -53,7 +53,7 @@ pub(super) fn shape(Target { statistics, rate, options }: Target<'_>, recipe: Re
     let (forced, allowed) = (forced(graph, rate, options), rate.bytes(graph.weights()));
     let of_inputs: Vec<&Moments> = moments.iter().map(|(input, _)| input).collect();
     let removals = statistics.removals(options.learns(), even);
-    let of_elements = rate.cycles().map(|_| cycles_of_elements(graph));
+    let of_elements = rate.cycles().map(|_| cycles_of_elements(graph, rate.core()));
     let of_cut = |cut: Cut| {
         let pick = |values: &[f64], of: &[usize]| of.iter().map(|&i| values[i]).collect::<Vec<f64>>();
         let of_matrix = |(m, matrix): (usize, &WeightMatrix)| {
@@ -64,10 +64,11 @@ pub(super) fn shape(Target { statistics, rate, options }: Target<'_>, recipe: Re
         };
         let rows: Vec<Rows> = cut.graph.matrices.iter().enumerate().map(of_matrix).collect();
         // Rows may take what the elements of removed units no longer take.
-        let saved = of_elements.map_or(0.0, |of_all| of_all - cycles_of_elements(&cut.graph));
+        let saved = of_elements.map_or(0.0, |of_all| of_all - cycles_of_elements(&cut.graph, rate.core()));
         let cycles = rate.cycles().map(|most| most + saved);
         let dimensions = dimensions(&cut.graph);
-        let size = Size { cycles, ..Size::new(&cut.graph, &dimensions, values(&cut.graph, rate, options)) };
+        let counted = Size::new(&cut.graph, &dimensions, values(&cut.graph, rate, options));
+        let size = Size { cycles, core: rate.core(), ..counted };
         let (widths, limits) = allocated(size.clone(), &rows, options, allowed)?;
         let cycles = cycles.map(|_| Size { packings: packed(&limits, options), ..size }.cycles(&widths) - saved);
         Ok(Shape { cut, dimensions, rows, widths, limits, cycles })

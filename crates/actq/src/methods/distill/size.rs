@@ -1,7 +1,7 @@
 //! Bytes and cycles as functions of the rows' widths, for the allocation, and the fewest bytes.
 
 use actq_kernels::Width;
-use actq_kernels::cost;
+use actq_kernels::cost::Core;
 use actq_kernels::image::{OpKind, block_bytes};
 use actq_kernels::layout::{BlockShape, STRIP};
 use actq_kernels::math::Function;
@@ -29,6 +29,8 @@ pub struct Size<'a> {
     pub runs: Vec<usize>,
     /// `true` for every matrix that adds to the output of another: that of an LSTM's state.
     pub accumulates: Vec<bool>,
+    /// The core whose cycles count.
+    pub core: Core,
     /// Most modelled cycles of the rows ([`Self::cycles`]); `None`: time does not matter.
     pub cycles: Option<f64>,
     /// Price of a row, by which the allocation compares widths.
@@ -53,7 +55,17 @@ impl<'a> Size<'a> {
         let products: Vec<Product> = cells.flat_map(|node| node.kind.products()).collect();
         let of_state = |m: usize| products.iter().any(|p| p.matrix == m && p.operand == Operand::State);
         let accumulates = (0..graph.matrices.len()).map(of_state).collect();
-        Self { graph, dimensions, packings: Vec::new(), values, runs, accumulates, cycles: None, price }
+        Self {
+            graph,
+            dimensions,
+            packings: Vec::new(),
+            values,
+            runs,
+            accumulates,
+            core: Core::M4f,
+            cycles: None,
+            price,
+        }
     }
 
     /// Returns `true` if the widths keep `limit`, in bytes, and the limit on cycles.
@@ -76,7 +88,9 @@ impl<'a> Size<'a> {
             let kept = widths[m].iter().flatten().count();
             // A removed row of no dimension is an output of its bias alone.
             let rows = Dimension::made_by(self.dimensions, m).map_or(self.graph.matrices[m].rows, |_| kept);
-            let products = cost::of_linear([rows, cols], blocks, sorted && kept == rows, self.accumulates[m]);
+            let blocks = blocks.map(|shape| packing.shape_on(self.core, shape));
+            let in_order = sorted && kept == rows;
+            let products = self.core.rates().of_linear([rows, cols], blocks, in_order, self.accumulates[m]);
             let functions =
                 Dimension::made_by(self.dimensions, m).map_or(0.0, |d| self.of_functions(d, d.kept(widths)));
             self.runs[m] as f64 * (products.cycles as f64 + functions)
@@ -88,15 +102,16 @@ impl<'a> Size<'a> {
     pub fn row_cycles(&self, m: usize, width: Width, cols: usize) -> f64 {
         let Some(packing) = self.packings[m].first() else { return 0.0 };
         let of = |rows: usize| {
-            let shape = packing.shape(width, rows, cols.max(1));
-            cost::of_linear([rows, cols.max(1)], [shape], true, self.accumulates[m]).cycles as f64
+            let shape = packing.shape_on(self.core, packing.shape(width, rows, cols.max(1)));
+            self.core.rates().of_linear([rows, cols.max(1)], [shape], true, self.accumulates[m]).cycles as f64
         };
         self.runs[m] as f64 * (of(2 * STRIP) - of(STRIP)) / STRIP as f64
     }
 
     /// Returns the cycles of the functions of a dimension of `len` elements.
     pub fn of_functions(&self, dimension: &Dimension, len: usize) -> f64 {
-        let of = |function: &Function| cost::of_elements(OpKind::Function(*function), len).cycles as f64;
+        let rates = self.core.rates();
+        let of = |function: &Function| rates.of_elements(OpKind::Function(*function), len).cycles as f64;
         dimension.functions(self.graph).iter().map(of).sum()
     }
 
@@ -163,7 +178,7 @@ impl<'a> Size<'a> {
 }
 
 /// Returns the modelled cycles of the elements of all operations without a matrix in a step, and of the units of cells.
-pub(super) fn cycles_of_elements(graph: &Graph) -> f64 {
+pub(super) fn cycles_of_elements(graph: &Graph, core: Core) -> f64 {
     let mut lowering = Lowering::new(graph.obs_len, readers(graph));
     let first = graph.denoising.as_ref().map_or(graph.nodes.len(), |denoising| denoising.first);
     let (once, repeated) = graph.nodes.split_at(first);
@@ -172,7 +187,7 @@ pub(super) fn cycles_of_elements(graph: &Graph) -> f64 {
     lower_nodes(repeated, &mut lowering);
     let of_step = |(i, step): (usize, &Step<Slice>)| {
         let runs = if i < before { 1 } else { graph.denoising_steps() as u64 };
-        runs * cost::of_elements(step.kind, step.dst.len).cycles
+        runs * core.rates().of_elements(step.kind, step.dst.len).cycles
     };
     let elementwise = lowering.steps.iter().enumerate().filter(|(_, step)| !matches!(step.kind, OpKind::Linear { .. }));
     elementwise.map(of_step).sum::<u64>() as f64

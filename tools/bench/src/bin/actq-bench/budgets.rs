@@ -161,6 +161,13 @@ fn code() -> Result<Figures> {
     let with_polls = Code::read(&firmware::binary("runtime-poll", Target::Fpu)?)?;
     let mut figures =
         Figures::from([(RUNTIME.to_owned(), code.bytes()), (RUNTIME_WITH_POLLS.to_owned(), with_polls.bytes())]);
+    for (name, target) in [("m3", Target::NoDsp), ("m0", Target::V6m)] {
+        figures
+            .insert(format!("{RUNTIME} on {name}"), Code::of(target, &firmware::binary("runtime", target)?)?.bytes());
+    }
+    // The program has no start code for RISC-V: the kernels' functions in the harness, with slices.
+    let riscv = firmware::kernel_bytes(&firmware::harness(Target::Riscv)?)?;
+    figures.insert(format!("{RUNTIME} on rv32imac"), riscv);
     for function in code.functions().iter().filter(|f| f.name.starts_with("actq_") && !f.name.contains("::")) {
         figures.insert(format!("bytes of code, {}", function.name), function.size);
         figures.insert(format!("{LOOP}{}", function.name), code.longest_inner_loop(function)?);

@@ -1,7 +1,7 @@
 //! `cargo xtask fit`: the rates of the cost model (`kernels/src/cost/`), from counted operations.
 //!
-//! Images with many shapes of every operation run under QEMU. Every operation and every whole step is a sample: the
-//! count of each item, and the measured cost. The rates minimize the squared relative errors. An item that others
+//! Images with many shapes of every operation run under QEMU on a core. Every operation and every whole step is a sample:
+//! the count of each item, and the measured cost. The rates minimize the squared relative errors. An item that others
 //! determine, or whose rate would be negative, gets the rate 0.
 
 mod images;
@@ -12,18 +12,19 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use actq::emit::repack;
 use actq::methods::Activations;
 use actq::random::Random;
 use actq::runtime::ImageBuffer;
 use actq_bench::networks::Builder;
-use actq_bench::qemu::Counter;
-use actq_bench::{Target, firmware, profile, root};
+use actq_bench::profile::Harness;
+use actq_bench::{Target, root};
 use actq_cli::outputs::files;
 use actq_kernels::Width;
-use actq_kernels::cost::{self, Cost, CostItem};
+use actq_kernels::cost::{self, CORES, Core, Cost, CostItem};
 use actq_kernels::image::{Op, OpKind, op};
 use actq_kernels::math::Function;
-use anyhow::Result;
+use anyhow::{Context as _, Result, bail};
 
 use images::images;
 use least_squares::solve;
@@ -36,14 +37,40 @@ const WORST_SAMPLES: usize = 8;
 /// A budget too large to limit anything, which is counted all the same.
 const AMPLE_BUDGET: u32 = 100_000_000;
 
-pub(crate) fn run() -> Result<()> {
-    let elf = firmware::harness(Target::Fpu)?;
-    let counter = Counter::build()?;
+/// Measures the rates of these cores; those of the others stay.
+pub(crate) fn run(cores: &[Core]) -> Result<()> {
+    let mut rates: BTreeMap<CostItem, Row> = CostItem::all().map(|item| (item, cost::rates_of(item))).collect();
+    for core in cores {
+        of_core(*core, &mut rates)?;
+        let path = root().join("kernels/src/cost/rates.rs");
+        files::write(&path, table(&rates).as_bytes())?;
+        println!("{}: written with the rates of {}", path.display(), core.name());
+    }
+    Ok(())
+}
+
+/// The rates of an item: of a Cortex-M4 with FPU, and of the other cores.
+type Row = ([f64; 3], [[f64; 2]; CORES.len()]);
+
+fn of_core(core: Core, all: &mut BTreeMap<CostItem, Row>) -> Result<()> {
+    let target = match core {
+        Core::M0 => Target::V6m,
+        Core::M3 => Target::NoDsp,
+        Core::Rv32imac => Target::Riscv,
+        Core::M4 => Target::NoFpu,
+        Core::M4f => Target::Fpu,
+        Core::M55 => Target::M55,
+        Core::M7 | Core::M33 | Core::Rv32zb => {
+            bail!("the rates of {} are those of {}", core.name(), core.measured().name())
+        }
+    };
+    let harness = Harness::build(target)?;
     let mut samples = Vec::new();
     let mut polls = Vec::new();
     for (name, bytes) in images()? {
         println!("measuring {name}");
-        measure((&name, &bytes), &elf, &counter, &mut samples, &mut polls)?;
+        let bytes = repack(&bytes, core).with_context(|| name.clone())?;
+        measure((&name, &bytes), &harness, &mut samples, (core == Core::M4f).then_some(&mut polls))?;
     }
     let expected: Vec<&Sample> = samples.iter().filter(|s| s.expected).collect();
     let instructions = solve(&expected, |c| c.instructions);
@@ -67,60 +94,89 @@ pub(crate) fn run() -> Result<()> {
             1e2 * worst
         );
     }
-    let mut most = most(&samples, &polls, &instructions);
-    println!("measuring polls");
-    let resumed = resumed(&elf, &counter, &most)?;
-    most.insert(CostItem::RESUMED, resumed);
-    let path = root().join("kernels/src/cost/rates.rs");
-    files::write(&path, table(&instructions, &cycles, &most).as_bytes())?;
-    println!("{}: written", path.display());
+    // Budgets of slices are those of a Cortex-M4 on every core.
+    let most = if core == Core::M4f {
+        let mut most = most(&samples, &polls, &instructions);
+        println!("measuring polls");
+        let resumed = resumed(&harness, &most)?;
+        most.insert(CostItem::RESUMED, resumed);
+        Some(most)
+    } else {
+        None
+    };
+    let rate = |rates: &Rates, item: CostItem| rates.get(&item).copied().unwrap_or(0.0);
+    for (item, (dsp, others)) in all {
+        let now = [rate(&instructions, *item), rate(&cycles, *item)];
+        if let Some(most) = &most {
+            *dsp = [now[0], now[1], rate(most, *item)];
+        } else if let Some(at) = CORES.iter().position(|known| *known == core) {
+            others[at] = now;
+        }
+    }
     Ok(())
 }
 
 /// Writes the rates as the source of the kernels' table: an item's debug text is its key.
-fn table(instructions: &Rates, cycles: &Rates, most: &Rates) -> String {
-    let mut text =
-        "//! Written by `cargo xtask fit`: expected instructions, expected cycles, instructions at most.\n\n\
-                    use super::item::{CostItem, Gemv, Prepare, Scales::*, Strips::*};\n\
-                    use crate::image::op;\n\
-                    use crate::layout::{Lanes::*, Width::*};\n\
-                    use crate::math::Function;\n\n\
-                    #[rustfmt::skip]\npub(super) const RATES: &[(CostItem, [f64; 3])] = &[\n"
-            .to_owned();
-    for item in CostItem::all() {
-        let rate = |rates: &Rates| rates.get(&item).copied().unwrap_or(0.0);
-        let [a, b, c] = [instructions, cycles, most].map(rate);
-        let _ = writeln!(text, "    ({item:?}, [{a:.3}, {b:.3}, {c:.3}]),");
+fn table(rates: &BTreeMap<CostItem, Row>) -> String {
+    let mut text = format!(
+        "//! Written by `cargo xtask fit`: for a Cortex-M4 with FPU expected instructions, expected cycles, instructions at\n\
+         //! most; for the cores of a writer expected instructions and cycles.\n\n\
+         #[cfg(all(feature = \"writer\", feature = \"scalar\", feature = \"helium\"))]\n\
+         use super::Core;\n\
+         use super::item::{{CostItem, Gemv, Prepare, Scales::*, Strips::*}};\n\
+         use crate::image::op;\n\
+         use crate::layout::{{Lanes::*, Width::*}};\n\
+         use crate::math::Function;\n\n\
+         /// Cores that were measured beside the Cortex-M4 with FPU.\n\
+         #[cfg(all(feature = \"writer\", feature = \"scalar\", feature = \"helium\"))]\n\
+         pub const CORES: [Core; {}] = [{}];\n\n\
+         /// The rates of an item.\n\
+         type Row = (CostItem, [f64; 3], [[f64; 2]; {}]);\n\n\
+         #[rustfmt::skip]\npub(super) const RATES: &[Row] = &[\n",
+        CORES.len(),
+        CORES.map(|core| format!("Core::{core:?}")).join(", "),
+        CORES.len()
+    );
+    for (item, (dsp, others)) in rates {
+        let [a, b, c] = dsp;
+        let others: Vec<String> = others.iter().map(|[i, c]| format!("[{i:.3}, {c:.3}]")).collect();
+        let _ = writeln!(text, "    ({item:?}, [{a:.3}, {b:.3}, {c:.3}], [{}]),", others.join(", "));
     }
     text + "];\n"
 }
 
-/// Runs an image, in steps and by operations. `polls` gets the cost that a limit adds to an operation, and its pieces.
+/// Runs an image, in steps and by operations. `polls`, if given, gets the cost that a limit adds to an operation, and its
+/// pieces.
 fn measure(
     (name, bytes): (&str, &[u8]),
-    elf: &Path,
-    counter: &Counter,
+    harness: &Harness,
     samples: &mut Vec<Sample>,
-    polls: &mut Vec<(f64, usize)>,
+    polls: Option<&mut Vec<(f64, usize)>>,
 ) -> Result<()> {
     let buffer = ImageBuffer::new(bytes);
     let image = buffer.image(Path::new(name))?;
-    let observations = observations(image.obs_len());
+    let all = observations(image.obs_len());
+    // Only slices need the ends of every branch.
+    let observations = if polls.is_some() { &all[..] } else { &all[..NORMAL_STEPS] };
     let frame = items(|add| cost::frame(&image, add));
     let ops: Vec<Op<'_>> = image.ops().collect();
     let of_ops: Vec<_> = ops.iter().map(|op| items(|add| cost::items(op, add))).collect();
-    // Before the second chunk there is none to blend with.
-    let expected = |step| (usize::from(image.overlap() > 0)..NORMAL_STEPS).contains(&step);
-    let steps = profile::steps(elf, counter, bytes, &observations)?;
+    // Before the second chunk there is none to blend with, and the first state is zeros, which floats in software are
+    // faster or slower with.
+    let first = usize::from(image.overlap() > 0 || image.state().len > 0);
+    let expected = |step| (first..NORMAL_STEPS).contains(&step);
+    let steps = harness.steps(bytes, observations)?;
     for (step, cost) in steps.into_iter().enumerate() {
         let mut all = frame.clone();
         of_ops.iter().flatten().for_each(|(item, n)| *all.entry(*item).or_default() += n);
         samples.push(Sample { name: format!("{name}, a step"), items: all, cost, expected: expected(step) });
     }
-    let single = profile::parts(elf, counter, &image, bytes, &observations, u32::MAX)?;
-    let limited = profile::parts(elf, counter, &image, bytes, &observations[..1], AMPLE_BUDGET)?;
-    for ((op, cost), plain) in ops.iter().zip(&limited[0].ops).zip(&single[0].ops) {
-        polls.push((cost.instructions as f64 - plain.instructions as f64, pieces(op)));
+    let single = harness.parts(&image, bytes, observations, u32::MAX)?;
+    if let Some(polls) = polls {
+        let limited = harness.parts(&image, bytes, &observations[..1], AMPLE_BUDGET)?;
+        for ((op, cost), plain) in ops.iter().zip(&limited[0].ops).zip(&single[0].ops) {
+            polls.push((cost.instructions as f64 - plain.instructions as f64, pieces(op)));
+        }
     }
     for (step, parts) in single.into_iter().enumerate() {
         let mut sample = |what: String, cost, poll: f64, mut items: BTreeMap<CostItem, f64>| {
@@ -204,7 +260,7 @@ fn most(samples: &[Sample], polls: &[(f64, usize)], rates: &Rates) -> Rates {
 
 /// Measures the cost of returning to a linear operation for each of its blocks, from steps in short polls, whose number
 /// tells how often that was. The image's least budget comes from the previous rates, which need not be exact here.
-fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
+fn resumed(harness: &Harness, most: &Rates) -> Result<f64> {
     let known: f64 = [CostItem::POLL, CostItem::ENTERED, CostItem::operation(op::LINEAR), CostItem::PIECE]
         .map(|f| most[&f])
         .iter()
@@ -221,7 +277,7 @@ fn resumed(elf: &Path, counter: &Counter, most: &Rates) -> Result<f64> {
                 let image = buffer.image(Path::new("polls"))?;
                 let observations = &observations(cols)[..1];
                 let sum = |arguments: &str| -> Result<(f64, usize)> {
-                    let (costs, _) = profile::regions(elf, counter, &bytes, arguments, observations)?;
+                    let (costs, _) = harness.regions(&bytes, arguments, observations)?;
                     Ok((costs.iter().skip(1).map(|c| c.instructions as f64).sum(), costs.len() - 1))
                 };
                 let (whole, _) = sum(&format!("poll {}", u32::MAX))?;

@@ -1,5 +1,6 @@
 //! The gallery: one page in which the example robots are driven by images of few bits.
 
+use actq_kernels::cost::Core;
 use std::fs;
 use std::path::Path;
 
@@ -125,7 +126,7 @@ fn shown(robot: u32, policy: &Policy, recordings: &Recordings, quick: bool) -> R
         let image = buffer.image(Path::new("the image"))?;
         let head = HeadData::new(image, buffer.bytes(), None, data.is_none().then_some(&reference))?;
         data = data.or(head.reference);
-        let milliseconds = StepTime::new(&image, CLOCK).milliseconds;
+        let milliseconds = StepTime::new(&image, Core::M4f, CLOCK).milliseconds;
         images.push(ShownImage {
             label: format!("{bits} bit{}", if bits == 1.0 { "" } else { "s" }),
             bytes: image.bytes(),

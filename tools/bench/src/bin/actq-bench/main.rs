@@ -22,6 +22,7 @@ use std::process::ExitCode;
 
 use actq::runtime::ImageBuffer;
 use actq_bench::capi::{CORES, Core};
+use actq_kernels::cost;
 use anyhow::{Context as _, Result};
 use clap::{Parser, Subcommand};
 
@@ -122,7 +123,11 @@ enum Command {
         quick: bool,
     },
     /// Measure the cost model's rates again (after every change of the kernels)
-    Fit,
+    Fit {
+        /// The cores
+        #[arg(long, value_name = "CORE,..", value_delimiter = ',', default_value = "m4f,m4,m3,m0,rv32imac,m55", value_parser = core)]
+        core: Vec<cost::Core>,
+    },
     /// Package the C interface: header, static library, files for build systems, licences and a manifest
     Capi {
         /// The core: cortex-m0plus, cortex-m3, cortex-m4, cortex-m4f, cortex-m7, cortex-m33, rv32imac or host
@@ -140,6 +145,11 @@ enum Command {
         #[arg(long)]
         compact: bool,
     },
+}
+
+/// Reads the name of a core.
+fn core(name: &str) -> Result<cost::Core, String> {
+    cost::Core::of_name(name).ok_or_else(|| format!("use one of {}", cost::Core::ALL.map(|(name, _)| name).join(", ")))
 }
 
 /// Packages the C interface for a core.
@@ -162,7 +172,7 @@ fn main() -> ExitCode {
         Command::Faults => faults::all(),
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
-        Command::Fit => fit::run(),
+        Command::Fit { core } => fit::run(&core),
         Command::Gallery { out, robots, quick } => gallery::build(&out, &robots, quick),
         Command::Peers { ours, folder, words, json } => peers::run(ours, &words, folder.as_deref(), json.as_deref()),
         Command::Capi { target, out, image, compact } => capi(&target, &out, image.as_deref(), compact),

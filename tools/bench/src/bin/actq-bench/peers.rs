@@ -10,7 +10,7 @@ use std::path::Path;
 use actq::emit::{Core, repack};
 use actq::runtime::ImageBuffer;
 use actq_bench::Target;
-use actq_bench::firmware::{harness_for, kernel_bytes};
+use actq_bench::firmware::{harness, kernel_bytes};
 use actq_bench::qemu::{self, Counter};
 use actq_cli::report::table::table;
 use actq_kernels::Width;
@@ -78,7 +78,7 @@ fn own() -> Result<Vec<Row>> {
                 let buffer = ImageBuffer::new(&bytes);
                 let scratch = 4 * buffer.image(Path::new(case.name))?.scratch_words();
                 let file = qemu::slot(&bytes)?;
-                let (elf, slot) = harness_for(target, file.path())?;
+                let (elf, slot) = (harness(target)?, Some(file.path()));
                 let (_, regions) = counter.run(target, &elf, slot, &[])?;
                 let instructions = regions.first().context("the harness has run no step")?.instructions;
                 let (code, stack) = (kernel_bytes(&elf)?, stack(target, &elf, slot)?);

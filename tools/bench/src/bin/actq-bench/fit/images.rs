@@ -10,7 +10,7 @@ use actq::graph::syntax::Keys;
 use actq::graph::{Denoising, NodeKind, ValueId};
 use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
-use actq_bench::networks::{Builder, accumulating};
+use actq_bench::networks::Builder;
 use actq_kernels::Width;
 use actq_kernels::image::{Kind, OpKind};
 use actq_kernels::ops::denoise::Coefficients;
@@ -67,7 +67,7 @@ pub(super) fn images() -> Result<Vec<(String, Vec<u8>)>> {
         }
     }
     let name = "added biases";
-    images.push((name.to_owned(), accumulating(&builder.image(name)?)?));
+    images.push((name.to_owned(), builder.accumulating(name)?));
     images.push(around()?);
     Ok(images)
 }
