@@ -32,6 +32,10 @@ pub struct Dataset {
     pub state: Option<Array2<f32>>,
 }
 
+/// Largest value that a linear operation may read from a recording: units of any kind stay far below it, and marks for
+/// "no reading", as f32's largest number, are above it.
+const LARGEST: f32 = 1e30;
+
 impl Dataset {
     /// Reads a recording and checks it against the sizes. Every error names the file and its fault.
     pub fn load(path: &Path, sizes: Sizes) -> Result<Self> {
@@ -97,7 +101,7 @@ impl Dataset {
     }
 
     /// Refuses a recording on which the f32 network gives an action that is not finite, or a linear operation reads a
-    /// value whose square is not.
+    /// value above [`LARGEST`].
     pub(crate) fn require_finite(&self, graph: &Graph) -> Result<()> {
         let mut evaluator = Evaluator::new(graph);
         for episode in 0..self.length.len() {
@@ -105,7 +109,7 @@ impl Dataset {
             for (step, obs) in self.episode(episode).enumerate() {
                 let mut wrong = None;
                 let action = evaluator.step(&obs, &mut |matrix, input| {
-                    let value = input.iter().find(|value| !(**value * **value).is_finite());
+                    let value = input.iter().find(|value| value.abs() > LARGEST);
                     wrong = wrong.or(value.map(|value| (matrix, *value)));
                 });
                 let at = || format!("{}: episode {episode}, step {step}", self.path.display());
@@ -115,7 +119,7 @@ impl Dataset {
                 }
                 if let Some((matrix, value)) = wrong {
                     let name = &graph.matrices[matrix].name;
-                    bail!("{}: {name} reads {value:.1e}, whose square f32 cannot hold; {remedy}", at());
+                    bail!("{}: {name} reads {value:.1e}, which is no measured value; {remedy}", at());
                 }
             }
         }

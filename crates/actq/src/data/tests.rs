@@ -547,7 +547,7 @@ fn steps_on_the_axis_of_episodes_are_noticed() {
 }
 
 #[test]
-fn values_whose_squares_f32_cannot_hold_are_refused() {
+fn values_that_no_sensor_measures_are_refused() {
     let graph = mlp();
     let mut dataset = dataset(&graph, 2, 200);
     let refused = |dataset: &Dataset, method| PreparedMethod::new(&graph, method, Some(dataset), |_| {}).map(drop);
