@@ -1,7 +1,7 @@
 #!/bin/sh
 # mjlab 1.6.0 (read from its wheel): the metadata of an exported policy has lists of two lengths and names for one of them only. joint_names and default_joint_pos have
 # all joints, joint_stiffness, joint_damping and action_scale those with an actuator, and nothing says which: a reader that pairs them gives the gains of a joint
-# behind a passive one to that passive one. Its own YAM arm is such a robot (right_finger has no actuator; it is the last joint, so that pairs are right there).
+# after a passive one to that passive one. Its own YAM arm is such a robot (right_finger has no actuator; it is the last joint, so that pairs are right there).
 # Seen on 2026-11-29:  joint_names hip,slide,knee   default_joint_pos 0.100,0.000,-0.300   joint_stiffness 20.000,40.000   no other key with names of joints
 set -eu
 dir=$(mktemp -d); trap 'rm -rf "$dir"' EXIT; cd "$dir"

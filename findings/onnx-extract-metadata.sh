@@ -1,5 +1,5 @@
 #!/bin/sh
-# onnx 1.23.2: onnx.utils.extract_model, which cuts an actor out of a file that has the critic, too, leaves the file's metadata behind: names and order of the
+# onnx 1.23.2: onnx.utils.extract_model, which cuts an actor out of a file that has the critic, too, drops the file's metadata: names and order of the
 # joints, gains and scales are gone, without a warning. version_converter, shape inference, add_prefix and merge_models of the same package keep them.
 # Seen on 2026-11-29:  convert_version: kept   infer_shapes: kept   add_prefix: kept   merge_models: kept   extract_model: lost
 set -eu

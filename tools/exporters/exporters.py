@@ -1179,7 +1179,7 @@ def isaaclab():
         """The measurements of a robot: the simulator needs a GPU."""
 
         def __getattr__(self, name):
-            # Tensors are behind a property.
+            # Tensors are read through a property.
             return Stub(torch=torch.as_tensor(vars(self)["values"][name]))
 
     class Found(list):

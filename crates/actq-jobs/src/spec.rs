@@ -3,7 +3,6 @@
 mod drive;
 mod quantities;
 
-use actq_kernels::cost::Core;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,6 +12,7 @@ use actq::error::{Context as _, Error, Result, ensure};
 use actq::measure::time::CLOCK;
 use actq::methods::Effort;
 use actq_kernels::Width;
+use actq_kernels::cost::Core;
 use serde::Deserialize;
 
 pub use drive::{Drive, Learn};

@@ -87,7 +87,7 @@ pub use product::{Mismatch, Product};
 pub(crate) use scaling::scale;
 pub use tables::Tables;
 #[cfg(all(feature = "writer", feature = "scalar"))]
-pub(crate) use tables::{TABLE_WORDS, TWO_COLUMNS};
+pub(crate) use tables::{LEAST_PAIRS, TABLE_WORDS, TWO_COLUMNS};
 
 use crate::activations::{Plan, Prepared, Scale};
 use crate::error::NotFinite;

@@ -21,6 +21,10 @@ const MAX_TABLES: usize = 8;
 #[cfg(feature = "scalar")]
 pub(crate) const TWO_COLUMNS: usize = 4;
 
+/// Pairs of columns for which there is always memory, a multiple of the step's.
+#[cfg(feature = "scalar")]
+pub(crate) const LEAST_PAIRS: usize = 16;
+
 /// Most pairs of columns that are of use at a time.
 #[cfg(feature = "scalar")]
 const MAX_PAIRS: usize = 64;
@@ -52,10 +56,16 @@ impl<'w> Tables<'w> {
     /// Takes up to half of the memory for the sums of `rows` rows; `None` for fewer than two runs of rows. Tables are then built
     /// less often.
     pub(crate) fn with_sums(self, rows: usize) -> Option<(&'w mut [i32], Self)> {
-        let most = (self.words.len() / 2) & !(STRIP - 1);
-        let len = rows.next_multiple_of(STRIP).min(most);
+        let len = Self::sums(self.words.len(), rows)?;
         let (sums, words) = self.words.split_at_mut_checked(len)?;
-        (len > RUN).then(|| (bytemuck::must_cast_slice_mut(sums), Self { words }))
+        Some((bytemuck::must_cast_slice_mut(sums), Self { words }))
+    }
+
+    /// Returns the number of sums in `words` words for `rows` rows, as [`Self::with_sums`] takes them.
+    #[inline(always)]
+    pub(crate) fn sums(words: usize, rows: usize) -> Option<usize> {
+        let len = rows.next_multiple_of(STRIP).min((words / 2) & !(STRIP - 1));
+        (len > RUN).then_some(len)
     }
 
     /// Returns the memory.

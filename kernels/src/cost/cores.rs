@@ -2,7 +2,7 @@
 
 pub use super::rates::CORES;
 use super::rates::RATES;
-use super::{CostItem, Rates, thousand24ths};
+use super::{CostItem, Rates, in_1024ths};
 use crate::image::Image;
 use crate::layout::Lanes;
 
@@ -92,6 +92,11 @@ impl Core {
         })
     }
 
+    /// Returns the cores whose layouts an image has.
+    pub fn of_image(image: &Image<'_>) -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().map(|(_, core)| core).filter(|core| core.has_layouts_of(image))
+    }
+
     /// Returns the core whose rates are taken for this one: the core itself, if it was measured. Code of the Cortex-M4 runs
     /// on the M7 and the M33, which take no more cycles; the kernels of RV32 do not use Zba.
     pub fn measured(self) -> Self {
@@ -127,7 +132,7 @@ const fn columns(which: usize) -> [[u32; CostItem::COUNT]; CORES.len()] {
     while i < RATES.len() {
         let mut core = 0;
         while core < CORES.len() {
-            columns[core][RATES[i].0.index()] = thousand24ths(RATES[i].2[core][which]);
+            columns[core][RATES[i].0.index()] = in_1024ths(RATES[i].2[core][which]);
             core += 1;
         }
         i += 1;

@@ -76,14 +76,14 @@ const fn column(which: usize) -> [u32; CostItem::COUNT] {
         let (item, rates, _) = RATES[i];
         assert!(!rated[item.index()], "rates.rs has an item twice");
         rated[item.index()] = true;
-        column[item.index()] = thousand24ths(rates[which]);
+        column[item.index()] = in_1024ths(rates[which]);
         i += 1;
     }
     column
 }
 
 /// Converts a rate to 1024ths; negative ones count as 0.
-const fn thousand24ths(rate: f64) -> u32 {
+const fn in_1024ths(rate: f64) -> u32 {
     if rate < 0.0 { 0 } else { (rate * ONE + 0.5) as u32 }
 }
 

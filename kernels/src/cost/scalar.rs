@@ -4,12 +4,9 @@
 use super::item::{Gemv, Strips};
 use super::{CostItem, rows_in_place, scaled};
 use crate::activations::Plan;
-use crate::arch::{TABLE_WORDS, TWO_COLUMNS};
+use crate::arch::{LEAST_PAIRS, TABLE_WORDS, TWO_COLUMNS, Tables};
 use crate::layout::{BlockShape, Format, QUAD, STRIP, Width, w4_scalar::W4Scalar};
 use crate::meter::RUN;
-
-/// Pairs of columns that the 8-bit loop has on the stack without other memory.
-const LEAST_PAIRS: usize = 16;
 
 /// Counts the items of a block's products and their scaling, as [`super::block`] does.
 pub(super) fn block(shape: BlockShape, in_order: bool, start: bool, add: &mut dyn FnMut(CostItem, usize)) {
@@ -22,9 +19,8 @@ pub(super) fn block(shape: BlockShape, in_order: bool, start: bool, add: &mut dy
     }
     let left = shape.rows - whole;
     if left > 0 {
-        // Sums take up to half of the memory, if that is for more rows than the stack's (`Tables::with_sums`).
-        let sums = left.next_multiple_of(STRIP).min((memory / 2) & !(STRIP - 1));
-        let (run, memory) = if whole == 0 && sums > RUN { (sums, memory - sums) } else { (RUN, memory) };
+        let sums = if whole == 0 { Tables::sums(memory, left) } else { None };
+        let (run, memory) = sums.map_or((RUN, memory), |sums| (sums, memory - sums));
         let runs = left.div_ceil(run);
         add(CostItem::STACK, 1);
         add(CostItem::RUN, runs);

@@ -1,6 +1,5 @@
 //! Makes the image of a cell.
 
-use actq_kernels::cost::Core;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -13,6 +12,7 @@ use actq::methods::{Options, Quantized};
 use actq::pipeline::{QuantizedPolicy, Quantizer};
 use actq::policy::Policy;
 use actq_kernels::Width;
+use actq_kernels::cost::Core;
 use actq_kernels::layout::GROUPS;
 use anyhow::{Context as _, Result};
 

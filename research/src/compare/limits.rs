@@ -1,10 +1,10 @@
 //! The budget of a cell.
 
-use actq::emit::Core;
 use std::cmp::Ordering;
 use std::fmt;
 
 use actq::budget::{Budget, TimeLimit};
+use actq::emit::Core;
 use actq::measure::time::CLOCK;
 use serde::{Deserialize, Serialize};
 

@@ -48,8 +48,8 @@ pub fn how_to_record(policy: &Policy) -> String {
     )
 }
 
-/// Returns notes on a policy: actions or targets without limits, a rate that its source does not state, what its source does with values that are not finite,
-/// and actions of its source that it does not have.
+/// Returns notes on a policy: actions or targets without limits, a rate that its source does not state, the source's
+/// treatment of values that are not finite, and actions of its source that it does not have.
 pub fn of_policy(policy: &Policy) -> Vec<String> {
     let limits = match &policy.around {
         Some(around) => targets_without_limits(around),

@@ -39,8 +39,7 @@ pub fn of_image(image: &Image<'_>, core: Option<Core>, clock_hz: f64) -> Result<
 
 /// Returns the names of the cores whose layouts the image has.
 fn cores(image: &Image<'_>) -> String {
-    let own = Core::ALL.into_iter().filter(|(_, core)| core.has_layouts_of(image));
-    own.map(|(name, _)| name).collect::<Vec<_>>().join(", ")
+    Core::of_image(image).map(Core::name).collect::<Vec<_>>().join(", ")
 }
 
 fn steps(step: &StepTime) -> String {

@@ -1,8 +1,8 @@
 //! The table of `actq tune`.
 
-use actq::emit::Core;
 use std::path::Path;
 
+use actq::emit::Core;
 use actq::measure::time::CLOCK;
 use actq::pipeline::tune::{Round, Tuned};
 use comfy_table::Table;

@@ -14,7 +14,7 @@ const ORDINARY: f64 = 0.99;
 const GAP: f32 = 50.0;
 /// Share of the actions' squares in one frame above which there is a note.
 const MOST: f64 = 0.5;
-/// Fewest frames of which one that has that share stands out.
+/// Fewest frames of a recording for that note.
 const LEAST: usize = 16;
 
 /// Values of one dimension far outside of the others.

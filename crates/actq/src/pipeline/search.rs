@@ -8,11 +8,11 @@
 //! held out in turn. After that many tries, a smaller budget may still pass, and the tries show which range is open.
 //! The search assumes that errors fall with bits.
 
-use actq_kernels::cost::Core;
 use std::borrow::Cow;
 use std::path::Path;
 
 use actq_kernels::Width;
+use actq_kernels::cost::Core;
 
 use super::quantizer::{QuantizedPolicy, Quantizer};
 use super::tries::{Search, Try};

@@ -1,10 +1,10 @@
 //! On-policy rounds: an image is rolled out, the f32 policy labels what the image observed, and the next image also
 //! learns from that (DAgger: Ross, Gordon, Bagnell 2011, with the f32 policy as the expert).
 
-use actq_kernels::cost::Core;
 use std::path::Path;
 use std::time::Instant;
 
+use actq_kernels::cost::Core;
 use serde::Serialize;
 
 use super::driven::{DriveOutcome, Driven};

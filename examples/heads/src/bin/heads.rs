@@ -1,7 +1,6 @@
 //! The cost of the heads: bytes, memory, instructions, time, polls.
 #![forbid(unsafe_code)]
 
-use actq_kernels::cost::Core;
 use std::path::{Path, PathBuf};
 
 use actq::budget::Budget;
@@ -12,6 +11,7 @@ use actq::pipeline::quantize;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_cli::report::table::table;
 use actq_heads::{Head, octo, oft};
+use actq_kernels::cost::Core;
 use actq_kernels::{Image, Width};
 use anyhow::Result;
 use clap::Parser;

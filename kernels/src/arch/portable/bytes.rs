@@ -7,14 +7,11 @@
 #[cfg(actq_loops)]
 use crate::arch::loops::add_bytes;
 use crate::arch::product::Product;
-use crate::arch::tables::TWO_COLUMNS;
+use crate::arch::tables::{LEAST_PAIRS, TWO_COLUMNS};
 use crate::layout::QUAD;
 use crate::layout::half::halves;
 #[cfg(not(actq_loops))]
 use crate::layout::w8_scalar::MASK;
-
-/// Pairs of columns for which there is always memory, a multiple of the step's.
-const LEAST_PAIRS: usize = 16;
 
 /// `true` if sums are those of `code * x`, row by row: no instruction masks and shifts, so two rows at once save nothing.
 const PLAIN: bool = cfg!(actq_armv6m);

@@ -51,7 +51,7 @@ pub struct Facts {
     pub scratch: usize,
     /// The core whose layouts the image has, its predicted cycles, and the clock in Hz.
     pub time: (&'static str, u64, f64),
-    /// What the image takes in the layouts of each core.
+    /// The image in the layouts of each core.
     pub cores: BTreeMap<&'static str, OnCore>,
     /// Features that a build of the kernels needs.
     pub features: Vec<&'static str>,
@@ -73,10 +73,10 @@ pub struct Facts {
     pub made: Vec<(&'static str, String)>,
 }
 
-/// What an image takes on a core, in its layouts.
+/// Figures of an image in the layouts of a core.
 #[derive(Debug, Serialize)]
 pub struct OnCore {
-    /// How a sentence names it.
+    /// Name of the core in a sentence.
     pub title: &'static str,
     /// Bytes of the image.
     pub bytes: usize,
@@ -93,22 +93,30 @@ pub struct OnCore {
 }
 
 impl OnCore {
+    /// Collects the figures of all cores.
+    ///
     /// # Errors
     ///
-    /// If the image has no place in the core's layouts.
-    fn new(image: &Image<'_>, bytes: &[u8], core: Core, runtime: usize) -> Result<Self> {
-        let packed = repack(bytes, core)?;
-        let buffer = ImageBuffer::new(&packed);
-        let here = buffer.image("the image".as_ref())?;
-        Ok(Self {
-            title: core.title(),
-            bytes: packed.len(),
-            scratch: 4 * here.scratch_words(),
-            cycles: StepTime::new(&here, core, 1.0).cycles,
-            is_modelled: core.is_modelled(),
-            is_own: core.has_layouts_of(image),
-            runtime,
-        })
+    /// If the image has no place in a core's layouts.
+    fn of_all(image: &Image<'_>, bytes: &[u8]) -> Result<BTreeMap<&'static str, Self>> {
+        let (mut all, mut packed) = (BTreeMap::new(), bytes.to_vec());
+        for (core, runtime) in RUNTIMES {
+            // An image that has the layouts already stays as it is.
+            packed = repack(&packed, core)?;
+            let buffer = ImageBuffer::new(&packed);
+            let here = buffer.image("the image".as_ref())?;
+            let figures = Self {
+                title: core.title(),
+                bytes: packed.len(),
+                scratch: 4 * here.scratch_words(),
+                cycles: StepTime::new(&here, core, 1.0).cycles,
+                is_modelled: core.is_modelled(),
+                is_own: core.has_layouts_of(image),
+                runtime,
+            };
+            all.insert(core.name(), figures);
+        }
+        Ok(all)
     }
 }
 
@@ -175,11 +183,9 @@ impl Facts {
     ///
     /// If the statistics are of another image.
     pub fn new(image: &Image<'_>, bytes: &[u8], stats: Option<&Stats>, clock_hz: f64) -> Result<Self> {
-        let own = Core::ALL.into_iter().map(|(_, core)| core).filter(|core| core.has_layouts_of(image));
         // Images of default layouts have those of several cores.
-        let core = own.min_by_key(|core| *core != Core::M4f).unwrap_or(Core::M4f);
+        let core = Core::of_image(image).min_by_key(|core| *core != Core::M4f).unwrap_or(Core::M4f);
         let step = StepTime::new(image, core, clock_hz);
-        let on = |&(core, runtime): &(Core, usize)| Ok((core.name(), OnCore::new(image, bytes, core, runtime)?));
         let widths = Widths::new(image, stats)?;
         let distinct = actq::measure::size::distinct(image);
         let places: Vec<_> =
@@ -224,7 +230,7 @@ impl Facts {
             file_bits_per_weight: file_bits_per_weight(image),
             scratch: 4 * image.scratch_words(),
             time: (core.name(), step.cycles, clock_hz),
-            cores: RUNTIMES.iter().map(on).collect::<Result<_>>()?,
+            cores: OnCore::of_all(image, bytes)?,
             features: image.features().collect(),
             playback: playback(image),
             self_test: image.self_test_steps(),

@@ -35,12 +35,15 @@ pub const PARTS: &[Part] = &[
     Part { name: "ESP32-C3", core: "rv32imac", flash: 4096 * KB, ram: 400 * KB, megahertz: 160, ..EXTERNAL },
 ];
 
+/// Bytes of code of the Cortex-M4F, and of M7 and M33.
+const DSP: usize = 36_840;
+
 /// Cores of a page, with the bytes of code that opens, checks and runs any image on them ("whole runtime" of budgets.json;
-/// of M7 and M33 that of the Cortex-M4F; of RV32IMAC with slices).
+/// of RV32IMAC with slices). Cores of the same layouts follow each other.
 pub const RUNTIMES: [(Core, usize); 6] = [
-    (Core::M4f, 36_840),
-    (Core::M7, 36840),
-    (Core::M33, 36840),
+    (Core::M4f, DSP),
+    (Core::M7, DSP),
+    (Core::M33, DSP),
     (Core::M3, 94_248),
     (Core::M0, 90_448),
     (Core::Rv32imac, 107_656),

@@ -1,6 +1,5 @@
 //! The gallery: one page in which the example robots are driven by images of few bits.
 
-use actq_kernels::cost::Core;
 use std::fs;
 use std::path::Path;
 
@@ -18,6 +17,7 @@ use actq_cli::report::page::runs::{HeadData, Reference, ReferenceData};
 use actq_cli::report::page::{CSS, UNPACK, encoded, filled, packed};
 use actq_deploy::Deployment;
 use actq_kernels::Width;
+use actq_kernels::cost::Core;
 use actq_ur3::policy_f32::PolicyF32;
 use anyhow::{Context as _, Result};
 use serde::Serialize;
