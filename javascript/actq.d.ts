@@ -34,6 +34,8 @@ export class Head {
   readonly scratchBytes: number;
   /** CRC-32 of the image, as in its header. */
   readonly crc32: number;
+  /** Bytes of a saved state. */
+  readonly stateBytes: number;
   /** Raw inputs in the order of the observation; empty without a description. */
   readonly inputs: readonly Port[];
   /** Targets in the order of the action; empty without a description. */
@@ -49,6 +51,14 @@ export class Head {
   reset(): void;
   /** Sets the seed of a flow or diffusion policy's noise, 0 by default, and resets. */
   seed(seed: number): void;
+  /** Returns the state between two steps: recurrent state, histories, chunks, last action, and the noise's position. */
+  save(): Uint8Array;
+  /**
+   * Continues from a state that a head of the same image saved: the next actions have the same bits.
+   *
+   * @throws If the state is of another image, or damaged; the head keeps its own.
+   */
+  restore(state: Uint8Array): void;
   /**
    * Computes with these weights in f32 from now on, in place of the image's own: each matrix once, in the order of the
    * operations that first use them, row by row.

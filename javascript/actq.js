@@ -1,7 +1,7 @@
 // Heads of actq in JavaScript: images run with the bits of a microcontroller. README.md and actq.d.ts document it.
 
 const TEXTS = { error: 0, name: 1, ports: 2 };
-const NUMBERS = { observationLength: 0, actionLength: 1, rateHz: 2, scratchBytes: 3, crc32: 4 };
+const NUMBERS = { observationLength: 0, actionLength: 1, rateHz: 2, scratchBytes: 3, crc32: 4, stateBytes: 5 };
 
 /** Compiles the module from its gzip file, or from its content: some servers make a browser unpack it. */
 export async function compile(gzip) {
@@ -87,6 +87,22 @@ export class Head {
   /** Sets the seed of a flow or diffusion policy's noise, and resets. */
   seed(seed) {
     check(this.#exports, this.#exports.seed(seed >>> 0));
+  }
+
+  /** Returns the state between two steps. */
+  save() {
+    const { memory, allocate, save } = this.#exports;
+    const address = allocate(this.stateBytes);
+    check(this.#exports, save());
+    return new Uint8Array(memory.buffer, address, this.stateBytes).slice();
+  }
+
+  /** Continues from a state that a head of the same image saved. */
+  restore(state) {
+    const { memory, allocate, restore } = this.#exports;
+    const address = allocate(state.length);
+    new Uint8Array(memory.buffer, address, state.length).set(state);
+    check(this.#exports, restore());
   }
 
   #text(which) {

@@ -1,10 +1,13 @@
 const ROBOTS = [
-  { title: "Balancer", hertz: 100, push: 4, unit: "m/s", error: "speed error", goals: [["speed, m/s", -0.6, 0.6], ["turn rate, rad/s", -1.5, 1.5]], draw: drawBalancer },
-  { title: "UR3 arm", hertz: 50, push: 12, unit: "mm", error: "distance to the goal", goals: [["x, m", -0.45, -0.15], ["y, m", -0.3, 0.3], ["z, m", 0.05, 0.45]], draw: drawArm },
+  { title: "Balancer", hertz: 100, push: 4, unit: "m/s", error: "speed error", goals: [["speed, m/s", -0.6, 0.6], ["turn rate, rad/s", -1.5, 1.5]], draw: drawBalancer,
+    task: "An episode succeeds if the robot stands to its end and follows the speed and the turn rate at the end of each command." },
+  { title: "UR3 arm", hertz: 50, push: 12, unit: "mm", error: "distance to the goal", goals: [["x, m", -0.45, -0.15], ["y, m", -0.3, 0.3], ["z, m", 0.05, 0.45]], draw: drawArm,
+    task: "An episode succeeds if the tool is near both of its goals, in position and direction, in the last 0.4 s of each." },
 ];
 const data = JSON.parse(document.getElementById("data").textContent);
 const byId = (id) => document.getElementById(id);
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name);
+const minus = (text) => text.replaceAll("-", "\u2212");
 const integer = (n) => n.toString().replace(/\B(?=(\d{3})+$)/g, ",");
 
 let heads;
@@ -19,8 +22,8 @@ let isPaused = false;
 let failed = "";
 /** Why the page, or the last choice, does not work. */
 let broken = "";
-/** The reader has set the goal; before, the sliders show the task's. */
-let isAimed = false;
+/** The goal that the reader has set; without one, the sliders show the task's. */
+let aimed;
 const opened = new Map();
 
 /** Opens the head of a level, once: 0 is f32, the others are images. */
@@ -37,25 +40,27 @@ async function headOf(which, level) {
 
 /** The newest choice: an older one that is still loading is dropped. */
 let newest = 0;
-/** Starts a robot. Frames run in between, so everything that belongs to it changes at once, at the end. */
-async function begin(chosen) {
+/** Starts a robot with a head. Frames run in between, so everything that belongs to it changes at once, at the end. Returns `true` if it is still the newest choice. */
+async function enter(chosen, bits) {
   const own = ++newest;
-  const bits = Math.min(level, data[chosen].images.length);
   const { exports } = await WebAssembly.instantiate(simulation, {});
   exports.begin(data[chosen].robot, seed++);
-  const first = await headOf(chosen, bits);
-  if (own !== newest) return;
-  [which, level, robot, head, broken] = [chosen, bits, exports, first, ""];
+  const next = await headOf(chosen, bits);
+  if (own !== newest) return false;
+  [which, level, robot, head, broken] = [chosen, bits, exports, next, ""];
   head.reset();
+  return true;
+}
+/** Chooses a robot. */
+async function begin(chosen) {
+  if (!(await enter(chosen, Math.min(level, data[chosen].images.length)))) return;
+  aimed = undefined;
   controls();
 }
-/** Switches the bits while the robot runs: the new head starts from its reset. */
+/** Switches the bits: the episodes that are counted begin again, as they are those of one head. A goal stays. */
 async function change(bits) {
-  const own = ++newest;
-  const next = await headOf(which, bits);
-  if (own !== newest) return;
-  [level, head, broken] = [bits, next, ""];
-  head.reset();
+  if (!(await enter(which, bits))) return;
+  if (aimed) robot.aim(...aimed);
   press("levels", level);
 }
 const array = (Type, address, length) => new Type(robot.memory.buffer, address, length);
@@ -92,6 +97,7 @@ function report(error) {
 function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
+const show = (i, goal) => write(byId(`goal${i}-value`), minus(goal.toFixed(2)));
 /** Makes the controls of a robot that has just begun. */
 function controls() {
   press("robots", which);
@@ -99,11 +105,17 @@ function controls() {
   const goals = ROBOTS[data[which].robot].goals;
   const inputs = goals.map(([, min, max], i) => Object.assign(document.createElement("input"), { type: "range", id: `goal${i}`, min, max, step: 0.01, oninput: aim }));
   function aim() {
-    isAimed = true;
-    robot.aim(...[0, 1, 2].map((i) => inputs[i]?.valueAsNumber ?? 0));
+    aimed = [0, 1, 2].map((i) => inputs[i]?.valueAsNumber ?? 0);
+    robot.aim(...aimed);
+    inputs.forEach(({ value }, i) => show(i, Number(value)));
   }
-  isAimed = false;
-  byId("goal").replaceChildren(...goals.flatMap(([name], i) => [Object.assign(document.createElement("label"), { htmlFor: `goal${i}`, textContent: name }), inputs[i]]));
+  byId("goal").replaceChildren(...goals.map(([name], i) => {
+    const pair = document.createElement("span");
+    pair.className = "pair";
+    pair.append(Object.assign(document.createElement("label"), { htmlFor: `goal${i}`, textContent: name }), inputs[i], Object.assign(document.createElement("output"), { id: `goal${i}-value` }));
+    return pair;
+  }));
+  byId("task").textContent = `${ROBOTS[data[which].robot].task} Your pushes and your goal are part of it.`;
 }
 byId("left").onclick = () => robot?.push(-ROBOTS[data[which].robot].push);
 byId("right").onclick = () => robot?.push(ROBOTS[data[which].robot].push);
@@ -117,7 +129,7 @@ function stage() {
   const canvas = byId("stage");
   const ratio = devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-  if (canvas.width !== Math.round(width * ratio)) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
   const context = canvas.getContext("2d");
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
@@ -150,7 +162,7 @@ function drawBalancer([distance, lean, yaw, speed, , command], context, width, h
   const turn = distance / 0.05;
   line(context, [wheel, [wheel[0] + 0.045 * scale * Math.sin(turn), wheel[1] - 0.045 * scale * Math.cos(turn)]], colour("--page"), 3);
   context.fillStyle = colour("--text");
-  context.fillText(`speed ${speed.toFixed(2)} of ${command.toFixed(2)} m/s, heading ${((yaw * 180) / Math.PI).toFixed(0)}\u00b0`, 12, 22);
+  context.fillText(minus(`speed ${speed.toFixed(2)} of ${command.toFixed(2)} m/s, heading ${((yaw * 180) / Math.PI).toFixed(0)}\u00b0`), 12, 22);
 }
 function drawArm(view, context, width, height) {
   const scale = Math.min(width, height * 1.4) * 0.85;
@@ -202,7 +214,7 @@ function frame(now) {
     for (; owed >= 1; owed--) step();
     const view = [...array(Float64Array, robot.view(), robot.number(2))];
     draw(view, ...stage());
-    if (!isAimed) goal(view).forEach((value, i) => (byId(`goal${i}`).value = value));
+    if (!aimed) goal(view).forEach((value, i) => ((byId(`goal${i}`).value = value), show(i, value)));
     const isDue = now - written > 250;
     if (isDue) written = now;
     figures(isDue);

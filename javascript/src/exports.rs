@@ -107,19 +107,38 @@ pub extern "C" fn seed(seed: u32) -> u32 {
     }))
 }
 
+/// Writes the state of the head to the address that [`allocate`] returned for it: as many bytes as [`number`] 5.
+#[unsafe(no_mangle)]
+pub extern "C" fn save() -> u32 {
+    let save = |running: &mut Running| {
+        INPUT.with_borrow_mut(|to| running.head.save(bytemuck::cast_slice_mut(to))).map_err(|error| error.to_string())
+    };
+    status(running(save))
+}
+
+/// Takes the buffer as a state that [`save`] wrote for a head of the same image.
+#[unsafe(no_mangle)]
+pub extern "C" fn restore() -> u32 {
+    let from = INPUT.take();
+    let restore =
+        |running: &mut Running| running.head.restore(bytemuck::cast_slice(&from)).map_err(|error| error.to_string());
+    status(running(restore))
+}
+
 /// Returns a number of the image: 0 the observation's length, 1 the action's, 2 the control rate in Hz, 3 the bytes of
-/// its scratch memory, 4 its CRC-32.
+/// its scratch memory, 4 its CRC-32, 5 the bytes of a head's state.
 #[unsafe(no_mangle)]
 pub extern "C" fn number(which: u32) -> f64 {
-    let number = |image: &Image<'_>| match which {
-        0 => image.obs_len() as f64,
-        1 => image.act_len() as f64,
-        2 => f64::from(image.rate_hz()),
-        3 => 4.0 * image.scratch_words() as f64,
-        4 => f64::from(image.crc()),
+    let number = |head: &Head<'_, '_>| match which {
+        0 => head.image().obs_len() as f64,
+        1 => head.image().act_len() as f64,
+        2 => f64::from(head.image().rate_hz()),
+        3 => 4.0 * head.image().scratch_words() as f64,
+        4 => f64::from(head.image().crc()),
+        5 => head.saved_len() as f64,
         _ => f64::NAN,
     };
-    RUNNING.with_borrow(|running| running.as_ref().map_or(f64::NAN, |running| number(running.head.image())))
+    RUNNING.with_borrow(|running| running.as_ref().map_or(f64::NAN, |running| number(&running.head)))
 }
 
 /// Prepares a text and returns its bytes of UTF-8, at the address that [`text_address`] returns: 0 the last error, 1 the

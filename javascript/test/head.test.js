@@ -37,6 +37,27 @@ test("heads are independent", async () => {
   assert.deepEqual(b.step(observation), fresh.step(observation));
 });
 
+test("a restored state continues with the same actions", async () => {
+  const head = await Head.open(await file("../../kernels/tests/valid.actq"));
+  const observation = new Float32Array(head.observationLength).fill(0.25);
+  const fresh = head.step(observation);
+  const state = head.save();
+  assert.equal(state.length, head.stateBytes);
+  const [second, third] = [head.step(observation), head.step(observation)];
+  head.restore(state);
+  assert.deepEqual([head.step(observation), head.step(observation)], [second, third]);
+  // Another head of the image, too; a damaged state changes nothing.
+  const other = await Head.open(valid);
+  other.restore(state);
+  const damaged = Uint8Array.from(state);
+  damaged[damaged.length - 1] ^= 1;
+  assert.throws(() => other.restore(damaged), /damaged/i);
+  assert.throws(() => other.restore(state.subarray(4)), /bytes|length/i);
+  assert.deepEqual(other.step(observation), second);
+  other.reset();
+  assert.deepEqual(other.step(observation), fresh);
+});
+
 test("wrong bytes, lengths and values are refused", async () => {
   await assert.rejects(Head.open(new Uint8Array(64)), /image|magic|actq/i);
   const damaged = Uint8Array.from(valid);

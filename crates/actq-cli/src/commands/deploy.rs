@@ -26,6 +26,8 @@ const DEFAULT_MINUTES: f64 = 6.0;
 const POLICY: &str = "policy";
 const MADE_WITH: &str = "policy.actq.txt";
 const IMAGE: &str = "policy.actq";
+/// Statistics of the image, for its report.
+const STATS: &str = "policy.stats.json";
 /// Endings of the files of constants.
 const CONSTANTS: [&str; 2] = ["rs", "h"];
 /// Checksums of the bundle's files at its import.
@@ -214,7 +216,7 @@ fn quantize_args(args: &DeployArgs, policy: &Path, image: &Path) -> QuantizeArgs
             ..args.learn.clone()
         },
         run: args.run.clone(),
-        save_stats: None,
+        save_stats: Some(args.out.join(STATS)),
     }
 }
 

@@ -3,12 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use actq::data::{Dataset, Recording, Sizes, files_of, joined};
+use actq::data::{Dataset, Recording, Sizes, driven_by, files_of, joined};
+use actq::measure::size::hex;
 use actq::measure::time::CLOCK;
 use actq::measure::{eval, own};
 use actq::pipeline::stats::Stats;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
+use actq::text::printable;
 use actq_deploy::Raw;
 use actq_jobs::record::Outcome;
 use actq_jobs::results::MergedPolicy;
@@ -16,9 +18,11 @@ use actq_jobs::store::Store;
 use actq_kernels::{Image, PortKind};
 use anyhow::{Context as _, Result, ensure};
 use ndarray::Array3;
+use sha2::{Digest as _, Sha256};
 
 use crate::args::ReportArgs;
 use crate::importers::{load, policy_files};
+use crate::report::notes::{targets_without_limits, useless, without_limits};
 use crate::report::page::facts::Facts;
 use crate::report::page::parts::PARTS;
 use crate::report::page::runs::{self, HeadData, Reference};
@@ -42,17 +46,25 @@ pub(crate) fn run(args: &ReportArgs) -> Result<()> {
     let (outcomes, driven): (Vec<_>, Vec<_>) =
         driven.into_iter().partition(|file| file.extension().is_some_and(|ending| ending == "json"));
     ensure!(outcomes.len() <= 1, "--driven: more than one .json file; name the one with the outcome of all episodes");
-    let success = outcomes.first().map(|file| outcome_of(file)).transpose()?;
+    let success = outcomes.first().map(|file| outcome_of(file, &driven)).transpose()?;
+    driven.iter().try_for_each(|file| refuse_unnamed(file))?;
     let own = (!driven.is_empty()).then(|| own::own_path(image, &driven, policy.as_ref())).transpose()?;
     let dataset = dataset_of(&image, &recordings, args.policy.as_deref())?;
-    let facts = Facts::new(&image, buffer.bytes(), stats.as_ref(), args.clock)?;
-    let sweep = args.store.as_deref().map(|store| sweep_of(store, &facts)).transpose()?;
-    let page = Page {
-        own_path: own.map(|own| (own.nmse, own.steps)),
-        success: success.or_else(|| sweep.as_ref().and_then(|sweep| sweep.images.iter().find(|i| i.is_own)?.success)),
-        sweep,
-        ..page(image, buffer.bytes(), facts, policy.as_ref(), dataset)?
-    };
+    let mut facts = Facts::new(&image, buffer.bytes(), stats.as_ref(), policy.as_ref(), args.clock)?;
+    for file in recordings.iter().chain(dataset.iter().map(|dataset| &dataset.path).filter(|_| recordings.is_empty())) {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        facts.made.push(("recording compared on, SHA-256", format!("{} {}", digest(file)?, printable(&name))));
+    }
+    let sweep = args.store.as_deref().map(|store| sweep_of(store, &facts, args.clock)).transpose()?;
+    let mut page = page(image, buffer.bytes(), facts, policy.as_ref(), dataset)?;
+    if let Some(warning) = own.as_ref().and_then(|own| useless(own.nmse)) {
+        page.warnings.push(format!("on the image's own path {warning}"));
+    }
+    page.own_path = own.map(|own| (own.nmse, own.steps));
+    if let Some(sweep) = sweep {
+        page.add(sweep);
+    }
+    page.success = success.or(page.success);
     let html = html(&page)?;
     let (shown, bytes) = (args.out.display(), html.len());
     outputs.write(&[html])?;
@@ -67,8 +79,8 @@ pub(crate) fn run(args: &ReportArgs) -> Result<()> {
 /// If policy or recordings do not match the image, or it cannot run on them.
 pub fn of_image(buffer: &ImageBuffer, name: &Path, policy: Option<&Policy>, files: &[PathBuf]) -> Result<String> {
     let image = buffer.image(name)?;
-    let facts = Facts::new(&image, buffer.bytes(), None, CLOCK)?;
     policy.map(|policy| of_policy(policy, &image)).transpose()?;
+    let facts = Facts::new(&image, buffer.bytes(), None, policy, CLOCK)?;
     let folder = policy.map(|policy| &*policy.dir).filter(|dir| !dir.as_os_str().is_empty());
     let dataset = dataset_of(&image, files, folder)?;
     html(&page(image, buffer.bytes(), facts, policy, dataset)?)
@@ -92,14 +104,39 @@ fn page(
     let pair = dataset.as_ref().zip(reference.as_ref());
     let runs = pair.map(|(dataset, reference)| runs::compare(image, reference, dataset, nmse)).transpose()?;
     let head = HeadData::new(image, bytes, dataset.as_ref(), reference.as_ref())?;
-    Ok(Page { facts, own_path: None, success: None, sweep: None, runs, head, parts: PARTS })
+    let error = runs.as_ref().and_then(|runs| runs.error);
+    let limits = (0..image.act_len()).map(|i| image.limits(i));
+    let limits = if image.has_around() { targets_without_limits(limits) } else { without_limits(limits) };
+    let warnings = error.and_then(useless).into_iter().chain(limits).collect();
+    let has_policy = policy.is_some();
+    Ok(Page { facts, warnings, has_policy, own_path: None, success: None, sweep: None, runs, head, parts: PARTS })
 }
 
-/// Reads the success that a simulator printed.
-fn outcome_of(file: &Path) -> Result<Success> {
+/// Reads the success that a simulator printed of the rollouts in `driven`, which name the image: it does not.
+fn outcome_of(file: &Path, driven: &[PathBuf]) -> Result<Success> {
     let name = || file.display().to_string();
+    ensure!(
+        !driven.is_empty(),
+        "{}: does not say of which image it is; add the recording of its rollouts: --driven FILE.npz, by actq serve --record",
+        name()
+    );
     let text = fs::read_to_string(file).context("cannot read the file").with_context(name)?;
     success_of(&text).with_context(name)
+}
+
+/// Refuses a recording that names no image: its error would be that of an unknown controller's path.
+fn refuse_unnamed(file: &Path) -> Result<()> {
+    ensure!(
+        driven_by(file)?.is_some(),
+        "{}: names no image, so it may be the rollout of another policy; record this image with actq serve --record",
+        file.display()
+    );
+    Ok(())
+}
+
+fn digest(file: &Path) -> Result<String> {
+    let bytes = fs::read(file).with_context(|| format!("{}: cannot read the file", file.display()))?;
+    Ok(hex(&Sha256::digest(&bytes)))
 }
 
 /// Reads the policy of a folder; refuses another than that of the image.
@@ -159,23 +196,40 @@ fn recorded(image: &Image<'_>, file: &Path) -> Result<Dataset> {
     Ok(Dataset { path: file.to_owned(), obs, action: None, length: vec![frames.len()], state: None })
 }
 
-/// Finds the sweep of an image in a store: that with the image's digest, or else one of a policy of its name.
-fn sweep_of(folder: &Path, facts: &Facts) -> Result<Sweep> {
+/// Finds the sweep of an image in a store: one with the image, or else one of the same policy.
+fn sweep_of(folder: &Path, facts: &Facts, clock_hz: f64) -> Result<Sweep> {
     let shown = folder.display();
     let store = Store::open_existing(folder)?;
-    let mut found: Vec<(bool, f64, MergedPolicy)> = Vec::new();
+    let (mut of_policy, mut of_name) = (None, false);
     for result in store.all()? {
         let Outcome::Merged(merged) = result else { continue };
         for policy in merged.policies {
-            let has_image = policy.images.iter().flat_map(|i| &i.made).any(|made| made.image.image == facts.sha256);
-            if has_image || policy.policy == facts.name {
-                found.push((has_image, merged.clock_hz, policy));
+            let sweep = Sweep::new(&policy, clock_hz, &facts.sha256);
+            if sweep.own().is_some() {
+                return Ok(sweep);
+            }
+            of_name |= policy.policy == facts.name;
+            if sources(&store, &policy).any(|source| source == facts.source) {
+                of_policy = Some(sweep);
             }
         }
     }
-    found.sort_by_key(|(has_image, ..)| !has_image);
-    let (_, clock, policy) = found.first().with_context(|| {
-        format!("{shown}: it has no merged result of {}; run its sweep to the end, or leave --store out", facts.name)
-    })?;
-    Ok(Sweep::new(policy, *clock, &facts.sha256))
+    of_policy.with_context(|| match of_name {
+        true => format!(
+            "{shown}: its images of {} were made from another policy of this name; name the store of this image's policy, or \
+             leave --store out",
+            facts.name
+        ),
+        false => format!("{shown}: it has no merged result of {}; run its sweep to the end, or leave --store out", facts.name),
+    })
+}
+
+/// Returns the digests of the policies that the images of a sweep were made from.
+fn sources(store: &Store, policy: &MergedPolicy) -> impl Iterator<Item = String> {
+    let made = policy.images.iter().filter(|image| image.made.is_some());
+    made.filter_map(|image| {
+        let path = store.image(&image.address);
+        let buffer = ImageBuffer::read(&path).ok()?;
+        Some(hex(&buffer.image(&path).ok()?.digest()))
+    })
 }

@@ -52,7 +52,7 @@ pub fn how_to_record(policy: &Policy) -> String {
 /// treatment of values that are not finite, and actions of its source that it does not have.
 pub fn of_policy(policy: &Policy) -> Vec<String> {
     let limits = match &policy.around {
-        Some(around) => targets_without_limits(around),
+        Some(around) => of_targets(around),
         None => without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))),
     };
     limits
@@ -88,10 +88,7 @@ pub(crate) fn default_rate(policy: &Policy) -> Option<String> {
 
 /// Returns a note that lists the actions without limits, for which a motor controller refuses to arm.
 pub(crate) fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Option<String> {
-    let is_limited =
-        |limits: Option<[f32; 2]>| limits.is_some_and(|limits| limits.iter().all(|limit| limit.is_finite()));
-    let limits = limits.into_iter().enumerate();
-    let without: Vec<usize> = limits.filter(|(_, limits)| !is_limited(*limits)).map(|(i, _)| i).collect();
+    let without = unlimited(limits);
     (!without.is_empty()).then(|| {
         format!(
             "no finite limits for {} {}: a motor controller refuses to arm without limits; pass --limits LOW:HIGH to actq import, \
@@ -102,11 +99,26 @@ pub(crate) fn without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>)
     })
 }
 
-/// Returns a note if a target of a description has no limits.
-fn targets_without_limits(around: &Around) -> Option<String> {
+/// Returns the indices of values without finite limits.
+fn unlimited(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Vec<usize> {
     let is_limited =
-        |i: usize| around.limits.as_ref().is_some_and(|[low, high]| low[i] > f32::MIN && high[i] < f32::MAX);
-    let without: Vec<usize> = (0..around.action_len()).filter(|i| !is_limited(*i)).collect();
+        |limits: Option<[f32; 2]>| limits.is_some_and(|limits| limits.iter().all(|limit| limit.is_finite()));
+    let limits = limits.into_iter().enumerate();
+    limits.filter(|(_, limits)| !is_limited(*limits)).map(|(i, _)| i).collect()
+}
+
+/// Returns a note if a target of a description has no limits.
+fn of_targets(around: &Around) -> Option<String> {
+    let is_limit = |limit: f32| limit > f32::MIN && limit < f32::MAX;
+    targets_without_limits((0..around.action_len()).map(|i| {
+        let [low, high] = around.limits.as_ref()?;
+        Some([low[i], high[i]]).filter(|limits| limits.iter().all(|limit| is_limit(*limit)))
+    }))
+}
+
+/// Returns a note that lists the targets without limits.
+pub(crate) fn targets_without_limits(limits: impl IntoIterator<Item = Option<[f32; 2]>>) -> Option<String> {
+    let without = unlimited(limits);
     (!without.is_empty()).then(|| {
         format!(
             "no finite limits for targets {}: a motor controller refuses to arm without limits; pass --limits LOW:HIGH to actq import, add \

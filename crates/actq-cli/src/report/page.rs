@@ -1,6 +1,6 @@
 //! The report as a page: one HTML file without a network, in which the image runs.
 //!
-//! The data is one JSON object ([`Page`]) in the file; `page/page.js` draws it.
+//! The data is one JSON object ([`Page`]) in the file; the scripts in `page/`, joined, draw it from the top down.
 
 pub mod facts;
 pub mod parts;
@@ -8,6 +8,7 @@ pub mod runs;
 
 use std::io::Write as _;
 
+use actq::emit::Core;
 use actq::measure::interval::wilson;
 use actq::pipeline::driven::DriveOutcome;
 use actq_jobs::results::MergedPolicy;
@@ -17,6 +18,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde::Serialize;
 
+use super::notes::useless;
 use facts::Facts;
 use parts::Part;
 use runs::{HeadData, Runs};
@@ -26,6 +28,10 @@ use runs::{HeadData, Runs};
 pub struct Page {
     /// The image's properties.
     pub facts: Facts,
+    /// Reasons not to drive a robot with the image.
+    pub warnings: Vec<String>,
+    /// `true` if the policy was given that the image was made from.
+    pub has_policy: bool,
     /// Error on the image's own path (NMSE), and its observations.
     pub own_path: Option<(f64, usize)>,
     /// Success of the image's rollouts, if it was reported.
@@ -47,6 +53,8 @@ pub struct Sweep {
     pub clock_hz: f64,
     /// All images.
     pub images: Vec<SweptImage>,
+    /// The page's image, if it is none of the sweep's, and its error is known.
+    pub outside: Option<SweptImage>,
 }
 
 /// An image of a sweep.
@@ -87,8 +95,32 @@ pub fn success_of(text: &str) -> Result<Success> {
     Ok((share, episodes as u64, outcome.interval().unwrap_or_else(|| wilson(share * episodes, episodes))))
 }
 
+impl Page {
+    /// Adds the sweep that the image is of, and takes its success from there. An image that the sweep does not have is
+    /// added by its own figures.
+    pub fn add(&mut self, mut sweep: Sweep) {
+        if let Some(own) = sweep.own() {
+            self.success = sweep.images.iter().filter(|image| image.is_own).find_map(|image| image.success);
+            if self.runs.is_none() {
+                self.warnings.extend(useless(own.nmse));
+            }
+        } else if let Some((nmse, _)) = self.runs.as_ref().and_then(|runs| runs.nmse) {
+            let cycles = self.facts.cores.get(Core::M4f.name()).map_or(0, |core| core.cycles);
+            sweep.outside = Some(SweptImage {
+                curve: "this image".to_owned(),
+                bytes: self.facts.bytes,
+                milliseconds: 1e3 * cycles as f64 / sweep.clock_hz,
+                nmse,
+                success: None,
+                is_own: true,
+            });
+        }
+        self.sweep = Some(sweep);
+    }
+}
+
 impl Sweep {
-    /// Takes the images of a policy; `sha256` is the digest of the page's image.
+    /// Takes the images of a policy, with times at a clock; `sha256` is the digest of the page's image.
     pub fn new(policy: &MergedPolicy, clock_hz: f64, sha256: &str) -> Self {
         let image = |image: &actq_jobs::results::MergedImage| {
             let made = image.made.as_ref()?;
@@ -103,14 +135,29 @@ impl Sweep {
                 is_own: made.image.image == sha256,
             })
         };
-        Self { clock_hz, images: policy.images.iter().filter_map(image).collect() }
+        Self { clock_hz, images: policy.images.iter().filter_map(image).collect(), outside: None }
+    }
+
+    /// Returns the page's image.
+    pub fn own(&self) -> Option<&SweptImage> {
+        self.images.iter().find(|image| image.is_own)
     }
 }
 
 const HTML: &str = include_str!("page/page.html");
 /// The style of the page.
 pub const CSS: &str = include_str!("page/page.css");
-const SCRIPT: &str = include_str!("page/page.js");
+const SCRIPT: &str = concat!(
+    include_str!("page/elements.js"),
+    include_str!("page/top.js"),
+    include_str!("page/charts.js"),
+    include_str!("page/network.js"),
+    include_str!("page/errors.js"),
+    include_str!("page/live.js"),
+    include_str!("page/flash.js"),
+    include_str!("page/diagram.js"),
+    include_str!("page/contract.js"),
+);
 /// Functions that read the data of a page.
 pub const UNPACK: &str = include_str!("page/unpack.js");
 
@@ -131,6 +178,13 @@ pub fn html(page: &Page) -> Result<String> {
         ("SCRIPT", SCRIPT.to_owned()),
     ];
     Ok(filled(HTML, &parts))
+}
+
+/// Returns the bytes of a page without its data.
+#[cfg(test)]
+fn code_bytes() -> usize {
+    [HTML, CSS, SCRIPT, UNPACK, actq_wasm::FACE].map(str::len).iter().sum::<usize>()
+        + Base64::encode_string(actq_wasm::MODULE).len()
 }
 
 /// Replaces each `{{NAME}}` of a template, once: values are not searched.

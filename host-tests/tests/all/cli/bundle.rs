@@ -206,6 +206,12 @@ fn deploy_makes_everything_and_keeps_what_is_made() -> Result<()> {
     for part in ["deploy.toml: kept", "made before with the same options", "largest error"] {
         ensure!(report.contains(part), "{part} is not in\n{report}");
     }
+    // The report has the names of the trained matrices and how the image was made.
+    let [deployed, page] = ["deployed/policy.actq", "report.html"].map(|file| text(&robot.path(file)));
+    let stats = text(&robot.path("deployed/policy.stats.json"));
+    succeeded(&run(actq(&["report", &deployed, "--stats", &stats, "--out", &page, "--quiet"]), b"")?)?;
+    let html = fs::read_to_string(&page)?;
+    ensure!(html.contains("[\"method\",\"distill\"]") && !html.contains("\"name\":\"matrix 0\""), "{page}");
     // Other answers are not taken for those of the import, and no other policy is put into its folder.
     let answers = text(&robot.path("answers.toml"));
     fs::write(&answers, "")?;

@@ -1,20 +1,22 @@
 //! Sweeps as jobs: `actq plan`, `job`, `sweep --store` and `merge`, and the script for Slurm.
 #![cfg(unix)]
 
-use std::fs;
+use std::fs::{self, File};
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
+use actq::data::NpzWriter;
+use actq::runtime::ImageBuffer;
 use actq_bench::command::{actq, binary, failed, run, succeeded};
 use actq_bench::root;
 use anyhow::{Context as _, Result, ensure};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::fixture::Fixture;
+use super::fixture::{Fixture, OBS};
 use crate::folder::snapshot;
 
 /// A simulator of short episodes, whose observations depend on the seed.
@@ -106,12 +108,26 @@ fn report_shows_the_sweep(sweep: &Sweep, merged: &Value) -> Result<()> {
         (&data["success"][1], &data["success"][2]),
         (&own["made"]["driven"]["episodes"], &own["made"]["interval"])
     );
-    // A driven record of this image alone, and one that is none.
+    // An outcome beside the recording of a rollout that names this image; without it, and beside that of another image.
     fs::write(folder.join("outcome.json"), "{\"success\": 0.25, \"episodes\": 8}\n")?;
     fs::write(folder.join("none.json"), "{\"reward\": 1}\n")?;
-    let line = |file: &str| format!("report whole/{address}.actq --driven {file} --out driven.html --quiet");
-    failed(&sweep.run(&line("none.json"), "")?, 1, &["none.json", "episodes"])?;
-    succeeded(&sweep.run(&line("outcome.json"), "")?)?;
+    let path = folder.join(format!("whole/{address}.actq"));
+    let crc = ImageBuffer::read(&path)?.image(&path)?.crc();
+    for (name, crc) in [("own.npz", crc), ("other.npz", crc ^ 1)] {
+        let mut npz = NpzWriter::new(File::create(folder.join(name))?);
+        npz.array("obs", &[1, 20, OBS], (0..20 * OBS).map(|i| (0.7 * i as f64).sin()))?;
+        npz.array("crc32", &[], [i64::from(crc)])?;
+        npz.finish()?;
+    }
+    let line = |file: &str, beside: &str| {
+        let driven = format!("--driven {file} {beside}");
+        format!("report whole/{address}.actq --policy policy {driven} --out driven.html --quiet")
+    };
+    failed(&sweep.run(&line("none.json", "--driven own.npz"), "")?, 1, &["none.json", "episodes"])?;
+    failed(&sweep.run(&line("outcome.json", ""), "")?, 1, &["outcome.json", "--driven FILE.npz"])?;
+    failed(&sweep.run(&line("outcome.json", "--driven other.npz"), "")?, 1, &["other.npz", "another image"])?;
+    failed(&sweep.run(&line("policy/heldout.npz", ""), "")?, 1, &["heldout.npz", "names no image"])?;
+    succeeded(&sweep.run(&line("outcome.json", "--driven own.npz"), "")?)?;
     ensure!(fs::read_to_string(folder.join("driven.html"))?.contains("\"success\":[0.25,8,["), "no success");
     Ok(())
 }

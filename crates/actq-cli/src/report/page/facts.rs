@@ -3,9 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use actq::emit::{Core, repack};
+use actq::graph::{Graph, WeightMatrix};
 use actq::measure::size::{Beside, bits_per_weight, file_bits_per_weight, hex};
 use actq::measure::time::StepTime;
 use actq::pipeline::stats::Stats;
+use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq::text::printable;
 use actq_kernels::image::{Op, OpKind, Region};
@@ -57,6 +59,10 @@ pub struct Facts {
     pub features: Vec<&'static str>,
     /// Settings of chunk playback.
     pub playback: Vec<String>,
+    /// Steps from one run of the network to the next.
+    pub execute: usize,
+    /// Control periods that a run of the network may take, as the rest of a chunk plays meanwhile.
+    pub periods: usize,
     /// Steps of the self-test.
     pub self_test: usize,
     /// Raw inputs and targets; empty without operations around the network.
@@ -69,7 +75,7 @@ pub struct Facts {
     pub is_trained: bool,
     /// Names of the action contract's arrays, and their values for each action.
     pub contract: Vec<(&'static str, Vec<f32>)>,
-    /// Names and values of the options that made the image; empty without its statistics.
+    /// How the image was made, by name; with its statistics, also by which options.
     pub made: Vec<(&'static str, String)>,
 }
 
@@ -177,12 +183,19 @@ pub struct MatrixFacts {
 }
 
 impl Facts {
-    /// Collects the properties of the image of `bytes`; the cycles are at `clock_hz`.
+    /// Collects the properties of the image of `bytes`; the cycles are at `clock_hz`. Without statistics, the matrices
+    /// have the names of the policy's, if that is known.
     ///
     /// # Errors
     ///
     /// If the statistics are of another image.
-    pub fn new(image: &Image<'_>, bytes: &[u8], stats: Option<&Stats>, clock_hz: f64) -> Result<Self> {
+    pub fn new(
+        image: &Image<'_>,
+        bytes: &[u8],
+        stats: Option<&Stats>,
+        policy: Option<&Policy>,
+        clock_hz: f64,
+    ) -> Result<Self> {
         // Images of default layouts have those of several cores.
         let core = Core::of_image(image).min_by_key(|core| *core != Core::M4f).unwrap_or(Core::M4f);
         let step = StepTime::new(image, core, clock_hz);
@@ -211,6 +224,13 @@ impl Facts {
             at += region.len;
             PortFacts::new(&port, flow.writers(region))
         });
+        let mut matrices: Vec<MatrixFacts> =
+            distinct.iter().enumerate().map(|(i, matrix)| MatrixFacts::new(matrix, &widths, i)).collect();
+        // In an image the matrices have the order of the operations that first use them, as in the policy.
+        let names = policy.filter(|_| stats.is_none()).map(|policy| used(&policy.graph)).unwrap_or_default();
+        if names.len() == matrices.len() {
+            matrices.iter_mut().zip(names).for_each(|(facts, of)| facts.name = printable(&of.name).into_owned());
+        }
         let Beside { biases, self_test, tables } = Beside::of(image);
         let contract = CONTRACT.into_iter().zip(image.contract_arrays());
         let values = |array: &[u32]| array.iter().map(|word| f32::from_bits(u32::from_le(*word))).collect();
@@ -233,16 +253,18 @@ impl Facts {
             cores: OnCore::of_all(image, bytes)?,
             features: image.features().collect(),
             playback: playback(image),
+            execute: image.execute(),
+            periods: periods(image),
             self_test: image.self_test_steps(),
             ports: ports.collect(),
             ops,
-            matrices: distinct.iter().enumerate().map(|(i, matrix)| MatrixFacts::new(matrix, &widths, i)).collect(),
+            matrices,
             is_trained: stats.is_some(),
             contract: contract
                 .filter(|(_, array)| !array.is_empty())
                 .map(|(name, array)| (name, values(array)))
                 .collect(),
-            made: stats.map(made).unwrap_or_default(),
+            made: made(image, core, stats),
         })
     }
 }
@@ -334,13 +356,44 @@ impl MatrixFacts {
     }
 }
 
-/// Lists how an image was made.
-fn made(stats: &Stats) -> Vec<(&'static str, String)> {
-    vec![
-        ("method", printable(&stats.method).into_owned()),
-        ("budget", stats.budget.to_string()),
-        ("seed", stats.seed.to_string()),
-        ("steps of distillation", stats.steps.to_string()),
-        ("made by actq", printable(&stats.actq).into_owned()),
-    ]
+/// Returns the matrices of a graph in the order of the operations that first use them.
+pub(super) fn used(graph: &Graph) -> Vec<&WeightMatrix> {
+    let mut seen = BTreeSet::new();
+    let products = graph.nodes.iter().flat_map(|node| node.kind.products());
+    products.filter(|product| seen.insert(product.matrix)).map(|product| &graph.matrices[product.matrix]).collect()
+}
+
+/// Returns the control periods that a run of the network may take. Only an overlap or an ensemble keeps the rest of a
+/// chunk while the next one is computed.
+fn periods(image: &Image<'_>) -> usize {
+    let keeps = image.overlap() > 0 || image.horizon() > 0;
+    let rest = if keeps { image.chunk().saturating_sub(image.execute()) } else { 0 };
+    (1 + rest).min(image.deadline().unwrap_or(usize::MAX)).max(1)
+}
+
+/// Lists how an image was made: what the image says, and with statistics the options.
+fn made(image: &Image<'_>, core: Core, stats: Option<&Stats>) -> Vec<(&'static str, String)> {
+    let distinct = |values: BTreeSet<String>| values.into_iter().collect::<Vec<_>>().join(", ");
+    let matrices = || image.ops().filter_map(|op| op.matrix());
+    let groups = matrices().map(|matrix| match matrix.group {
+        0 => "a scale for each row".to_owned(),
+        columns => format!("a scale for {columns} columns"),
+    });
+    let activations = matrices().map(|matrix| if matrix.x_max > 127 { "int16" } else { "int8" }.to_owned());
+    let mut list = Vec::new();
+    if let Some(stats) = stats {
+        list.extend([
+            ("method", printable(&stats.method).into_owned()),
+            ("budget", stats.budget.to_string()),
+            ("seed", stats.seed.to_string()),
+            ("steps of distillation", stats.steps.to_string()),
+            ("made by actq", printable(&stats.actq).into_owned()),
+        ]);
+    }
+    list.extend([
+        ("scales", distinct(groups.collect())),
+        ("activations", distinct(activations.collect())),
+        ("layouts", format!("of {}", core.title())),
+    ]);
+    list
 }

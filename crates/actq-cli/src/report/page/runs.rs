@@ -1,7 +1,5 @@
 //! Actions of an image and of the f32 policy on recordings, and the image for the page to run.
 
-use std::collections::BTreeSet;
-
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
 use actq::error::Error;
@@ -18,6 +16,7 @@ use anyhow::{Context as _, Result, ensure};
 use ndarray::ArrayView1;
 use serde::Serialize;
 
+use super::facts::used;
 use super::{encoded, packed};
 
 /// Most MACs of the image over a recording, about a second of each network on a host.
@@ -26,15 +25,17 @@ const MAX_MACS: usize = 1_000_000_000;
 const MIN_STEPS: usize = 200;
 /// Observations over which the rounding of activations is measured.
 const LAYER_STEPS: usize = 100;
-/// Most values of a drawn episode, and of the listed observations.
+/// Most values of the drawn episodes, and most words of the listed observations.
 const MAX_DRAWN: usize = 16_000;
-const MAX_LISTED: usize = 6_000;
+const MAX_LISTED: usize = 12_000;
+/// Most episodes that are drawn.
+const DRAWN_EPISODES: usize = 4;
 /// Most bytes of a golden run.
 const MAX_GOLDEN: usize = 64_000;
 /// Most f32 weights that a page has whole; of more it has 16 bits each.
-const MAX_F32_WEIGHTS: usize = 210_000;
+const MAX_F32_WEIGHTS: usize = 180_000;
 /// Most weights of an f32 policy in a page, so that it takes at most 1.5 MB beside the image.
-const MAX_WEIGHTS: usize = 370_000;
+const MAX_WEIGHTS: usize = 340_000;
 
 /// Actions of the image and of the f32 policy on a recording.
 #[derive(Debug, Serialize)]
@@ -45,16 +46,29 @@ pub struct Runs {
     pub recorded: usize,
     /// Error of the network's raw output on it, as `actq eval` prints it; `None` for images with raw inputs.
     pub nmse: Option<(f64, usize)>,
+    /// Error of the image: of the raw output, or else the mean over the actions that vary.
+    pub error: Option<f64>,
     /// Compared observations, from its start.
     pub compared: usize,
     /// Errors of each action: over its variance, if it varies, and the largest.
     pub actions: Vec<(Option<f64>, f32)>,
     /// Error that rounding its input adds to an operation's output, over the output's variance.
     pub rounding: Vec<Option<f64>>,
-    /// Actions of an episode, one list a dimension: of the f32 policy, and of the image.
-    pub trace: [Vec<Vec<f32>>; 2],
-    /// The percent of observations with the largest errors.
+    /// The first episode, and those of the largest errors: a part of each.
+    pub traces: Vec<Trace>,
+    /// Number of observations in the percent with the largest errors, of those on which the network ran.
+    pub percent: usize,
+    /// The first of that percent.
     pub worst: Vec<Worst>,
+}
+
+/// A part of an episode.
+#[derive(Clone, Debug, Serialize)]
+pub struct Trace {
+    /// Episode and first step, from 0.
+    pub at: [usize; 2],
+    /// Actions of the f32 policy and of the image, step by step: f32 in base64.
+    pub actions: [String; 2],
 }
 
 /// An observation with its actions.
@@ -64,10 +78,12 @@ pub struct Worst {
     pub at: [usize; 2],
     /// Squared error over the variance, mean over the actions that vary.
     pub error: f64,
-    /// The observation.
-    pub observation: Vec<f32>,
+    /// The observation: f32 in base64, as the actions.
+    pub observation: String,
     /// Actions of the f32 policy and of the image.
-    pub actions: [Vec<f32>; 2],
+    pub actions: [String; 2],
+    /// States of the heads before the step, of the f32 policy and of the image: base64.
+    pub states: [String; 2],
 }
 
 /// The image as the page runs it.
@@ -121,11 +137,7 @@ impl Reference {
         let quantized = quantizer.quantize(&options, |_: &str, _: f64| {})?;
         let buffer = ImageBuffer::new(&quantized.whole_image()?);
         let graph = &quantized.policy.graph;
-        let mut seen = BTreeSet::new();
-        let products = graph.nodes.iter().flat_map(|node| node.kind.products());
-        let used =
-            products.filter(|product| seen.insert(product.matrix)).map(|product| &graph.matrices[product.matrix]);
-        let used: Vec<_> = used.collect();
+        let used = used(graph);
         let shapes: Vec<[usize; 2]> = used.iter().map(|matrix| [matrix.rows, matrix.cols]).collect();
         let weights = used.iter().flat_map(|matrix| matrix.data.iter().copied()).collect();
         let reference = Self { buffer, weights, shapes };
@@ -168,39 +180,56 @@ fn bytes_of(words: impl Iterator<Item = u32>) -> Vec<u8> {
     words.flat_map(u32::to_le_bytes).collect()
 }
 
-/// Runs a network over the recording's first `steps` observations, each episode from its start. `run` receives episode,
-/// step, observation and action.
+/// A step of a recording.
+struct Step<'a> {
+    /// Episode and step, from 0.
+    at: [usize; 2],
+    /// `true` if the network runs; `false` if the rest of a chunk plays.
+    runs: bool,
+    action: &'a [f32],
+}
+
+/// Runs a network over the recording: `lengths` are the steps of each episode from its start. `before` receives episode,
+/// step and the head before a step, `after` the step.
 fn play(
     image: Image<'_>,
     products: Option<&Products<'_>>,
     dataset: &Dataset,
-    steps: usize,
-    mut run: impl FnMut([usize; 2], &[f32], &[f32]),
+    lengths: &[usize],
+    mut before: impl FnMut([usize; 2], &Head<'_, '_>) -> Result<(), Error>,
+    mut after: impl FnMut(&Step<'_>),
 ) -> Result<()> {
-    let mut left = steps;
     with_head::<_, Error>(image, |head| {
-        for episode in 0..dataset.length.len() {
+        for (episode, length) in lengths.iter().enumerate() {
             head.reset();
             if let Some(start) = dataset.start(episode) {
                 head.state_mut().iter_mut().zip(start).for_each(|(to, from)| *to = from);
             }
-            for (step, row) in dataset.episode(episode).enumerate().take(left) {
+            for (step, row) in dataset.episode(episode).enumerate().take(*length) {
                 // The noise of an iterative head follows the observation; the head makes its own.
-                let observation = &row[..image.obs_len()];
-                let action = match products {
-                    Some(products) => products.step(head, observation),
-                    None => head.step(observation),
-                };
-                let at = |error: StepError| {
+                let (at, observation) = ([episode, step], &row[..image.obs_len()]);
+                let failed = |error: StepError| {
                     Error::input(format!("{}: episode {episode}, step {step}: {error}", dataset.path.display()))
                 };
-                run([episode, step], observation, action.map_err(at)?);
+                before(at, head)?;
+                let (runs, action) = match products {
+                    Some(products) => (true, products.step(head, observation).map_err(failed)?),
+                    None => {
+                        head.begin_ops(observation).map_err(failed)?;
+                        (head.next_op().is_some(), head.finish_ops().map_err(failed)?)
+                    }
+                };
+                after(&Step { at, runs, action });
             }
-            left -= dataset.length[episode].min(left);
         }
         Ok(())
     })?;
     Ok(())
+}
+
+/// Encodes values for the page.
+fn floats(values: impl IntoIterator<Item = f32>) -> String {
+    encoded(&bytes_of(values.into_iter().map(f32::to_bits)))
 }
 
 /// Sums of errors of an action.
@@ -238,6 +267,16 @@ pub(crate) fn macs(image: &Image<'_>) -> usize {
     of_ops.sum::<usize>() * image.denoising_steps()
 }
 
+/// A compared observation.
+struct Compared {
+    at: [usize; 2],
+    /// `true` if the network ran on it.
+    ran: bool,
+    error: f64,
+    /// Actions of the f32 policy and of the image.
+    actions: [Vec<f32>; 2],
+}
+
 /// Compares the image with the f32 policy on a recording.
 ///
 /// # Errors
@@ -249,46 +288,108 @@ pub fn compare(image: Image<'_>, reference: &Reference, dataset: &Dataset, nmse:
     ensure!(steps > 0, "{}: the recording has no observation", dataset.path.display());
     let whole = reference.image()?;
     let products = Products::new(&whole, &reference.weights).map_err(anyhow::Error::msg)?;
-    let mut all: Vec<Worst> = Vec::with_capacity(steps);
-    play(whole, Some(&products), dataset, steps, |at, observation, action| {
-        let actions = [action.to_vec(), Vec::new()];
-        all.push(Worst { at, error: 0.0, observation: observation.to_vec(), actions });
+    let mut all: Vec<Compared> = Vec::with_capacity(steps);
+    let mut left = steps;
+    let take = |length: &usize| {
+        let taken = left.min(*length);
+        left -= taken;
+        taken
+    };
+    let lengths: Vec<usize> = dataset.length.iter().map(take).collect();
+    let nothing = |_: [usize; 2], _: &Head<'_, '_>| Ok(());
+    play(whole, Some(&products), dataset, &lengths, nothing, |step| {
+        all.push(Compared { at: step.at, ran: true, error: 0.0, actions: [step.action.to_vec(), Vec::new()] });
     })?;
-    let mut i = 0;
-    play(image, None, dataset, steps, |_, _, action| {
-        all[i].actions[1] = action.to_vec();
-        i += 1;
+    let mut next = all.iter_mut();
+    play(image, None, dataset, &lengths, nothing, |step| {
+        if let Some(one) = next.next() {
+            (one.ran, one.actions[1]) = (step.runs, step.action.to_vec());
+        }
     })?;
     let mut moments = vec![Moments::default(); image.act_len()];
-    for Worst { actions: [exact, given], .. } in &all {
+    for Compared { actions: [exact, given], .. } in &all {
         moments.iter_mut().zip(exact.iter().zip(given)).for_each(|(moments, (x, y))| moments.add(*x, *y));
     }
     let varying = moments.iter().filter(|m| m.variance(steps).is_some()).count().max(1) as f64;
-    for Worst { error, actions: [exact, given], .. } in &mut all {
+    for Compared { error, actions: [exact, given], .. } in &mut all {
         let relative = |(moments, (x, y)): (&Moments, (&f32, &f32))| {
             Some((f64::from(*x) - f64::from(*y)).powi(2) / moments.variance(steps)?)
         };
         *error = moments.iter().zip(exact.iter().zip(&*given)).filter_map(relative).sum::<f64>() / varying;
     }
-    let drawn = (MAX_DRAWN / (2 * image.act_len())).max(50);
-    let episode: Vec<&Worst> = all.iter().take_while(|one| one.at[0] == 0).take(drawn).collect();
-    let trace = [0, 1].map(|which| {
-        (0..image.act_len()).map(|dim| episode.iter().map(|one| one.actions[which][dim]).collect()).collect()
-    });
-    let listed = (MAX_LISTED / (image.obs_len() + 2 * image.act_len())).max(5);
-    let rounding = rounding(image, dataset)?;
-    all.sort_by(|a, b| b.error.total_cmp(&a.error));
-    all.truncate(steps.div_ceil(100).min(listed));
+    let actions: Vec<_> = moments.iter().map(|m| (m.nmse(steps), m.max)).collect();
+    let known: Vec<f64> = actions.iter().filter_map(|(nmse, _)| *nmse).collect();
+    let mean = (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64);
+    let mut worst: Vec<&Compared> = all.iter().filter(|one| one.ran).collect();
+    worst.sort_by(|a, b| b.error.total_cmp(&a.error));
+    let percent = worst.len().div_ceil(100);
+    worst.truncate(percent);
+    let traces = traces(&all, &worst, image.act_len());
+    let words = |head: Image<'_>| with_head::<_, Error>(head, |head| Ok(head.saved_len() / 4));
+    let each = image.obs_len() + 2 * image.act_len() + words(image)? + words(whole)?;
+    worst.truncate((MAX_LISTED / each).max(5));
     Ok(Runs {
         recording: actq::text::printable(&dataset.name()).into_owned(),
         recorded: dataset.frames(),
         nmse,
+        error: nmse.map(|(nmse, _)| nmse).or(mean),
         compared: steps,
-        actions: moments.iter().map(|m| (m.nmse(steps), m.max)).collect(),
-        rounding,
-        trace,
-        worst: all,
+        actions,
+        rounding: rounding(image, dataset)?,
+        traces,
+        percent,
+        worst: listed([(whole, Some(&products)), (image, None)], dataset, &worst)?,
     })
+}
+
+/// Takes the parts of episodes that are drawn.
+fn traces(all: &[Compared], worst: &[&Compared], act_len: usize) -> Vec<Trace> {
+    let mut places = vec![[0, 0]];
+    for at in worst.iter().map(|one| one.at) {
+        if places.len() < DRAWN_EPISODES && places.iter().all(|place| place[0] != at[0]) {
+            places.push(at);
+        }
+    }
+    let drawn = (MAX_DRAWN / (2 * act_len * places.len())).max(50);
+    let trace = |[episode, step]: [usize; 2]| {
+        // The step is in the part, with what led to it.
+        let first = (step + 1).saturating_sub(drawn * 3 / 4);
+        let part: Vec<&Compared> =
+            all.iter().filter(|one| one.at[0] == episode && one.at[1] >= first).take(drawn).collect();
+        let actions = [0, 1].map(|which| floats(part.iter().flat_map(|one| one.actions[which].iter().copied())));
+        Trace { at: [episode, first], actions }
+    };
+    places.into_iter().map(trace).collect()
+}
+
+/// Runs the episodes of the observations with the largest errors again, and takes the states before these. The heads are
+/// those of the f32 policy and of the image.
+fn listed(
+    heads: [(Image<'_>, Option<&Products<'_>>); 2],
+    dataset: &Dataset,
+    worst: &[&Compared],
+) -> Result<Vec<Worst>> {
+    let mut found: Vec<Worst> = Vec::new();
+    for Compared { at, error, actions, .. } in worst {
+        let actions = actions.each_ref().map(|values| floats(values.iter().copied()));
+        let row = dataset.episode(at[0]).nth(at[1]).unwrap_or_default();
+        let observation = floats(row.into_iter().take(heads[0].0.obs_len()));
+        found.push(Worst { at: *at, error: *error, observation, actions, states: Default::default() });
+    }
+    let needed = |episode| worst.iter().filter(|one| one.at[0] == episode).map(|one| one.at[1] + 1).max().unwrap_or(0);
+    let lengths: Vec<usize> = (0..dataset.length.len()).map(needed).collect();
+    for (which, (image, products)) in heads.into_iter().enumerate() {
+        let keep = |at: [usize; 2], head: &Head<'_, '_>| {
+            if let Some(one) = found.iter_mut().find(|one| one.at == at) {
+                let mut state = vec![0; head.saved_len()];
+                head.save(&mut state).map_err(|error| Error::input(format!("internal error: {error}")))?;
+                one.states[which] = encoded(&state);
+            }
+            Ok(())
+        };
+        play(image, products, dataset, &lengths, keep, |_| ())?;
+    }
+    Ok(found)
 }
 
 /// Measures for each operation the error that rounding its input adds to its output.
@@ -391,5 +492,38 @@ fn widened([low, high]: [f32; 2]) -> [f32; 2] {
         (true, false) => [low, low + 2.0],
         (false, true) => [high - 2.0, high],
         (false, false) => [-1.0, 1.0],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Largest page without its image, in bytes.
+    const MAX_PAGE: usize = 1_500_000;
+    /// Bytes of the facts of an image: names, ranges, widths of rows.
+    const FACTS: usize = 60_000;
+
+    #[test]
+    fn a_page_has_at_most_a_megabyte_and_a_half_beside_its_image() {
+        let base64 = |bytes: usize| (4 * bytes).div_ceil(3);
+        let runs = base64(MAX_GOLDEN) + base64(4 * MAX_DRAWN) + base64(4 * MAX_LISTED);
+        let rest = super::super::code_bytes() + runs + FACTS;
+        for (weights, bytes) in [(MAX_F32_WEIGHTS, 4), (MAX_WEIGHTS, 2)] {
+            // The image of the policy's operations has codes of 2 bits.
+            let page = rest + base64(bytes * weights) + base64(weights / 4);
+            assert!(page <= MAX_PAGE, "{weights} weights of {bytes} bytes: {page} bytes");
+        }
+    }
+
+    #[test]
+    fn the_document_has_the_limits_of_a_page() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/REPORT.md");
+        // A published crate has no documents.
+        let Ok(text) = std::fs::read_to_string(path) else { return };
+        for limit in [MAX_F32_WEIGHTS, MAX_WEIGHTS] {
+            let limit = format!("{},{:03} ", limit / 1000, limit % 1000);
+            assert!(text.contains(&limit), "docs/REPORT.md does not name {limit}");
+        }
     }
 }

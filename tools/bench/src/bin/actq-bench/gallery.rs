@@ -4,11 +4,12 @@ use std::fs;
 use std::path::Path;
 
 use actq::budget::Budget;
-use actq::data::Recordings;
+use actq::data::{NpzWriter, Recordings};
 use actq::measure::time::{CLOCK, StepTime};
 use actq::methods::{Effort, Method, Options};
 use actq::pipeline;
 use actq::policy::Policy;
+use actq::random::Random;
 use actq::runtime::ImageBuffer;
 use actq_bench::ur3;
 use actq_cli::commands::report;
@@ -18,6 +19,7 @@ use actq_cli::report::page::{CSS, UNPACK, encoded, filled, packed};
 use actq_deploy::Deployment;
 use actq_kernels::Width;
 use actq_kernels::cost::Core;
+use actq_testkit::{Dtype, safetensors};
 use actq_ur3::policy_f32::PolicyF32;
 use anyhow::{Context as _, Result};
 use serde::Serialize;
@@ -84,8 +86,8 @@ pub(crate) fn build(folder: &Path, robots: &Path, quick: bool) -> Result<()> {
 /// A name that a page must show as it is.
 const MARKUP: &str = "</script><img src=x onerror=alert(1)>";
 
-/// Writes three reports, for the tests in a browser: of the arm's policy at 2 bits, of one whose name is markup, and of
-/// a bundle.
+/// Writes four reports, for the tests in a browser: of the arm's policy at 2 bits, of one whose name is markup, of a
+/// bundle, and of a recurrent policy.
 fn reports(folder: &Path, bundle: &Policy) -> Result<()> {
     let policy = Policy::load(&ur3())?;
     let options = Options::new(Method::Rtn, Budget::Width(Width::W2));
@@ -97,7 +99,32 @@ fn reports(folder: &Path, bundle: &Policy) -> Result<()> {
     };
     write("report.html", &policy, Some(&policy))?;
     write("bundle.html", bundle, Some(bundle))?;
+    let scratch = tempfile::tempdir()?;
+    let recurrent = recurrent(scratch.path())?;
+    write("recurrent.html", &recurrent, Some(&recurrent))?;
     write("markup.html", &Policy { name: MARKUP.to_owned(), ..policy.clone() }, None)
+}
+
+/// Writes a recurrent policy of random weights with a recording into a folder, and reads it.
+fn recurrent(folder: &Path) -> Result<Policy> {
+    const OBS: usize = 12;
+    const HIDDEN: usize = 16;
+    const ACT: usize = 3;
+    const STEPS: usize = 100;
+    let json = serde_json::json!({"name": "recurrent", "obs_dim": OBS, "act_dim": ACT, "control_hz": 50, "ops": [
+        {"op": "lstm", "hidden": HIDDEN, "w_ih": "ih", "w_hh": "hh"}, {"op": "linear", "w": "out"}]});
+    fs::write(folder.join("policy.json"), json.to_string())?;
+    let mut random = Random::new(7);
+    let mut tensor = |name: &'static str, rows: usize, cols: usize| {
+        let values = (0..rows * cols).flat_map(|_| random.unit().to_le_bytes()).collect();
+        (name, Dtype::F32, vec![rows, cols], values)
+    };
+    let (ih, hh) = (tensor("ih", 4 * HIDDEN, OBS), tensor("hh", 4 * HIDDEN, HIDDEN));
+    fs::write(folder.join("policy.safetensors"), safetensors([ih, hh, tensor("out", ACT, HIDDEN)]))?;
+    let mut npz = NpzWriter::new(fs::File::create(folder.join("heldout.npz"))?);
+    npz.array("obs", &[2, STEPS, OBS], (0..2 * STEPS * OBS).map(|_| random.unit()))?;
+    npz.finish()?;
+    Ok(Policy::load(folder)?)
 }
 
 /// Makes the images of a policy.
