@@ -27,23 +27,49 @@ pub struct Core {
     pub target: Option<Target>,
     /// Options of arm-none-eabi-gcc, or of riscv64-unknown-elf-gcc.
     pub flags: &'static [&'static str],
+    /// Its condition in Zephyr's Kconfig.
+    kconfig: &'static str,
+    /// Its condition in C, by macros of GCC and Clang.
+    macros: &'static str,
 }
 
 const fn core(name: &'static str, target: Option<Target>, flags: &'static [&'static str]) -> Core {
-    Core { name, target, flags }
+    Core { name, target, flags, kconfig: "y", macros: "1" }
+}
+
+impl Core {
+    const fn is(self, kconfig: &'static str, macros: &'static str) -> Self {
+        Self { kconfig, macros, ..self }
+    }
 }
 
 /// All of them.
 pub const CORES: &[Core] = &[
-    core("cortex-m0plus", Some(Target::Small), &["-mcpu=cortex-m0plus", "-mthumb"]),
-    core("cortex-m3", Some(Target::NoDsp), &["-mcpu=cortex-m3", "-mthumb"]),
-    core("cortex-m4", Some(Target::NoFpu), &["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=soft"]),
-    core("cortex-m4f", Some(Target::Fpu), &["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]),
-    core("cortex-m7", Some(Target::M7), &["-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"]),
-    core("cortex-m33", Some(Target::M33), &["-mcpu=cortex-m33", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"]),
-    core("rv32imac", Some(Target::Riscv), &["-march=rv32imac", "-mabi=ilp32"]),
+    core("cortex-m0plus", Some(Target::Small), &["-mcpu=cortex-m0plus", "-mthumb"])
+        .is("CPU_CORTEX_M0 || CPU_CORTEX_M0PLUS", "__ARM_ARCH == 6 && __ARM_ARCH_PROFILE == 'M'"),
+    core("cortex-m3", Some(Target::NoDsp), &["-mcpu=cortex-m3", "-mthumb"])
+        .is("CPU_CORTEX_M3", "__ARM_ARCH == 7 && __ARM_ARCH_PROFILE == 'M' && !defined(__ARM_FEATURE_DSP)"),
+    core(SOFT_FLOAT, Some(Target::NoFpu), &["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=soft"]).is(
+        "(CPU_CORTEX_M4 || CPU_CORTEX_M7) && !FP_HARDABI",
+        "__ARM_ARCH == 7 && __ARM_ARCH_PROFILE == 'M' && defined(__ARM_FEATURE_DSP) && !defined(__ARM_PCS_VFP)",
+    ),
+    core("cortex-m4f", Some(Target::Fpu), &["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"])
+        .is("CPU_CORTEX_M4", "__ARM_ARCH == 7 && __ARM_ARCH_PROFILE == 'M' && defined(__ARM_FEATURE_DSP)"),
+    core("cortex-m7", Some(Target::M7), &["-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"])
+        .is("CPU_CORTEX_M7", "__ARM_ARCH == 7 && __ARM_ARCH_PROFILE == 'M' && defined(__ARM_FEATURE_DSP)"),
+    core("cortex-m33", Some(Target::M33), &["-mcpu=cortex-m33", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"]).is(
+        "CPU_CORTEX_M33 && ARMV8_M_DSP",
+        "__ARM_ARCH == 8 && __ARM_ARCH_PROFILE == 'M' && defined(__ARM_FEATURE_DSP)",
+    ),
+    core("rv32imac", Some(Target::Riscv), &["-march=rv32imac", "-mabi=ilp32"]).is(
+        "RISCV && !64BIT && RISCV_ISA_EXT_M && RISCV_ISA_EXT_C && !FLOAT_HARD",
+        "__riscv_xlen == 32 && defined(__riscv_mul) && defined(__riscv_compressed) && defined(__riscv_float_abi_soft)",
+    ),
     core("host", None, &[]),
 ];
+
+/// The core whose library also is for programs that pass floats in integer registers on cores with an FPU.
+const SOFT_FLOAT: &str = "cortex-m4";
 
 impl Core {
     /// Returns the core with this name.
@@ -54,6 +80,21 @@ impl Core {
     /// Name of the core in Arduino's `build.mcu`, which is gcc's: `None` if it is not a Cortex-M.
     fn mcu(self) -> Option<&'static str> {
         self.flags.iter().find_map(|flag| flag.strip_prefix("-mcpu="))
+    }
+
+    /// Folder of the library among Arduino's: `src/MCU/FPU-ABI`, or `src/MCU` for programs of any other ABI.
+    fn arduino(self) -> Option<String> {
+        let mcu = self.mcu()?;
+        let value = |name: &str| self.flags.iter().find_map(|flag| flag.strip_prefix(name));
+        Some(match (value("-mfpu="), value("-mfloat-abi=")) {
+            (Some(fpu), Some(abi)) => format!("src/{mcu}/{fpu}-{abi}"),
+            _ => format!("src/{mcu}"),
+        })
+    }
+
+    /// The core of the library that a package for a core with an FPU also has.
+    fn soft_float(self) -> Option<Self> {
+        self.flags.contains(&"-mfloat-abi=hard").then(|| Self::of(SOFT_FLOAT)).flatten()
     }
 
     fn has_assembler(self) -> bool {
@@ -133,16 +174,31 @@ impl Core {
         for header in ["actq.h", "actq.hpp"] {
             files.put(&format!("include/{header}"), &fs::read(capi.join("include").join(header))?);
         }
-        if let Some(mcu) = self.mcu() {
+        let soft_float = self.soft_float().map(|core| core.library(&features)).transpose()?;
+        if let Some(library) = &soft_float {
+            files.put("lib/soft-float/libactq.a", library);
+        }
+        if let (Some(mcu), Some(folder)) = (self.mcu(), self.arduino()) {
             // Arduino looks only below `src`.
-            files.put(&format!("src/{mcu}/libactq.a"), &library);
+            files.put(&format!("{folder}/libactq.a"), &library);
+            if let Some(library) = &soft_float {
+                files.put(&format!("src/{mcu}/libactq.a"), library);
+            }
             for header in ["actq.h", "actq.hpp"] {
                 files.put(&format!("src/{header}"), format!("#include \"../include/{header}\"\n").as_bytes());
             }
         }
         for (from, to) in self.templates() {
             let text = fs::read_to_string(capi.join("package").join(from)).with_context(|| from.to_owned())?;
-            files.put(to, text.replace("@VERSION@", VERSION).replace("@CORE@", self.name).as_bytes());
+            let values = [
+                ("@VERSION@", VERSION),
+                ("@CORE@", self.name),
+                ("@KCONFIG@", self.kconfig),
+                ("@MACROS@", self.macros),
+                ("@FLAGS@", &self.flags.join(" ")),
+            ];
+            let text = values.iter().fold(text, |text, (key, value)| text.replace(key, value));
+            files.put(to, text.as_bytes());
         }
         let parts = licences(&mut files)?;
         let digests: serde_json::Map<String, Value> =
