@@ -30,7 +30,7 @@ pub(crate) const AN385: Board = Board {
     name: "mps2-an385",
     machine: &["-M", "mps2-an385"],
     binaries: &["functions", "golden", "portable", "runtime"],
-    application: None,
+    application: Some(Application { about: "Cortex-M3, QEMU", scratch: SCRATCH }),
     ..AN386
 };
 

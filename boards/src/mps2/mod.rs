@@ -1,4 +1,4 @@
-//! Arm's MPS2 with its FPGA images AN385, AN386, AN500 and AN505.
+//! Arm's MPS2 with its FPGA images AN385, AN386, AN500 and AN505, whose peripherals MPS3 has, too.
 
 #[cfg(not(target_os = "none"))]
 pub(crate) mod host;

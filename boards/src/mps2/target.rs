@@ -1,39 +1,50 @@
-//! The registers of the MPS2 boards: UART 0, the watchdog, no power stage. AN386 and AN500 share their addresses (Arm
-//! DAI 0386C, section 3). AN505 (Arm DAI 0505B, section 3) has those of the secure state, with bit 28 set.
+//! The registers of the MPS2 and MPS3 boards: UART 0, the watchdog, no power stage. AN385, AN386 and AN500 share their
+//! addresses (Arm DAI 0386C, section 3). AN505 (Arm DAI 0505B, section 3) and AN547 (Arm DAI 0547B, section 3) have those
+//! of the secure state, with bit 28 set.
 
 use core::cell::Cell;
 
 use crate::hal::{self, Cause, Clock, Source};
 use crate::ram::Ram;
 pub use crate::target::cmsdk::{Uart, Watchdog};
-#[cfg(not(feature = "mps2-an505"))]
+#[cfg(not(any(feature = "mps2-an505", feature = "mps3-an547")))]
 pub use crate::target::mpu::guard_stack;
-#[cfg(feature = "mps2-an505")]
+#[cfg(any(feature = "mps2-an505", feature = "mps3-an547"))]
 pub use crate::target::msplim::guard_stack;
 use crate::target::vectors::interrupts;
 
-/// Core clock and addresses of AN386 and AN500.
-#[cfg(not(feature = "mps2-an505"))]
+/// Clocks and addresses of AN385, AN386 and AN500.
+#[cfg(not(any(feature = "mps2-an505", feature = "mps3-an547")))]
 mod map {
     pub(super) const HZ: u32 = 25_000_000;
-    pub(super) const UART: usize = 0x4000_4000;
-    pub(super) const WATCHDOG: usize = 0x4000_8000;
+    pub(super) const UART: (usize, u32) = (0x4000_4000, HZ);
+    pub(super) const WATCHDOG: (usize, u32) = (0x4000_8000, HZ);
 }
 
-/// Core clock and addresses of AN505.
+/// Clocks and addresses of AN505.
 #[cfg(feature = "mps2-an505")]
 mod map {
     pub(super) const HZ: u32 = 20_000_000;
-    pub(super) const UART: usize = 0x5020_0000;
-    pub(super) const WATCHDOG: usize = 0x5008_1000;
+    pub(super) const UART: (usize, u32) = (0x5020_0000, HZ);
+    pub(super) const WATCHDOG: (usize, u32) = (0x5008_1000, HZ);
+}
+
+/// Clocks and addresses of AN547: its watchdog has the slow clock.
+#[cfg(feature = "mps3-an547")]
+mod map {
+    pub(super) const HZ: u32 = 32_000_000;
+    pub(super) const UART: (usize, u32) = (0x5930_3000, 25_000_000);
+    pub(super) const WATCHDOG: (usize, u32) = (0x5802_e000, 32_000);
 }
 
 // Received bytes of UART 0; transmitted ones have another interrupt.
-#[cfg(not(feature = "mps2-an505"))]
+#[cfg(not(any(feature = "mps2-an505", feature = "mps3-an547")))]
 interrupts!(0 of 32);
 // All events of UART 0.
 #[cfg(feature = "mps2-an505")]
 interrupts!(42 of 96);
+#[cfg(feature = "mps3-an547")]
+interrupts!(43 of 96);
 
 /// Number of bits of an interrupt's priority.
 pub const NVIC_PRIO_BITS: u8 = 3;
@@ -59,7 +70,8 @@ pub type Parts = hal::Parts<Uart, Watchdog, Stage>;
 /// Call it once: the caller owns all of the board's peripherals.
 pub unsafe fn start(baud: u32) -> Parts {
     // SAFETY: these are the documented addresses, and nothing else uses the peripherals.
-    let (uart, watchdog) = unsafe { (Uart::new(map::UART, map::HZ, baud), Watchdog::new(map::WATCHDOG, map::HZ)) };
+    let (uart, watchdog) =
+        unsafe { (Uart::new(map::UART.0, map::UART.1, baud), Watchdog::new(map::WATCHDOG.0, map::WATCHDOG.1)) };
     let clock = Clock { hz: map::HZ, source: Source::Crystal };
     Parts { clock, cause: Cause::Unknown, uart, watchdog, stage: Stage::default() }
 }

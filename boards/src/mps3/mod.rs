@@ -1,6 +1,7 @@
 //! Arm's MPS3 with its FPGA image AN547: a Cortex-M55 with FPU and Helium. All of the firmware runs in the secure state.
 
-use crate::board::Board;
+use crate::board::{Application, Board};
+use crate::mps2::SCRATCH;
 
 pub(crate) const AN547: Board = Board {
     name: "mps3-an547",
@@ -9,5 +10,5 @@ pub(crate) const AN547: Board = Board {
     emulator: "qemu-system-arm",
     machine: &["-M", "mps3-an547"],
     binaries: &["functions", "golden", "portable"],
-    application: None,
+    application: Some(Application { about: "Cortex-M55, QEMU", scratch: SCRATCH }),
 };

@@ -2,9 +2,9 @@
 
 #[cfg(feature = "cmsdk")]
 pub(crate) mod cmsdk;
-#[cfg(any(feature = "mps2-an386", feature = "mps2-an500", feature = "stm32f405"))]
+#[cfg(not(any(feature = "mps2-an505", feature = "mps3-an547")))]
 pub(crate) mod mpu;
-#[cfg(feature = "mps2-an505")]
+#[cfg(any(feature = "mps2-an505", feature = "mps3-an547"))]
 pub(crate) mod msplim;
 pub(crate) mod stack;
 pub(crate) mod vectors;

@@ -32,13 +32,13 @@ impl<'a> Prepared<'a> {
 
     /// Iterates over the groups' words, each with its sum if the layout has one.
     pub(crate) fn groups(&self) -> impl Iterator<Item = &'a [u32]> {
-        self.words.chunks(self.plan.group_words())
+        self.words.chunks(self.plan.group_words().max(1))
     }
 
     /// Iterates over the chunks of a group's words, without its sum.
     pub(crate) fn chunks(&self, group: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
         let (first, rest) = group.split_at(self.plan.chunk_words(self.plan.first).min(group.len()));
-        core::iter::once(first).chain(rest.chunks(self.plan.chunk_words(self.plan.layout.x.chunk)))
+        core::iter::once(first).chain(rest.chunks(self.plan.chunk_words(self.plan.layout.x.chunk).max(1)))
     }
 
     /// Returns the value of column `col`; 0 when out of range.
@@ -64,7 +64,7 @@ pub fn prepare<'w>(x: &[i16], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prep
 /// Writes the prepared vector of any values, which `integer` converts to integers whose low 16 bits count.
 pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: impl Fn(V) -> u32) {
     let mut x = x;
-    for group in out.chunks_exact_mut(plan.group_words()).take(plan.groups) {
+    for group in out.chunks_exact_mut(plan.group_words().max(1)).take(plan.groups) {
         let (mut chunks, sum_word) = group.split_at_mut(group.len() - usize::from(plan.layout.x.sum));
         let (mut sum, mut last) = (0i32, 0);
         let mut columns = plan.first;

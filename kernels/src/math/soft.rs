@@ -269,10 +269,11 @@ fn fraction_near_tie<const NARROW: bool>(f: Magnitude) -> (u32, u32) {
     (q.plus(p).mantissa, q.minus(p).map_or(0, |d| d.mantissa))
 }
 
-/// Computes what is outside the range of normal numbers, in the compiler's way.
+/// Computes what is outside the range of normal numbers, in the compiler's way. There is one for each `of`: a call through
+/// a pointer would leave the stack without a bound.
 #[cold]
 #[inline(never)]
-fn slow(a: u32, b: u32, of: fn(f32, f32) -> f32) -> u32 {
+fn slow(a: u32, b: u32, of: impl Fn(f32, f32) -> f32) -> u32 {
     of(f32::from_bits(a), f32::from_bits(b)).to_bits()
 }
 

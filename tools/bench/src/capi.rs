@@ -57,10 +57,11 @@ pub const CORES: &[Core] = &[
         .is("CPU_CORTEX_M4", "__ARM_ARCH == 7 && __ARM_ARCH_PROFILE == 'M' && defined(__ARM_FEATURE_DSP)"),
     core("cortex-m7", Some(Target::M7), &["-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"])
         .is("CPU_CORTEX_M7", "__ARM_ARCH == 7 && __ARM_ARCH_PROFILE == 'M' && defined(__ARM_FEATURE_DSP)"),
-    core("cortex-m33", Some(Target::M33), &["-mcpu=cortex-m33", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"]).is(
-        "CPU_CORTEX_M33 && ARMV8_M_DSP",
-        "__ARM_ARCH == 8 && __ARM_ARCH_PROFILE == 'M' && defined(__ARM_FEATURE_DSP)",
-    ),
+    core("cortex-m33", Some(Target::M33), &["-mcpu=cortex-m33", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"])
+        .is(
+            "CPU_CORTEX_M33 && ARMV8_M_DSP",
+            "__ARM_ARCH == 8 && __ARM_ARCH_PROFILE == 'M' && defined(__ARM_FEATURE_DSP)",
+        ),
     core("rv32imac", Some(Target::Riscv), &["-march=rv32imac", "-mabi=ilp32"]).is(
         "RISCV && !64BIT && RISCV_ISA_EXT_M && RISCV_ISA_EXT_C && !FLOAT_HARD",
         "__riscv_xlen == 32 && defined(__riscv_mul) && defined(__riscv_compressed) && defined(__riscv_float_abi_soft)",

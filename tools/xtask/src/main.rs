@@ -175,7 +175,10 @@ mod tests {
         assert_eq!(parse("xtask python --optional -- -k head"), Ok(()));
         assert_eq!(parse("xtask exporters rsl_rl keras"), Ok(()));
         for (line, expected) in [
-            ("xtask firmware --board microbit --out f.elf", "use one of mps2-an386, mps2-an505, mps2-an500, stm32f405"),
+            (
+                "xtask firmware --board microbit --out f.elf",
+                "use one of mps2-an386, mps2-an385, mps2-an505, mps2-an500, stm32f405, mps3-an547",
+            ),
             ("xtask firmware --board stm32f4 --list", "use one of"),
             ("xtask firmware --board stm32f405", "--out <FILE.elf>"),
             ("xtask firmware --board stm32f405 --out f.elf --key 12", "64 hexadecimal digits"),

@@ -23,9 +23,9 @@ use actq_ur3::{ACT_DIM, OBS_DIM};
 use anyhow::{Context, Result, ensure};
 
 /// The boards with a device for the application.
-const BOARDS: [Target; 4] = [Target::Fpu, Target::M33, Target::M7, Target::F405];
+const BOARDS: [Target; 6] = [Target::Fpu, Target::M33, Target::M7, Target::NoDsp, Target::M55, Target::F405];
 /// Boards with a watchdog, a clock and memory for slots in QEMU.
-const FULL_BOARDS: [Target; 3] = [Target::Fpu, Target::M33, Target::M7];
+const FULL_BOARDS: [Target; 5] = [Target::Fpu, Target::M33, Target::M7, Target::NoDsp, Target::M55];
 
 fn start(target: Target, features: &'static str) -> Result<(Controller, Client)> {
     let controller = Controller::start(target, &firmware::controller(target, features)?, None)?;
@@ -209,7 +209,7 @@ fn an_unsuitable_image_is_refused_with_its_reason() -> Result<()> {
 /// watchdog interrupts somewhere in it.
 #[test]
 fn the_watchdog_resets_a_board_without_progress() -> Result<()> {
-    for (target, hidden) in FULL_BOARDS.into_iter().zip([1, 2, 4]) {
+    for (target, hidden) in FULL_BOARDS.into_iter().zip([1, 2, 4, 1, 2]) {
         let elf = firmware::controller(target, "faults")?;
         let (_controller, mut client) = start(target, "faults")?;
         let first = client.status()?;
@@ -284,7 +284,9 @@ fn overflow_place(target: Target) -> Result<String> {
 #[test]
 fn the_stack_fits_the_deepest_calls_and_interrupts() -> Result<()> {
     let foc = [Target::Fpu, Target::M33].map(|target| (target, "foc"));
-    for (target, features) in BOARDS.map(|target| (target, "")).into_iter().chain(foc) {
+    // The kernels of the Cortex-M55 jump by an address that they keep on the stack, which this analysis does not follow.
+    let boards = BOARDS.into_iter().filter(|target| *target != Target::M55).map(|target| (target, ""));
+    for (target, features) in boards.chain(foc) {
         let worst = worst_case(&firmware::controller(target, features)?)?;
         assert!((4096..=worst.room).contains(&worst.bytes()), "{target:?}: {} of {}", worst.bytes(), worst.room);
         let (name, bytes) =
@@ -314,7 +316,8 @@ fn the_application_is_small_and_has_no_panic() -> Result<()> {
         assert!(found.is_empty(), "{target:?}: {found:?}");
         assert!(names().any(|name| name.contains("Head")), "{target:?}: nothing is in it");
         let flash = firmware::flash_bytes(&elf)? - image;
-        assert!(flash <= 64 << 10, "{target:?} {features}: {flash} bytes of flash");
+        let most = if target.has_assembler() { 64 << 10 } else { 144 << 10 };
+        assert!(flash <= most, "{target:?} {features}: {flash} bytes of flash");
     }
     Ok(())
 }
@@ -343,7 +346,7 @@ fn a_keyed_build_runs_only_signed_images() -> Result<()> {
     let signature = keys::sign(&key, &new, 1)?.check(&new)?;
     let (observation, bits) = self_test(&ImageBuffer::new(&new).image(Path::new("small"))?, 0)?;
     let slot = qemu::slot(&new)?;
-    for target in FULL_BOARDS {
+    for target in [Target::Fpu, Target::M33, Target::M7] {
         let elf = firmware::controller_of_key(target, "signed,faults", &keys::public(&key))?;
         let error = format!(
             "{:#}",

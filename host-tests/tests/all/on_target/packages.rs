@@ -137,7 +137,8 @@ fn the_library_for_risc_v_has_no_atomic_instructions() -> Result<()> {
         return Ok(());
     }
     fs::write(dir.path().join("program.c"), PROGRAM)?;
-    let options = "-march=rv32imc -mabi=ilp32 -ffreestanding -nostdlib -Wl,--entry=main -Irv32imac/include -Lrv32imac/lib";
+    let options =
+        "-march=rv32imc -mabi=ilp32 -ffreestanding -nostdlib -Wl,--entry=main -Irv32imac/include -Lrv32imac/lib";
     shell(&dir, &format!("riscv64-unknown-elf-gcc {options} program.c -lactq -o program"))?;
     Ok(())
 }

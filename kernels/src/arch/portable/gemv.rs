@@ -72,7 +72,7 @@ fn strips<F: Format>(product: Product<'_>) {
 /// Splits words at `at`, without the panic of `split_at`.
 #[inline(always)]
 fn split(words: &[u32], at: usize) -> (&[u32], &[u32]) {
-    words.split_at(at.min(words.len()))
+    words.split_at_checked(at).unwrap_or((words, &[]))
 }
 
 /// Computes a strip of `CELLS` cells, one above the other.
@@ -103,8 +103,8 @@ fn strip_of<F: Format, const CELLS: usize>(mut words: &[u32], mut x: &[u32], len
             }
             if !group.is_empty() {
                 // In a last group, the weights may end inside a chunk.
-                let weights = weights.chunks(weights_of::<F>(length) * CELLS);
-                for (weights, x) in weights.zip(group.chunks_exact(length)) {
+                let weights = weights.chunks((weights_of::<F>(length) * CELLS).max(1));
+                for (weights, x) in weights.zip(group.chunks_exact(length.max(1))) {
                     chunk::<F, CELLS>(weights, x, F::PASS, &mut sums);
                 }
             }
@@ -250,7 +250,7 @@ fn cells<F: Format, const CELLS: usize, const N: usize>(
     t: &mut [Sums; N],
 ) {
     let unit = F::CELL.words * CELLS;
-    for (units, x) in weights.chunks_exact(pass * unit).zip(x.chunks_exact(pass * F::CELL.cols / 2)) {
+    for (units, x) in weights.chunks_exact((pass * unit).max(1)).zip(x.chunks_exact((pass * F::CELL.cols / 2).max(1))) {
         for k in 0..pass {
             let (words, x) = (&units[k * unit..][..unit], &x[k * F::CELL.cols / 2..][..F::CELL.cols / 2]);
             for (i, t) in t.iter_mut().enumerate() {

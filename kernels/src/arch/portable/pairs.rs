@@ -37,7 +37,11 @@ pub(super) fn gemv(Product { block, x, first_row, acc, .. }: Product<'_>) {
         last.iter_mut().for_each(|last| fixed.separate(&mut last[..]));
         return;
     }
-    for (acc, words) in strips.iter_mut().zip(words.chunks(stride)) {
+    // Never: it tells the compiler that no division by it panics.
+    if row.group == 0 {
+        return;
+    }
+    for (acc, words) in strips.iter_mut().zip(words.chunks(stride.max(1))) {
         row.groups(words, acc, |words, chunk, sums| add_pairs(words, stride, chunk, core::slice::from_mut(sums)));
     }
     if let Some(acc) = last {
@@ -141,5 +145,5 @@ fn add<const R: usize>(words: &[u32], chunk: &[u32], sums: &mut [i32; R]) {
 /// Adds a chunk's products to the sums of strips, whose weights are `stride` words apart.
 #[cfg(not(actq_loops))]
 fn add_pairs(words: &[u32], stride: usize, chunk: &[u32], strips: &mut [[i32; STRIP]]) {
-    strips.iter_mut().zip(words.chunks(stride)).for_each(|(sums, words)| add(words, chunk, sums));
+    strips.iter_mut().zip(words.chunks(stride.max(1))).for_each(|(sums, words)| add(words, chunk, sums));
 }

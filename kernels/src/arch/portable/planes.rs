@@ -73,7 +73,7 @@ fn tiles_of_planes<const B: usize>(Product { block, x, first_row, acc, .. }: Pro
             }
             Some(log) => {
                 let tile = Tile { tables, first, units, log };
-                for (acc, words) in strips.iter_mut().zip(words.chunks(stride)) {
+                for (acc, words) in strips.iter_mut().zip(words.chunks(stride.max(1))) {
                     tile.groups::<STRIP>(words, B, acc, |words, tables, sums| {
                         sums.fill(-bias * tables.len() as i32);
                         add_strips::<B>(words, stride, tables, core::slice::from_mut(sums));
@@ -155,7 +155,7 @@ fn add_rows<const R: usize, const B: usize>(planes: &[[[u8; R]; B]], tables: &[T
 /// Adds the entries of successive units to the sums of strips, whose weights are `stride` words apart.
 #[cfg(not(actq_loops))]
 fn add_strips<const B: usize>(words: &[u32], stride: usize, tables: &[Table], strips: &mut [[i32; STRIP]]) {
-    for (sums, words) in strips.iter_mut().zip(words.chunks(stride)) {
+    for (sums, words) in strips.iter_mut().zip(words.chunks(stride.max(1))) {
         add_rows::<STRIP, B>(planes(words, 0), tables, sums);
     }
 }

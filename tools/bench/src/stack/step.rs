@@ -175,6 +175,9 @@ fn branch(pc: u32, first: u16, second: u16) -> Option<Step> {
         let high = sign << 24 | (1 ^ one ^ sign) << 23 | (1 ^ two ^ sign) << 22;
         to(high | bits(first, 9, 0) << 12 | bits(second, 10, 0) << 1, 25)
     };
+    if let Some(step) = low_overhead_loop(pc, first, second) {
+        return Some(step);
+    }
     Some(match second & 0x5000 {
         0x5000 => Step::Call(far()),
         0x1000 => Step::Branch(far()),
@@ -194,6 +197,21 @@ fn branch(pc: u32, first: u16, second: u16) -> Option<Step> {
         },
         _ => return None,
     })
+}
+
+/// Decodes the loops of Armv8.1-M: DLS counts, WLS counts or skips the loop, and LE goes back to its begin or leaves it;
+/// also in their forms that end in predicated vectors.
+fn low_overhead_loop(pc: u32, first: u16, second: u16) -> Option<Step> {
+    if first & 0xff80 != 0xf000 || second & 1 == 0 {
+        return None;
+    }
+    let offset = bits(second, 10, 1) << 2 | bits(second, 11, 11) << 1;
+    match (second & 0xf000, bits(first, 3, 0)) {
+        (0xc000, PC) => Some(Step::Conditional { to: pc.wrapping_sub(offset), zero: None }),
+        (0xc000, _) => Some(Step::Conditional { to: pc.wrapping_add(offset), zero: None }),
+        _ if second == 0xe001 => Some(Step::Next),
+        _ => None,
+    }
 }
 
 /// Decodes ADD and SUB of a constant to the stack pointer.
@@ -292,6 +310,10 @@ mod tests {
         check([0xbf08, 0], Step::If { mask: 8, condition: 0 }); // it eq
         check([0xbf1c, 0], Step::If { mask: 12, condition: 1 }); // itt ne
         check([0xf382, 0x8808], Step::SetStack(2)); // msr msp, r2
+        check([0xf003, 0xe001], Step::Next); // dlstp.8 lr, r3
+        check([0xf042, 0xc015], Step::Conditional { to: AT + 4 + 0x28, zero: None }); // wls lr, r2
+        check([0xf00f, 0xc803], Step::Conditional { to: AT + 4 - 6, zero: None }); // le lr
+        check([0xf01f, 0xc803], Step::Conditional { to: AT + 4 - 6, zero: None }); // letp lr
     }
 
     #[test]
