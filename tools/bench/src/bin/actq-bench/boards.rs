@@ -28,7 +28,7 @@ pub(crate) fn measure(counter: &Counter) -> Result<Vec<(String, u64)>> {
     let image = buffer.image(path)?;
     let recorded = eval::heldout(&ur3(), &image)?;
     let mut figures = Vec::new();
-    for target in [Target::Fpu, Target::M33, Target::M7, Target::F405] {
+    for target in [Target::Fpu, Target::M33, Target::M7, Target::NoDsp, Target::F405] {
         let board = target.board();
         let scratch = board.application.context("the board has no application")?.scratch;
         let elf = firmware::controller(target, "")?;
