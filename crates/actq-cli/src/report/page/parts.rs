@@ -44,9 +44,9 @@ pub const RUNTIMES: [(Core, usize); 6] = [
     (Core::M4f, DSP),
     (Core::M7, DSP),
     (Core::M33, DSP),
-    (Core::M3, 94_248),
-    (Core::M0, 90_448),
-    (Core::Rv32imac, 107_656),
+    (Core::M3, 94_464),
+    (Core::M0, 91_616),
+    (Core::Rv32imac, 109_978),
 ];
 
 #[cfg(test)]
