@@ -140,6 +140,10 @@ impl ActionContract {
     pub fn apply(&self, i: usize, raw: f32) -> f32 {
         let of = |array: &Option<Vec<f32>>| array.as_ref().map(|values| values[i]);
         let action = raw * of(&self.scale).unwrap_or(1.0) + of(&self.offset).unwrap_or(0.0);
+        // `max` and `min` make a limit of NaN.
+        if action.is_nan() {
+            return action;
+        }
         let action = of(&self.low).map_or(action, |low| action.max(low));
         of(&self.high).map_or(action, |high| action.min(high))
     }
