@@ -159,11 +159,15 @@ impl Lowered {
             }
             Expr::Cell(cell) => self.cell(cell, len)?,
             Expr::CellState(_) => bail!("an LSTM's cell state is read outside its cell; read the hidden state instead"),
-            Expr::Unary(f, _) => {
+            Expr::Unary(f, x) => {
+                let x = if let Expr::Affine(inner, ..) = exprs.get(*x) { inner } else { x };
                 let what = match f {
                     Unary::Log => "a logarithm",
                     Unary::Sqrt => "a square root",
                     Unary::Erf => "an error function",
+                    Unary::Reciprocal if matches!(exprs.get(*x), Expr::Add(..)) => {
+                        "a quotient by a sum of values, as the mean alpha / (alpha + beta) of a Beta distribution,"
+                    }
                     Unary::Reciprocal => "a quotient by a value",
                     _ => "a comparison",
                 };
