@@ -8,7 +8,7 @@ use actq::text::printable;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use crate::document::{Document, fits};
+use crate::document::Document;
 use crate::families::Schema;
 use crate::yaml::Node;
 
@@ -36,11 +36,8 @@ pub(crate) struct Profile {
     /// Keys by which the family's files are told, a list for each kind of file.
     #[serde(default, rename = "mark")]
     pub marks: Vec<Mark>,
-    /// Keys of the family's files that could change a number, with `*` for any text within a part of a path. One that
-    /// nothing reads is a question.
-    #[serde(default = "every_key")]
-    pub own: Vec<String>,
-    /// Keys of the family's files that no deployment reads, with `*` for any part of a path.
+    /// Keys of the family's files that no deployment reads, with `*` for any text within a part of a path. Any other one
+    /// that nothing reads is a question.
     #[serde(default)]
     pub ignored: Vec<String>,
     /// The rules.
@@ -49,10 +46,6 @@ pub(crate) struct Profile {
     /// The stack, if its reader is data.
     #[serde(default)]
     pub stack: Option<Schema>,
-}
-
-fn every_key() -> Vec<String> {
-    vec!["*".to_owned()]
 }
 
 /// Versions of a family's files.
@@ -328,8 +321,8 @@ impl Facts {
         Ok(())
     }
 
-    /// Asks for the keys that nothing reads and that could change a number, and for a version that was not read.
-    /// Returns the other keys that nothing reads, with their files.
+    /// Asks for the keys that nothing reads, and for a version that was not read. Returns the keys of files that nothing
+    /// reads at all, as those of another policy, with their files.
     ///
     /// # Errors
     ///
@@ -353,9 +346,8 @@ impl Facts {
                 if node.is_some_and(says_nothing) {
                     continue;
                 }
-                let is_asked = document.is_read() && profile.own.iter().any(|pattern| fits(pattern, &path));
                 let at = document.location(&path);
-                if is_asked {
+                if document.is_read() {
                     let value = node.and_then(Node::text).map_or_else(|| "a list".to_owned(), printable_start);
                     let name = path.rsplit('.').next().unwrap_or(&path).to_owned();
                     asked.entry(name).or_default().push(format!("{at} = {value}"));

@@ -33,6 +33,23 @@ const KEY: &str = "kinfer_metadata";
 /// Keys of older files' metadata, which has each as a text by itself.
 const OLD_KEYS: [&str; 3] = ["sim_dt", "sim_decimation", "num_actions"];
 
+/// Keys of an ONNX file's metadata that its graph computes (sim/model_export.py:181-225), and those of the simulation and
+/// of the joints' controller, which the application keeps. An archive has none of them.
+const IN_GRAPH: [&str; 10] = [
+    "action_scale",
+    "lin_vel_scale",
+    "ang_vel_scale",
+    "quat_scale",
+    "dof_pos_scale",
+    "dof_vel_scale",
+    "frame_stack",
+    "clip_observations",
+    "clip_actions",
+    "cycle_time",
+];
+const OF_APPLICATION: [&str; 6] =
+    ["use_projected_gravity", "embodiment", "num_parameters", "robot_effort", "tau_factor", "input_params"];
+
 impl Family for Kinfer {
     fn profile(&self) -> &str {
         include_str!("kinfer/profile.toml")
@@ -74,6 +91,9 @@ impl Family for Kinfer {
         }
         let graph = Graph::of(file, bundle.signature(file)?)?;
         graph.check_names(meta)?;
+        for key in IN_GRAPH.iter().chain(&OF_APPLICATION) {
+            meta.node(key);
+        }
         let (dt, decimation) = (meta.number("sim_dt")?, meta.number("sim_decimation")?);
         let period = dt * decimation;
         ensure!(

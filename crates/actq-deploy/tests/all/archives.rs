@@ -81,6 +81,18 @@ fn archives_carry_what_they_begin_with() -> Result<()> {
 }
 
 #[test]
+fn unknown_keys_of_archives_are_questions() -> Result<()> {
+    let [step, init] = step_and_init();
+    // Keys that only the graphs of older files compute.
+    let json = JSON.replacen('{', r#"{"action_scale": 0.5, "clip_actions": 1.0, "frame_stack": 3, "#, 1);
+    let files = packed(&[("init_fn.onnx", &init), ("step_fn.onnx", &step), ("metadata.json", json.as_bytes())])?;
+    let asked: Vec<String> = files.reading(true, "")?.questions.into_iter().map(|question| question.key).collect();
+    let unread = ["unread.action_scale", "unread.clip_actions", "unread.frame_stack"];
+    assert_eq!(asked, [&["packed.rate_hz", "packed.target"][..], &unread].concat());
+    Ok(())
+}
+
+#[test]
 fn archives_without_memory_have_no_state() -> Result<()> {
     let [_, init] = step_and_init();
     let step = onnx::shaped(

@@ -46,6 +46,8 @@ const WIDTHS: [&str; 5] = [
     "models.policy.network.0.layers",
     "policy_kwargs.net_arch",
 ];
+/// Keys of rl_games and skrl that say whether the action is limited.
+const LIMITED: [&str; 2] = ["params.config.clip_actions", "models.policy.clip_actions"];
 /// Keys of the recurrent cells, below "actor" or "policy".
 const RECURRENT: [&str; 3] = ["rnn_type", "rnn_hidden_dim", "rnn_num_layers"];
 /// Activations that are one operation of a graph, and other names of them.
@@ -66,6 +68,16 @@ impl Agent {
     pub(super) fn of(yaml: &Document) -> Result<Self> {
         let limit = |node: &Node| node.number().filter(|limit| *limit > 0.0);
         let limit = yaml.optional("clip_actions", "a number above 0, or null", limit)?;
+        // Wrappers that limit nothing; those that do are a question.
+        for path in LIMITED {
+            if yaml.peek(path).is_some_and(|node| node.truth() == Some(false)) {
+                yaml.node(path);
+            }
+        }
+        // Of Stable-Baselines3 a class, whose network the graph has.
+        if yaml.peek("policy").is_some_and(|node| node.text().is_some()) {
+            yaml.node("policy");
+        }
         let clip = limit.map(|limit| Sourced { numbers: vec![limit], from: yaml.location("clip_actions") });
         // The network has another name in later versions.
         let path = ["obs_groups.actor", "obs_groups.policy"].into_iter().find(|path| yaml.peek(path).is_some());
