@@ -59,7 +59,7 @@ impl LimitList {
     }
 }
 
-/// Parses limits for all actions, or reads a file with a line for each.
+/// Parses limits for all actions, or reads a file with a line for each, and comments after `#`.
 pub(super) fn limits(text: &str) -> Result<LimitList, String> {
     let error = match text.parse() {
         Ok(limits) => return Ok(LimitList(vec![limits])),
@@ -69,8 +69,15 @@ pub(super) fn limits(text: &str) -> Result<LimitList, String> {
         return Err(format!("no file has this name, and {error}"));
     }
     let lines = fs::read_to_string(text).map_err(|error| error.to_string())?;
-    let line = |(i, line): (usize, &str)| line.parse().map_err(|error| format!("line {}: {line:?}: {error}", i + 1));
-    let all: Vec<Limits> = lines.trim_end().lines().enumerate().map(line).collect::<Result<_, _>>()?;
+    let line = |(i, line): (usize, &str)| {
+        let limits = line.split('#').next().unwrap_or_default().trim();
+        // A line without anything could stand for an action that was forgotten.
+        let is_comment = limits.is_empty() && !line.trim().is_empty();
+        (!is_comment).then(|| limits.parse().map_err(|error| format!("line {}: {line:?}: {error}", i + 1)))
+    };
+    // Editors of Windows begin a file with a mark of its encoding.
+    let lines = lines.trim_start_matches('\u{feff}').trim_end().lines();
+    let all: Vec<Limits> = lines.enumerate().filter_map(line).collect::<Result<_, _>>()?;
     if all.is_empty() {
         Err("the file is empty; it takes a line LOW:HIGH for each action".to_owned())
     } else {
