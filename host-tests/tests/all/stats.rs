@@ -74,7 +74,7 @@ fn statistics_sum_to_the_image_and_explain_widths() -> Result<()> {
     ensure!(last.image_rows.iter().copied().eq(0..last.rows));
     ensure!(first.image_rows.is_sorted() && blocks.iter().all(|m| m.image_rows == first.image_rows));
     let removed = first.rows - first.image_rows.len();
-    let text = format!("neurons removed: {removed} of the {} of {}, ", first.rows, first.name);
+    let text = format!("\n{removed} of the {} neurons of layer 1 ({}) removed\n", first.rows, first.name);
     ensure!(removed > 0 && printed.contains(&text) && printed.contains("\nTook "), "{printed}");
     Ok(())
 }

@@ -103,20 +103,17 @@ pub fn report(image: &Image<'_>) -> String {
     }
     let _ = writeln!(text, "{ops}\n");
     let contract = image.contract_arrays();
-    // Columns after the first five appear only if the contract has them.
-    const ALWAYS: usize = 5;
-    let columns: Vec<_> = CONTRACT
-        .into_iter()
-        .zip(contract)
-        .enumerate()
-        .filter(|(i, (_, array))| *i < ALWAYS || !array.is_empty())
-        .collect();
-    let heads: Vec<&str> = std::iter::once("action").chain(columns.iter().map(|(_, (name, _))| *name)).collect();
+    let columns: Vec<_> = CONTRACT.into_iter().zip(contract).filter(|(_, array)| !array.is_empty()).collect();
+    if columns.is_empty() {
+        let _ = writeln!(text, "actions       the network's output, without scale and limits");
+        return text;
+    }
+    let heads: Vec<&str> = std::iter::once("action").chain(columns.iter().map(|(name, _)| *name)).collect();
     let mut actions = table(&heads);
     for i in 0..image.act_len() {
         let cell =
             |array: &[u32]| array.get(i).map_or("-".to_owned(), |w| format!("{}", f32::from_bits(u32::from_le(*w))));
-        actions.add_row([i.to_string()].into_iter().chain(columns.iter().map(|(_, (_, array))| cell(array))));
+        actions.add_row([i.to_string()].into_iter().chain(columns.iter().map(|(_, array)| cell(array))));
     }
     let _ = writeln!(text, "{actions}");
     text

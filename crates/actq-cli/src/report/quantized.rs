@@ -48,11 +48,15 @@ pub fn sampled(Sampled { frames, inputs, outputs }: Sampled) -> String {
 
 /// Formats how far a linear model of the robot can predict, and what was learned from its rollouts.
 pub fn imagined(imagined: &Imagined) -> String {
-    let predicted =
-        format!("a linear model predicts {:.0}% of the next observation", 100.0 * imagined.predicted.max(0.0));
+    let predicted = format!("predicts {:.0}% of the next observation", 100.0 * imagined.predicted.max(0.0));
     match imagined.frames() {
-        0 => format!("no imagined rollouts: {predicted}\n"),
-        frames => format!("{} of imagined rollouts: {predicted}\n", count(frames, "observation")),
+        0 => format!(
+            "learned from the recording only: a linear model of the robot, fitted to it, {predicted}, too little to imagine others\n"
+        ),
+        frames => format!(
+            "learned also from {} that a linear model of the robot, fitted to the recording, imagined; it {predicted}\n",
+            count(frames, "observation")
+        ),
     }
 }
 
@@ -61,12 +65,15 @@ pub fn learning(learning: &Learning) -> String {
     let Learning { steps, discarded, choice, tried } = learning;
     match choice {
         Choice::Feedback { .. } if *discarded > 0 => format!(
-            "learned {}, and discarded the result: its error is higher than without learning\n",
+            "learned in {}, and discarded the result: its error is higher than without learning\n",
             count(*discarded, "step")
         ),
-        Choice::Learning(_) if tried.is_empty() => format!("learned {}\n", count(*steps, "step")),
+        Choice::Learning(_) if tried.is_empty() => {
+            format!("learned the weights in {}\n", count(*steps, "step"))
+        }
         Choice::Learning(_) => {
-            format!("learned {}, with the best of {}\n", count(*steps, "step"), count(tried.len(), "setting"))
+            let settings = count(tried.len(), "setting");
+            format!("learned the weights in {}, with the best of {settings} of the learning\n", count(*steps, "step"))
         }
         Choice::Feedback { .. } => "not learned: weights are rounded with error feedback\n".to_owned(),
     }

@@ -171,19 +171,18 @@ impl Widths {
 pub fn line(policy: &Policy, outcomes: &[Outcome]) -> String {
     let of = |outcome: &Outcome, width| outcome.trained_widths().iter().filter(|w| **w == width).count();
     let (mut removed, mut constant) = (Vec::new(), Vec::new());
-    for (matrix, outcome) in policy.graph.matrices.iter().zip(outcomes).filter(|(_, outcome)| of(outcome, None) > 0) {
-        let all = outcome.trained_widths().len();
-        let to = if outcome.quantized.rows < all { &mut removed } else { &mut constant };
-        to.push(format!("{} of the {all} of {}", of(outcome, None), matrix.name));
+    for (i, (matrix, outcome)) in policy.graph.matrices.iter().zip(outcomes).enumerate() {
+        let (without, all) = (of(outcome, None), outcome.trained_widths().len());
+        if without > 0 {
+            let to = if outcome.quantized.rows < all { &mut removed } else { &mut constant };
+            to.push(format!("{without} of the {all} neurons of layer {} ({})", i + 1, matrix.name));
+        }
     }
     let count = |width| outcomes.iter().map(|outcome| of(outcome, Some(width))).sum::<usize>();
     let widths = ALL.iter().flatten().map(|width| (count(*width), width.bits())).filter(|(count, _)| *count > 0);
     let mut lines = Vec::new();
-    for (name, parts) in [("neurons removed", removed), ("neurons with a constant value", constant)] {
-        if !parts.is_empty() {
-            lines.push(format!("{name}: {}", parts.join(", ")));
-        }
-    }
+    lines.extend(removed.into_iter().map(|neurons| neurons + " removed"));
+    lines.extend(constant.into_iter().map(|neurons| neurons + " made constant"));
     lines.push(format!(
         "rows: {}",
         widths.map(|(count, bits)| format!("{count} at {bits} bits")).collect::<Vec<_>>().join(", ")
