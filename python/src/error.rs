@@ -39,7 +39,9 @@ fn as_arguments(text: &str) -> String {
         let mut rest = std::mem::take(&mut text);
         while let Some(at) = rest.find(option) {
             let value = &rest[at + option.len()..];
-            let (value, after) = value.split_at(value.find([' ', ';', ':', ',']).unwrap_or(value.len()));
+            // Names have punctuation, as the colons of Keras, but do not end with it.
+            let word = value.split(' ').next().unwrap_or_default();
+            let (value, after) = value.split_at(word.trim_end_matches([';', ':', ',']).len());
             text += &rest[..at];
             text += &match (argument, value.split_once('=')) {
                 ("observe", _) => format!("observe=[{value:?}]"),

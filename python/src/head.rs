@@ -1,6 +1,6 @@
 //! Heads: the executor of the microcontroller, for one robot or thousands.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use actq_batch::Batch;
 use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _};
@@ -8,9 +8,11 @@ use numpy::{IntoPyArray as _, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use crate::error::{error, given, of_python};
+use crate::arrays::{array, floats};
+use crate::error::{error, given};
 use crate::image::Image;
 use crate::process::refuse_forked;
+use crate::work;
 
 /// The executor of an image, with n independent states.
 #[pyclass(frozen, module = "actq")]
@@ -19,17 +21,35 @@ pub(crate) struct Head {
     obs_len: usize,
     act_len: usize,
     seed: u32,
-    /// `None` until the first observations decide how many states there are.
-    batch: Mutex<Option<Batch>>,
+    /// `None` until the first observations decide how many states there are. An interrupted step still makes its step.
+    batch: Arc<Mutex<Option<Batch>>>,
 }
 
+/// Bytes of an image times heads from which work takes so long that Ctrl-C must end the wait for it: about 10 ms.
+const LONG: usize = 1 << 26;
+
 impl Head {
-    /// Makes states in their beginning. State i has the seed of the head plus i.
-    fn states(&self, image: &Image, heads: usize) -> PyResult<Batch> {
-        let mut batch = Batch::new(image.buffer().bytes(), heads).map_err(raised)?;
-        let seeds: Vec<u32> = (0..heads).map(|i| self.seed.wrapping_add(i as u32)).collect();
-        batch.seed(&seeds).map_err(raised)?;
-        Ok(batch)
+    /// Does `work` on the states, in a thread of its own if it is long. It takes what makes states in their beginning:
+    /// state i has the seed of the head plus i.
+    fn with<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        heads: usize,
+        work: impl FnOnce(&mut Option<Batch>, &dyn Fn(usize) -> PyResult<Batch>) -> PyResult<T> + Send + 'static,
+    ) -> PyResult<T> {
+        let (image, seed, batch) = (self.image.clone_ref(py), self.seed, Arc::clone(&self.batch));
+        let is_long = heads.saturating_mul(image.get().buffer().bytes().len()) >= LONG;
+        let run = move || {
+            let states = |heads: usize| {
+                let mut batch = Batch::new(image.get().buffer().bytes(), heads).map_err(raised)?;
+                let seeds: Vec<u32> = (0..heads).map(|i| seed.wrapping_add(i as u32)).collect();
+                batch.seed(&seeds).map_err(raised)?;
+                Ok(batch)
+            };
+            work(&mut batch.lock().unwrap_or_else(PoisonError::into_inner), &states)
+        };
+        // The exception of failed work is its result.
+        if is_long { work::interruptible(py, None, move |_| Ok(run()))? } else { py.detach(run) }
     }
 
     /// Returns the states u8 [n, bytes], if there are any.
@@ -59,8 +79,7 @@ pub(crate) fn head_of_states(
 
 /// Reads a mask of the states to reset: bool [heads].
 fn flags(mask: &Bound<'_, PyAny>, heads: usize) -> PyResult<Vec<bool>> {
-    let array = mask.py().import("numpy")?.call_method1("asarray", (mask,));
-    let array = array.map_err(|error| of_python(mask.py(), error))?;
+    let array = array(mask)?;
     let Ok(array) = array.cast::<PyArrayDyn<bool>>() else {
         return Err(error!("reset is of type {}; pass bool [{heads}]", array.getattr("dtype")?));
     };
@@ -91,10 +110,12 @@ impl Head {
         #[pyo3(from_py_with = given)] seed: u32,
     ) -> PyResult<Self> {
         let (obs_len, act_len) = (image.get().obs_len(), image.get().act_len());
-        let head = Self { image: image.clone_ref(py), obs_len, act_len, seed, batch: Mutex::new(None) };
+        let head = Self { image, obs_len, act_len, seed, batch: Arc::default() };
         if let Some(n) = n {
-            let batch = py.detach(|| head.states(image.get(), n))?;
-            *head.batch.lock().unwrap_or_else(PoisonError::into_inner) = Some(batch);
+            head.with(py, n, move |batch, states| {
+                *batch = Some(states(n)?);
+                Ok(())
+            })?;
         }
         Ok(head)
     }
@@ -104,7 +125,7 @@ impl Head {
     fn __call__<'py>(
         &self,
         py: Python<'py>,
-        #[pyo3(from_py_with = given)] observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
+        #[pyo3(from_py_with = floats)] observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
         reset: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         refuse_forked()?;
@@ -122,17 +143,17 @@ impl Head {
         let reset: Option<Vec<bool>> = reset.map(|mask| flags(mask, heads)).transpose()?;
         // Copies: another thread may change numpy's memory.
         let observations: Vec<f32> = observations.as_array().iter().copied().collect();
-        let actions = py.detach(|| {
-            let mut kept = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
+        let act_len = self.act_len;
+        let actions = self.with(py, heads, move |kept, states| {
             let is_new = kept.is_none();
             let batch = match &mut *kept {
                 Some(batch) => batch,
-                none => none.insert(self.states(self.image.get(), heads)?),
+                none => none.insert(states(heads)?),
             };
             if batch.heads() != heads {
                 return Err(error!("{heads} observations for a head of {} states; make another head", batch.heads()));
             }
-            let mut actions = vec![0.0; heads * self.act_len];
+            let mut actions = vec![0.0; heads * act_len];
             if let Err(error) = batch.step(&observations, reset.as_deref(), &mut actions) {
                 // Observations that fail do not decide how many states there are.
                 if is_new {
@@ -165,7 +186,7 @@ impl Head {
 
     /// Restores states that `state` returned: the robots go on with the same bits.
     fn restore(&self, py: Python<'_>, states: &Bound<'_, PyAny>) -> PyResult<()> {
-        let array = py.import("numpy")?.call_method1("asarray", (states,)).map_err(|error| of_python(py, error))?;
+        let array = array(states)?;
         let Ok(rows) = array.cast::<PyArrayDyn<u8>>() else {
             return Err(error!("the states are of type {}; pass the array of Head.state()", array.getattr("dtype")?));
         };
@@ -176,23 +197,22 @@ impl Head {
                 rows.shape()
             ));
         };
-        let one = self.states(self.image.get(), 1)?.save().map_err(raised)?;
-        let (needed, given) = (one.len(), rows.shape()[1]);
+        let needed = self.with(py, 1, |_, states| Ok(states(1)?.save().map_err(raised)?.len()))?;
+        let given = rows.shape()[1];
         if given != needed {
             return Err(error!(
                 "a state has {given} bytes, and one of this image {needed}; pass the array of Head.state() of a head of the same image"
             ));
         }
         let bytes: Vec<u8> = rows.readonly().as_array().iter().copied().collect();
-        py.detach(|| {
-            let mut kept = self.batch.lock().unwrap_or_else(PoisonError::into_inner);
-            let restored = match &mut *kept {
+        self.with(py, heads, move |kept, states| {
+            let restored = match kept {
                 Some(batch) if batch.heads() != heads => {
                     return Err(error!("{heads} states for a head of {}; make another head", batch.heads()));
                 }
                 Some(batch) => batch.restore(&bytes),
                 none => {
-                    let mut batch = self.states(self.image.get(), heads)?;
+                    let mut batch = states(heads)?;
                     let restored = batch.restore(&bytes);
                     *none = Some(batch).filter(|_| restored.is_ok());
                     restored

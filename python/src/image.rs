@@ -22,6 +22,7 @@ use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 
 use crate::error::{OrRaise as _, error, given};
 use crate::policy::Policy;
+use crate::work;
 
 /// A port: kind, name, names of its values, and their number.
 type Port = (&'static str, String, Vec<String>, usize);
@@ -179,8 +180,9 @@ impl Image {
         #[pyo3(from_py_with = given)] recordings: Vec<PathBuf>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let policy = policy.map(|policy| policy.policy.clone());
-        let page =
-            py.detach(|| report::of_image(&self.buffer, &self.name, policy.as_deref(), &recordings)).or_raise()?;
+        let (buffer, name) = (self.buffer.clone(), self.name.clone());
+        let make = move |_: &_| report::of_image(&buffer, &name, policy.as_deref(), &recordings);
+        let page = work::interruptible(py, None, make)?;
         py.import("actq._report")?.getattr("Page")?.call1((page,))
     }
 
@@ -237,19 +239,11 @@ impl Image {
         if steps == 0 {
             return Err(error!("steps is 0; use a whole number from 1 on"));
         }
-        let image = self.image()?;
-        py.detach(|| {
-            export_c::export(
-                image,
-                self.buffer.bytes(),
-                &folder,
-                &name,
-                golden.as_deref().map(|file| (file, steps)),
-                None,
-                force,
-            )
+        let (buffer, own) = (self.buffer.clone(), self.name.clone());
+        work::interruptible(py, None, move |_| {
+            let golden = golden.as_deref().map(|file| (file, steps));
+            export_c::export(buffer.image(&own)?, buffer.bytes(), &folder, &name, golden, None, force)
         })
-        .or_raise()
     }
 
     /// Writes the image's network as an ONNX file in f32, whole or not at all. Replaces only a file whose name ends in

@@ -125,7 +125,8 @@ fn width(name: &str, bits: u32) -> PyResult<Width> {
     Width::from_bits(bits).ok_or_else(|| error!("{name} is {bits}; use 2, 3, 4 or 8 bits"))
 }
 
-/// Quantizes a policy. Returns the image, warnings, and notes that matter on a motor controller only.
+/// Quantizes a policy. Returns the image, its error on frames that it did not learn from, or else on its recordings,
+/// warnings, and notes that matter on a motor controller only.
 #[pyfunction]
 #[pyo3(signature = (policy, recordings, heldout, request, progress))]
 pub(crate) fn quantize(
@@ -135,7 +136,7 @@ pub(crate) fn quantize(
     heldout: Option<&Bound<'_, PyAny>>,
     #[pyo3(from_py_with = given)] request: Request,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Image, Vec<String>, Vec<String>)> {
+) -> PyResult<(Image, Option<f64>, Vec<String>, Vec<String>)> {
     let (calib, heldout) = (passed(recordings, "recordings")?, passed(heldout, "heldout")?);
     let folder = policy.folder();
     let found = folder.map(|folder| Recording::Calib.find(folder)).transpose().or_raise()?.flatten();
@@ -148,7 +149,7 @@ pub(crate) fn quantize(
     let options = request
         .options(&policy.policy.graph, method.unwrap_or(if has_calib { Method::Distill } else { Method::Rtn }))?;
     let (mut options, policy, in_folder) = (options, policy.policy.clone(), folder.is_some());
-    let (bytes, warnings, notes) = work::run(py, progress, move |worker| {
+    let (bytes, nmse, warnings, notes) = work::run(py, progress, move |worker| {
         check_budget(&policy, &options)?;
         let mut recordings = read(&policy, calib, heldout, in_folder)?;
         let mut warnings = notes::of_recordings(&recordings);
@@ -168,14 +169,16 @@ pub(crate) fn quantize(
         let image = alone.image(Path::new("image"))?;
         let mut notes = notes::of_policy(&policy);
         notes.extend(notes::one_width(&options));
-        if let Some(check) = check::check(&policy, image, &recordings, &options.method, held_out)? {
-            notes.push(notes::errors(&check).trim_end().to_owned());
-            warnings.extend(notes::of_check(&check, &options));
+        let check = check::check(&policy, image, &recordings, &options.method, held_out)?;
+        if let Some(check) = &check {
+            notes.push(notes::errors(check).trim_end().to_owned());
+            warnings.extend(notes::of_check(check, &options));
         }
         let image = found.whole_image()?;
-        Ok((core.map_or(Ok(image.clone()), |core| repack(&image, core))?, warnings, notes))
+        let bytes = core.map_or(Ok(image.clone()), |core| repack(&image, core))?;
+        Ok((bytes, check.and_then(|check| check.nmse()), warnings, notes))
     })?;
-    Ok((Image::of(ImageBuffer::new(&bytes), Path::new("image"))?, warnings, notes))
+    Ok((Image::of(ImageBuffer::new(&bytes), Path::new("image"))?, nmse, warnings, notes))
 }
 
 /// Reads what was passed, or else what is in the policy's folder.

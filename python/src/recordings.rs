@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use actq::data::{Dataset, Sizes, files_of, joined};
 use actq::import::values::{Tensor, Values};
-use numpy::{PyArrayLike1, PyUntypedArray, TypeMustMatch};
+use numpy::{PyArrayLike1, TypeMustMatch};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyMapping, PyString, PyTuple};
 
-use crate::arrays::tensor;
+use crate::arrays::{array, tensor};
 use crate::error::{OrRaise as _, error, given};
 
 /// A recording that was passed, before its sizes are known.
@@ -51,7 +51,7 @@ fn append(object: &Bound<'_, PyAny>, name: &Path, to: &mut Vec<Passed>) -> PyRes
     if object.is_instance_of::<PyString>() || object.hasattr("__fspath__")? {
         let files = files_of(&[object.extract::<PathBuf>()?]).or_raise()?;
         to.extend(files.into_iter().map(Passed::File));
-    } else if object.cast::<PyUntypedArray>().is_ok() {
+    } else if object.hasattr("__array__")? {
         to.push(Passed::Arrays(name.to_owned(), BTreeMap::from([("obs".to_owned(), tensor(object)?)])));
     } else if let Ok(mapping) = object.cast::<PyMapping>() {
         let mut arrays = BTreeMap::new();
@@ -89,7 +89,7 @@ fn episodes(pair: &Bound<'_, PyTuple>, name: &Path) -> PyResult<Vec<Tensor>> {
     let [frames, width] = shape[..] else {
         return Err(error!("{shown}[0] has the shape {shape:?}; with starts, pass [frame, value]"));
     };
-    let starts: PyArrayLike1<'_, bool, TypeMustMatch> = starts
+    let starts: PyArrayLike1<'_, bool, TypeMustMatch> = array(&starts)?
         .extract()
         .map_err(|_| error!("{shown}[1] is no array of bool [frame]; pass one value for each frame"))?;
     let starts = starts.as_array();

@@ -57,6 +57,24 @@ def test_every_form_of_a_recording_gives_one_image(mlp, observations, tmp_path):
     assert all(image == images[0] for image in images)
 
 
+def test_tensors_of_torch_are_recordings(mlp, observations):
+    torch = pytest.importorskip("torch", reason="torch is not installed (requirements-optional.txt)")
+    policy, tensor = actq.import_policy(mlp), torch.from_numpy(observations)
+    make = lambda form: actq.quantize(policy, form, bpw=3, steps=5, progress=False)  # noqa: E731
+    expected, starts = make(observations), torch.zeros(len(observations), dtype=torch.bool)
+    with_gradient = tensor.clone().requires_grad_()
+    for form in [tensor, with_gradient, tensor.double(), tensor[None], {"obs": with_gradient}, (with_gradient, starts)]:
+        assert make(form) == expected
+    assert make([tensor[:100], tensor[100:]]) == make([observations[:100], observations[100:]])
+    for short in [tensor.half(), tensor.bfloat16()]:
+        assert make(short) == make(short.float().numpy())
+    head, row = actq.Head(expected), with_gradient[:1]
+    assert np.array_equal(head(row, torch.tensor([True])), actq.Head(expected)(observations[:1]))
+    assert np.array_equal(policy(with_gradient), policy(observations))
+    head.restore(torch.from_numpy(head.state()))
+    assert actq.evaluate(expected, with_gradient, policy) == actq.evaluate(expected, observations, policy)
+
+
 def test_episodes_are_those_of_a_padded_file(command, mlp, observations, tmp_path):
     lengths = [100, 250, 150]
     padded = np.zeros((3, 250, 12), dtype=np.float32)

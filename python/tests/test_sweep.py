@@ -39,6 +39,26 @@ def test_a_sweep_has_the_images_of_quantize(mlp, parts, caplog):
         actq.sweep(policy, learned, heldout=heldout, budgets=[{"flash": 300}], steps=5, progress=False)
     with pytest.raises(actq.Error, match="budgets is empty"):
         actq.sweep(policy, learned, heldout=heldout, budgets=[])
+    with pytest.raises(TypeError, match="unexpected keyword argument 'step'"):
+        actq.sweep(policy, learned, budgets=[4.0], step=5)
+
+
+def test_a_sweep_holds_parts_out_by_itself(mlp, observations):
+    policy = actq.import_policy(mlp)
+    found = actq.sweep(policy, observations, budgets=[2.0, 4.0], steps=20, progress=False)
+    errors = [point.nmse for point in found.points]
+    seen = [actq.evaluate(point.image, observations, policy).nmse for point in found.points]
+    assert errors[0] > seen[0] > 0 and errors[1] < errors[0], "the parts are not those that the image learned from"
+    assert found.points[0].image == actq.quantize(policy, observations, bpw=2.0, steps=20, progress=False)
+
+
+@pytest.mark.parametrize("core", ["m0", "m3", "rv32imac", "m55"])
+def test_a_sweep_has_the_times_of_its_core(mlp, parts, core):
+    policy = actq.import_policy(mlp)
+    options = {"heldout": parts[1], "steps": 5, "progress": False}
+    found = actq.sweep(policy, parts[0], budgets=[2.0, {"bits": 8, "clock": 1e8}], core=core, **options)
+    expected = [point.image.cost(clock=clock, core=core) for point, clock in zip(found.points, [168e6, 1e8])]
+    assert [point.milliseconds for point in found.points] == [cost["milliseconds"] for cost in expected]
 
 
 def test_a_sweep_draws_error_and_success(mlp, parts):

@@ -139,6 +139,7 @@ def test_arguments_of_rollouts_are_named(mlp):
     act = lambda x, reset: x[:, :4]  # noqa: E731
     for arguments, text in [
         ({"frames": 0}, "frames is 0; use a whole number from 1 on"),
+        ({"frames": None, "episodes": 0}, "episodes is 0; use a whole number from 1 on"),
         ({"frames": float("nan")}, "frames is nan; use a whole number"),
         ({"every": 1.5}, "every is 1.5; use a whole number"),
         ({"every": 0}, "every is 0"),

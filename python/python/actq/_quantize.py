@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from numbers import Real
 from operator import index
-from typing import Any, Dict, Mapping, Optional, Union
+from typing import Any, Dict, Mapping, Optional, Tuple, Union
 
 import numpy as np
 
@@ -27,7 +27,11 @@ def request(**given: Any) -> Dict[str, Any]:
     unset = dict.fromkeys(
         ["bits", "bpw", "flash", "ms", "max_nmse", "method", "group", "activations", "core", "steps", "minutes", "effort"]
     )
-    options: Dict[str, Any] = {**unset, "clock": CLOCK, "widths": [], "relative": False, "seed": 1, **given}
+    options: Dict[str, Any] = {**unset, "clock": CLOCK, "widths": [], "relative": False, "seed": 1}
+    for name in given.keys() - options.keys():
+        # As Python says it of `quantize`; of a sweep, the options come here unseen.
+        raise TypeError(f"quantize() got an unexpected keyword argument {name!r}")
+    options.update(given)
     if options["widths"] is not None and not isinstance(options["widths"], (list, Mapping)):
         raise Error(f"widths is of type {type(options['widths']).__name__}; pass a mapping of matrices to bits")
     options["widths"] = [(name, _whole(f"widths[{name!r}]", bits)) for name, bits in dict(options["widths"] or {}).items()]
@@ -118,15 +122,23 @@ def quantize(
     Raises `actq.Error` if the policy, a recording or an option cannot be used, or a budget cannot be kept. Ctrl-C returns
     at once. What the command prints as notes goes to the log `actq`.
     """
-    options = request(
-        bits=bits, bpw=bpw, flash=flash, ms=ms, clock=clock, max_nmse=max_nmse, method=method, group=group,
-        activations=activations, core=core, widths=widths, steps=steps, minutes=minutes, effort=effort, relative=relative,
-        seed=seed,
+    image, _ = measured(
+        policy, recordings, heldout, progress, bits=bits, bpw=bpw, flash=flash, ms=ms, clock=clock, max_nmse=max_nmse,
+        method=method, group=group, activations=activations, core=core, widths=widths, steps=steps, minutes=minutes,
+        effort=effort, relative=relative, seed=seed,
     )  # fmt: skip
+    return image
+
+
+def measured(
+    policy: Policy, recordings: Optional[Recordings], heldout: Optional[Recordings], progress: Progress, **options: Any
+) -> Tuple[Image, Optional[float]]:
+    """Quantizes, and returns the error on frames that the image did not learn from, or else on its recordings, too; `None`
+    without any."""
     with reporter(progress) as report:
-        image, warnings, notes = _actq.quantize(policy, recordings, heldout, options, report)
+        image, nmse, warnings, notes = _actq.quantize(policy, recordings, heldout, request(**options), report)
     for warning in warnings:
         log.warning(warning)
     for note in notes:
         log.info(note)
-    return image
+    return image, nmse

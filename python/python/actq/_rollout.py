@@ -75,7 +75,7 @@ def rollout(
     act: Optional[Act] = None,
     success: Optional[Success] = None,
     every: int = 1,
-    progress: Progress = False,
+    progress: Progress = None,
 ) -> Rollout:
     """Steps all robots of `env` by a policy until `frames` frames are recorded, or `episodes` episodes have ended.
 
@@ -97,7 +97,7 @@ def rollout(
     """
     if frames is not None and episodes is not None:
         raise Error("frames and episodes are given; pass one of them")
-    for name, number in (("frames", 1 if frames is None else frames), ("episodes", episodes or 1), ("every", every)):
+    for name, number in (("frames", 1 if frames is None else frames), ("episodes", 1 if episodes is None else episodes), ("every", every)):
         if _whole(name, number) < 1:
             raise Error(f"{name} is {number}; use a whole number from 1 on")
     # A policy's call takes the steps of one robot.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, 
 from ._actq import Error, Image, Policy
 from ._evaluate import evaluate
 from ._progress import Progress, reporter
-from ._quantize import CLOCK, log, quantize
+from ._quantize import CLOCK, log, measured
 from ._rollout import Rollout
 from ._typing import Recordings
 
@@ -27,9 +27,10 @@ class Point:
     #: The budget's options.
     budget: Mapping[str, Any]
     image: Image
-    #: Error on the held-out recordings.
-    nmse: float
-    #: Predicted time of a step on a Cortex-M4.
+    #: Error on the held-out recordings, or on parts of the recordings that were held out; on all of them if none could be,
+    #: which the log `actq` says. `None` without recordings.
+    nmse: Optional[float]
+    #: Predicted time of a step on the core, by default a Cortex-M4.
     milliseconds: float
     #: Its rollout; `None` if the sweep has none.
     rollout: Optional[Rollout]
@@ -120,20 +121,21 @@ def sweep(
     recordings: Optional[Recordings] = None,
     *,
     budgets: Sequence[Budget] = (1.0, 1.5, 2.0, 3.0, 4.0),
-    heldout: Recordings,
+    heldout: Optional[Recordings] = None,
     drive: Optional[Callable[[Image], Rollout]] = None,
     clock: float = CLOCK,
     progress: Progress = None,
     **options: Any,
 ) -> Sweep:
-    """Quantizes a policy at several budgets, measures each image on held-out recordings, and drives it.
+    """Quantizes a policy at several budgets, measures each image on frames that it did not learn from, and drives it.
 
     policy, recordings: as for `quantize`.
     budgets: bits per weight, or budgets of `quantize`, as {"flash": "24K"} or {"ms": 0.6}.
-    heldout: recordings that nothing learns from; {"max_nmse": X} chooses the size by them.
+    heldout: recordings that nothing learns from; {"max_nmse": X} chooses the size by them. Without them, parts of `recordings`
+        are held out for each image, as `quantize` does.
     drive: drives an image, as `lambda image: actq.rollout(actq.Head(image, env.num_envs), env, episodes=100)`.
     clock: clock in Hz of the predicted milliseconds.
-    options: other options of `quantize`, for all budgets.
+    options: other options of `quantize`, for all budgets. With core=, milliseconds are those of that core.
 
     The result prints as a table, `rows()` are its rows, and `plot()` draws it. A budget that cannot be kept is left out, with
     a warning in the log `actq`. Raises what `drive` raises, and `actq.Error` if no budget can be kept.
@@ -151,14 +153,17 @@ def sweep(
                     report(f"{name}: {work}", (i + share) / len(each))  # noqa: B023
 
             try:
-                image = quantize(policy, recordings, heldout=heldout, clock=clock, progress=show, **budget, **options)
-                nmse = evaluate(image, heldout, policy).nmse
+                settings = {"clock": clock, **options, **budget}
+                image, nmse = measured(policy, recordings, heldout, show, **settings)
+                if heldout is not None:
+                    # Of all frames.
+                    nmse = evaluate(image, heldout, policy).nmse
+                milliseconds = image.cost(clock=settings["clock"], core=settings.get("core"))["milliseconds"]
             except Error as error:
                 log.warning("%s: %s", name, error)
                 failure = error
                 continue
             driven = drive(image) if drive is not None else None
-            milliseconds = image.cost(clock=clock)["milliseconds"]
             points.append(Point(budget, image, nmse, milliseconds, driven))
     if failure is not None and not points:
         raise failure

@@ -106,7 +106,7 @@ def tune(
         first = (seed + number * env.num_envs) % 2**31
         head = Head(image, env.num_envs)
         return rollout(
-            head, env, frames=frames, seed=first, observe=observe, act=act, success=success, every=every
+            head, env, frames=frames, seed=first, observe=observe, act=act, success=success, every=every, progress=False
         )  # fmt: skip
 
     def driven(number: int, image: Image) -> Tuple[Any, str]:
