@@ -1,11 +1,13 @@
 //! Policies: their import from files, bundles and bytes.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use actq::import::contract::StatedLimits;
-use actq::import::{FILES, Importer as _};
+use actq::import::json::PolicyJson;
+use actq::import::{FILES, Importer as _, PolicySource};
 use actq::measure::actions::actions;
 use actq::measure::size::hex;
 use actq_cli::commands::bundle::{Gathered, refuse_open_questions};
@@ -14,7 +16,7 @@ use actq_cli::outputs::unfinished::Scratch;
 use actq_cli::probes::probes;
 use actq_cli::report::deployment;
 use actq_deploy::{Answers, Bundle, DESCRIPTION, DeployFolder, read, targets};
-use actq_onnx::{ImportOptions, Onnx, import, import_bytes};
+use actq_onnx::{ImportOptions, Imported, Onnx, import, import_bytes};
 use anyhow::anyhow;
 use numpy::{
     AllowTypeChange, IntoPyArray as _, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _, PyUntypedArrayMethods as _,
@@ -22,6 +24,7 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
+use crate::arrays::floats;
 use crate::error::{OrRaise as _, error, given, raise_of_import};
 use crate::work;
 
@@ -124,7 +127,7 @@ impl Policy {
     fn __call__<'py>(
         &self,
         py: Python<'py>,
-        #[pyo3(from_py_with = given)] observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
+        #[pyo3(from_py_with = floats)] observations: PyArrayLikeDyn<'py, f32, AllowTypeChange>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let is_bundle = self.policy.around.is_some();
         let (len, values_of) = match is_bundle {
@@ -144,10 +147,17 @@ impl Policy {
             }
         };
         let observations: Vec<f32> = observations.as_array().iter().copied().collect();
+        if let Some(at) = observations.iter().position(|value| !value.is_finite()) {
+            let (step, index) = (at / len, at % len);
+            return Err(error!("observation value {index} of step {step} is not finite; pass finite observations"));
+        }
         let rows: Vec<Vec<f32>> = observations.chunks(len).map(<[f32]>::to_vec).collect();
         let policy = Arc::clone(&self.policy);
         let run = move || if is_bundle { targets(&policy.dir, &rows) } else { Ok(actions(&policy, &rows)) };
         let actions = work::interruptible(py, None, move |_| Ok(run().or_raise()))??;
+        if let Some(step) = actions.iter().position(|row| row.iter().any(|value| value.is_nan())) {
+            return Err(error!("step {step}: a value inside the network exceeds float32; pass smaller observations"));
+        }
         actions.concat().into_pyarray(py).reshape(shape)
     }
 
@@ -234,8 +244,8 @@ pub(crate) fn import_path(
         if is_bundle && !is_policy {
             return import_bundle(&path, accept_profile, &answers, profile.as_deref(), &options.limits);
         }
-        if !options.limits.is_empty() {
-            return Err(error!("{}: a policy folder takes no limits; set them in its files", path.display()));
+        if !options.limits.is_empty() && DeployFolder.accepts(&path) {
+            return Err(error!("{}: was imported already; import its bundle with limits, or set them in deploy.toml", path.display()));
         }
         if is_answered {
             return Err(error!("{}: only a deploy bundle takes accept_profile, answers and profile", path.display()));
@@ -243,10 +253,25 @@ pub(crate) fn import_path(
         let policy = load(&path).or_raise()?;
         let files = FILES.map(|name| fs::read(path.join(name)));
         let own = if let [Ok(json), Ok(weights)] = files { Some([json, weights]) } else { None };
-        Ok(Policy::new(policy, own.filter(|_| !DeployFolder.accepts(&path))))
+        let Some(own) = own.filter(|_| !DeployFolder.accepts(&path)) else { return Ok(Policy::new(policy, None)) };
+        if options.limits.is_empty() {
+            return Ok(Policy::new(policy, Some(own)));
+        }
+        let own = limited(own, &options.limits).map_err(|error| error.context(path.display().to_string())).or_raise()?;
+        let names = FILES.map(|name| path.join(name));
+        let policy = actq::policy::Policy::of_files(&path, [&names[0], &names[1]], &own[0], &own[1]).or_raise()?;
+        Ok(Policy::new(policy, Some(own)))
     };
     // The exception of a failed import is the result of the work.
     work::interruptible(py, None, move |_| Ok(import()))?
+}
+
+/// Adds limits to the files of a policy folder.
+fn limited([json, weights]: [Vec<u8>; 2], limits: &StatedLimits) -> actq::error::Result<[Vec<u8>; 2]> {
+    let mut json = PolicyJson::parse(&json)?;
+    json.action = Some(json.action.unwrap_or_default().limited(limits, json.act_dim)?);
+    let [json, _] = PolicySource { json, about: Vec::new(), tensors: BTreeMap::new() }.files()?;
+    Ok([json, weights])
 }
 
 /// Imports a bundle into a temporary folder, as `actq import` does into a lasting one.
@@ -289,11 +314,12 @@ fn stated([low, high, max_step]: [Vec<f64>; 3]) -> StatedLimits {
 const MAGNITUDES: [f32; 7] = [2.0, 0.002, 0.02, 0.2, 20.0, 200.0, 2000.0];
 const FRAMES: usize = 32;
 
-/// Reads the bytes of an ONNX file. Returns the policy, and how to compare its source with it: observed inputs, pairs of
+/// Reads the bytes of an ONNX file; `parts` are the names and lengths of the parts of its only input, if it has some.
+/// Returns the policy, and how to compare its source with it: observed inputs, pairs of
 /// states, the output, drawn observations [block, frame, value], and the policy's actions on them without the limits of
 /// the caller.
 #[pyfunction]
-#[pyo3(signature = (bytes, *, name, output, states, observe, limits, rate_hz))]
+#[pyo3(signature = (bytes, *, name, output, states, observe, limits, rate_hz, parts))]
 #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub(crate) fn import_onnx<'py>(
     py: Python<'py>,
@@ -304,6 +330,7 @@ pub(crate) fn import_onnx<'py>(
     #[pyo3(from_py_with = given)] observe: Vec<String>,
     #[pyo3(from_py_with = given)] limits: [Vec<f64>; 3],
     #[pyo3(from_py_with = given)] rate_hz: Option<f64>,
+    #[pyo3(from_py_with = given)] parts: Vec<(String, usize)>,
 ) -> PyResult<(Policy, Bound<'py, PyDict>)> {
     let import = move || {
         let limits = stated(limits);
@@ -325,6 +352,12 @@ pub(crate) fn import_onnx<'py>(
             }
         };
         let files = source.files().or_raise()?;
+        let mut policy = policy;
+        if let [(_, len)] = imported.inputs[..]
+            && len == parts.iter().map(|(_, len)| len).sum::<usize>()
+        {
+            policy.ports = Imported { inputs: parts, ..imported.clone() }.described();
+        }
         PyResult::Ok((imported, Policy::new(policy, Some(files)), probes, actions))
     };
     let (imported, policy, probes, actions) = work::interruptible(py, None, move |_| Ok(import()))??;

@@ -2,6 +2,7 @@
 
 import copy
 import os
+import pickle
 import re
 import signal
 import subprocess
@@ -15,7 +16,7 @@ import pytest
 
 import actq
 from actq._report import Page
-from conftest import UR3
+from conftest import UR3, write_mlp
 
 
 def test_errors_are_those_of_the_command(command, mlp, observations, tmp_path):
@@ -232,6 +233,71 @@ except KeyboardInterrupt:
     assert time.monotonic() - sent < 1
     process.kill()
     process.wait()
+
+
+LONG = """
+import actq, numpy, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+image, folder = actq.Image.load(sys.argv[1] + "/i.actq"), sys.argv[1]
+obs = numpy.ones((1, image.obs_len), numpy.float32)
+def head(n):
+    return actq.Head(image, n)
+print("begun", flush=True)
+try:
+    {call}
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "image.report(recordings=[folder + '/obs.npy'])",
+        "image.export_c(folder + '/c', golden=folder + '/obs.npy', steps=10**9)",
+        "[head(100_000) for _ in range(10**6)]",
+        "actq.Head(image)(obs.repeat(300_000, axis=0))",
+    ],
+)
+def test_ctrl_c_ends_other_calls_within_a_second(tmp_path, call):
+    """Each of them would take longer."""
+    random = np.random.default_rng(1)
+    layers = [(random.normal(size=size) / 16, np.zeros(size[1])) for size in [(64, 256), (256, 256), (256, 8)]]
+    policy = actq.import_policy(write_mlp(tmp_path / "wide.onnx", layers))
+    actq.quantize(policy, bits=4, method="rtn", progress=False).save(tmp_path / "i.actq")
+    np.save(tmp_path / "obs.npy", random.normal(size=(200_000, 64)).astype(np.float32))
+    process = subprocess.Popen([sys.executable, "-c", LONG.format(call=call), tmp_path], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "begun\n"
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    sent = time.monotonic()
+    assert process.stdout.readline() == "interrupted\n"
+    assert time.monotonic() - sent < 1
+    process.kill()
+    process.wait()
+
+
+def test_arguments_are_whole_names(tmp_path):
+    onnx = pytest.importorskip("onnx", reason="onnx is not installed")
+    name = "sequential/normalization/mean:0"
+    ports = [onnx.helper.make_tensor_value_info(port, 1, [1, 6]) for port in ("obs", name, "action")]
+    node = onnx.helper.make_node("Sub", ["obs", name], ["action"])
+    graph = onnx.helper.make_graph([node], "g", ports[:2], ports[2:])
+    onnx.save(onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=8), tmp_path / "m.onnx")
+    with pytest.raises(actq.Error, match=r'pass observe=\["sequential/normalization/mean:0"\]$'):
+        actq.import_policy(tmp_path / "m.onnx")
+    with pytest.raises(actq.Error, match=r'observe=\["force:1"\]: the file has no input of this name'):
+        actq.import_policy(tmp_path / "m.onnx", observe=["force:1"])
+
+
+def test_a_policy_folder_takes_limits():
+    free, limited = actq.import_policy(UR3), actq.import_policy(UR3, low=-0.01, high=0.02, max_step=0.001)
+    assert limited.digest != free.digest and limited.name == free.name
+    rows = np.random.default_rng(1).normal(size=(20, free.obs_len)).astype(np.float32)
+    np.testing.assert_array_equal(limited(rows), np.clip(free(rows), np.float32(-0.01), np.float32(0.02)))
+    head = actq.Head(actq.quantize(limited, bits=4, method="rtn", progress=False))
+    steps = np.diff([head(row) for row in rows], axis=0)
+    assert np.abs(steps).max() <= 0.001 + 1e-6 and pickle.loads(pickle.dumps(limited)).digest == limited.digest
 
 
 def test_an_exception_of_a_callback_ends_the_work():

@@ -23,6 +23,26 @@ def test_a_policy_runs_in_f32():
         policy(observations[:, :2])
 
 
+def test_a_policy_refuses_what_is_not_finite():
+    policy = actq.import_policy(linear(), torch.zeros(1, 3), low=-1, high=1)
+    rows = np.zeros((4, 3), np.float32)
+    rows[2, 1] = np.nan
+    with pytest.raises(actq.Error, match="observation value 1 of step 2 is not finite"):
+        policy(rows)
+    with pytest.raises(actq.Error, match="observation value 0 of step 0 is not finite"):
+        policy([np.inf, 0, 0])
+    # A value that is infinite inside, less another one: a limit would hide it.
+    opposite = torch.nn.Linear(2, 1)
+    with torch.no_grad():
+        opposite.weight.copy_(torch.tensor([[1.0, -1.0]]))
+    network = torch.nn.Sequential(torch.nn.Linear(1, 2), torch.nn.ReLU(), opposite)
+    with torch.no_grad():
+        network[0].weight.copy_(torch.tensor([[3.0], [2.0]]))
+    policy = actq.import_policy(network, torch.zeros(1, 1), low=-1, high=1)
+    with pytest.raises(actq.Error, match="step 1: a value inside the network exceeds float32"):
+        policy([[1.0], [3e38]])
+
+
 def test_limits_and_rate_become_the_policys():
     module, observations = linear(), 5 * np.random.default_rng(1).normal(size=(50, 3)).astype(np.float32)
     free = actq.import_policy(module, torch.zeros(1, 3))
@@ -132,6 +152,22 @@ def test_agents_with_more_than_an_actor_are_refused():
     with pytest.raises(actq.Error, match="Trunk: the agent computes before its actor; pass a module that returns the mean action"):
         actq.import_policy(Trunk())
 
+    class Wide(Agent):
+        def __init__(self):
+            super().__init__()
+            self.network = torch.nn.Linear(6, 3)
+
+        def get_action_and_value(self, x):
+            return super().get_action_and_value(self.network(x))
+
+    class Recurrent(Agent):
+        def get_action_and_value(self, x, lstm_state, done):
+            return super().get_action_and_value(x)
+
+    for agent, why in [(Wide, "mat1 and mat2"), (Recurrent, "missing 2 required positional arguments")]:
+        with pytest.raises(actq.Error, match=f"the agent computes before its actor .*{why}.*; pass a module that returns the mean"):
+            actq.import_policy(agent())
+
     class Whole(Agent):
         def forward(self, x):
             return 2 * self.actor_mean(x)
@@ -149,7 +185,7 @@ def test_agents_stay_as_they_are():
     assert agent.training and all(torch.equal(value, before[key]) for key, value in agent.state_dict().items())
 
 
-def test_runners_of_rsl_rl_give_their_policy(tmp_path):
+def test_runners_of_rsl_rl_give_their_policy(caplog):
     runners = pytest.importorskip("rsl_rl.runners", reason="rsl-rl-lib is not installed")
     tensordict = pytest.importorskip("tensordict")
 
@@ -166,17 +202,18 @@ def test_runners_of_rsl_rl_give_their_policy(tmp_path):
     cnn = {"output_channels": [2], "kernel_size": [3], "stride": [2], "activation": "elu"}
     cell = {"rnn_hidden_dim": 6, "rnn_num_layers": 1}
 
-    def runner(name, env, more):
+    gaussian = {"class_name": "GaussianDistribution", "init_std": 1.0, "std_type": "scalar"}
+
+    def runner(name, env, more, distribution=gaussian, groups=("policy", "height")):
         torch.manual_seed(2)
         network = {"hidden_dims": [8], "activation": "elu", "obs_normalization": True}
-        distribution = {"class_name": "GaussianDistribution", "init_std": 1.0, "std_type": "scalar"}
         made = runners.OnPolicyRunner(
             env,
             {
                 "algorithm": {"class_name": "PPO", "rnd_cfg": None, "symmetry_cfg": None},
                 "actor": {"class_name": name, "distribution_cfg": distribution, **network, **more},
                 "critic": {"class_name": "MLPModel", **network},
-                "obs_groups": {"actor": ["policy", "height"], "critic": ["policy"]},
+                "obs_groups": {"actor": list(groups), "critic": ["policy"]},
                 "num_steps_per_env": 4,
                 "save_interval": 10,
             },
@@ -206,6 +243,25 @@ def test_runners_of_rsl_rl_give_their_policy(tmp_path):
             given = [tensordict.TensorDict({"policy": proprioception, "height": scan}, [1]) for proprioception, scan in steps]
             expected = np.concatenate([own(x).numpy() for x in given])
         np.testing.assert_allclose(policy(rows), expected, rtol=1e-4, atol=1e-5)
+
+    caplog.clear()
+    env = Env((1, 5, 5))
+    policy = actq.import_policy(runner("CNNModel", env, {"cnn_cfg": cnn}, groups=("height", "policy")))
+    assert "OnPolicyRunner: an observation is the groups policy, height [1, 5, 5]: those of images are last" in caplog.text
+    assert policy.obs_len == 28
+
+    # As the wrapper of Isaac Lab has it.
+    env = Env((4,))
+    env.clip_actions = 0.5
+    made, rows = runner("MLPModel", env, {}), 100 * np.random.default_rng(1).normal(size=(50, 7)).astype(np.float32)
+    free = runner("MLPModel", Env((4,)), {})
+    assert np.abs(actq.import_policy(free)(rows)).max() > 0.5, "the limits change actions"
+    limited = actq.import_policy(made, low=[-2, -0.1], high=0.25)(rows)
+    assert (limited.min(axis=0) == np.float32([-0.5, -0.1])).all() and (limited.max(axis=0) == 0.25).all()
+    with pytest.raises(actq.Error, match="no value of action 1 is within your limits and those of the action space, -0.5 to 0.5"):
+        actq.import_policy(made, low=[-1, 0.75])
+    with pytest.raises(actq.Error, match="the action of BetaDistribution is alpha / .*, a quotient of values, which no kernel computes"):
+        actq.import_policy(runner("MLPModel", Env((4,)), {}, {"class_name": "BetaDistribution"}))
 
 
 def test_what_a_policy_has_of_a_module_is_said(caplog):

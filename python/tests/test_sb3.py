@@ -37,8 +37,8 @@ def moved(made):
 def test_a_new_model_has_the_limits_of_its_action_space():
     policy = actq.import_policy(sb3.PPO("MlpPolicy", Env(WIDE), seed=0, device="cpu"))
     lines = [line.split() for line in actq.quantize(policy, bits=8, method="rtn", progress=False).inspect().splitlines()]
-    i = lines.index(["action", "scale", "offset", "low", "high", "max", "step"])
-    assert [line[3:5] for line in lines[i + 1 : i + 4]] == [["-2", "2"], ["0", "1"], ["-5", "7"]], "a controller can arm"
+    i = lines.index(["action", "low", "high"])
+    assert [line[1:] for line in lines[i + 1 : i + 4]] == [["-2", "2"], ["0", "1"], ["-5", "7"]], "a controller can arm"
     narrow = actq.import_policy(sb3.PPO("MlpPolicy", Env(WIDE), seed=0, device="cpu").policy, torch.zeros(1, 17), high=[1, 2, 3])
     random = 1e3 * np.random.default_rng(0).normal(size=(200, 17)).astype(np.float32)
     assert (narrow(random) <= [1, 1, 3]).all() and (narrow(random) >= WIDE.low).all()
@@ -192,3 +192,62 @@ def test_parts_of_an_observation_follow_the_keys_of_the_space():
     assert list(made.observation_space.spaces) == ["aim", "joints"]
     expected, _ = made.predict(env.normalize_obs(ends), deterministic=True)
     np.testing.assert_allclose(policy(rows), expected, rtol=1e-4, atol=1e-4)
+
+
+def test_new_models_are_imported():
+    class Narrow(Env):
+        observation_space = spaces.Box(-1, 1, (4,))
+
+    for seed in range(4):
+        for env in (Env(WIDE), Narrow(spaces.Box(-2, 2, (1,))), Narrow(spaces.Discrete(2))):
+            made = sb3.PPO("MlpPolicy", env, seed=seed, device="cpu")
+            assert actq.import_policy(made).obs_len == env.observation_space.shape[0]
+
+
+@pytest.mark.parametrize("algorithm", ["PPO", "SAC", "TD3"])
+@pytest.mark.parametrize("shape", [(2, 3), (2, 1)])
+def test_actions_of_two_axes_are_flat(algorithm, shape):
+    low, high = -1 - np.arange(np.prod(shape)).reshape(shape), 2 + np.ones(shape)
+    actions = spaces.Box(low.astype(np.float32), high.astype(np.float32))
+    made = model(algorithm, actions, **({} if algorithm == "PPO" else {"buffer_size": 9}))
+    observations = np.random.default_rng(0).normal(size=(20, 17)).astype(np.float32)
+    expected, _ = made.predict(observations, deterministic=True)
+    np.testing.assert_allclose(actq.import_policy(made)(observations), expected.reshape(20, -1), rtol=1e-4, atol=1e-5)
+
+
+def test_a_normalizer_within_another_is_refused():
+    from stable_baselines3.common import vec_env
+
+    class Doubled(vec_env.VecEnvWrapper):
+        def reset(self):
+            return 2 * self.venv.reset()
+
+        def step_wait(self):
+            return self.venv.step_wait()
+
+    normalized = lambda **options: vec_env.VecNormalize(vec_env.DummyVecEnv([lambda: Env(WIDE)]), **options)  # noqa: E731
+    of = lambda env: actq.import_policy(moved(sb3.PPO("MlpPolicy", env, seed=0, device="cpu")))  # noqa: E731
+    with pytest.raises(actq.Error, match="PPO: the environment has one VecNormalize within another"):
+        of(vec_env.VecNormalize(normalized()))
+    with pytest.raises(actq.Error, match="PPO: Doubled changes observations after VecNormalize"):
+        of(Doubled(normalized()))
+    with pytest.raises(actq.Error, match="PPO: the environment stacks frames twice"):
+        of(vec_env.VecFrameStack(vec_env.VecFrameStack(normalized(), 2), 2))
+    # Only rewards outside, and wrappers that change no observation.
+    env = vec_env.VecNormalize(vec_env.VecCheckNan(vec_env.VecMonitor(normalized(clip_obs=0.5))), norm_obs=False)
+    policy, rows = of(env), 3 * np.random.default_rng(1).normal(size=(20, 17)).astype(np.float32)
+    np.testing.assert_allclose(policy(rows), policy(np.clip(rows, -0.5, 0.5)), rtol=1e-4, atol=1e-4)
+
+
+def test_parts_and_frames_of_an_observation_are_listed(caplog):
+    from stable_baselines3.common import vec_env
+
+    class Planes(Parts):
+        observation_space = spaces.Dict(b=spaces.Box(-9, 9, (3,)), a=spaces.Box(-9, 9, (2, 2)))
+
+    env = vec_env.VecFrameStack(vec_env.DummyVecEnv([Planes]), 3)
+    policy = actq.import_policy(moved(sb3.PPO("MultiInputPolicy", env, seed=0, device="cpu")))
+    assert policy.ports.splitlines()[:2] == ["input     obs[0:12] = a", "          obs[12:21] = b"]
+    assert "PPO: an observation is the last 3 frames of each key along the axis that VecFrameStack stacks, the oldest first" in caplog.text
+    alone = actq.import_policy(sb3.PPO("MultiInputPolicy", Planes(), seed=0, device="cpu").policy, torch.zeros(1, 7))
+    assert alone.ports.splitlines()[:2] == ["input     obs[0:3] = b", "          obs[3:7] = a"], "VecFrameStack sorts the keys"

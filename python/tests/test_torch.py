@@ -452,3 +452,52 @@ def test_the_action_of_several_outputs_is_asked_for():
     assert actq.import_policy(named, torch.zeros(1, 6)).act_len == 3
     pair = Critic(lambda value, mean: (value, mean))
     assert actq.import_policy(pair, torch.zeros(1, 6), output="output_1").act_len == 3
+
+
+@pytest.mark.parametrize("function", [nn.Tanh, nn.ELU, nn.SELU, nn.Sigmoid, nn.SiLU, nn.GELU, nn.Softplus, nn.Mish])
+def test_networks_without_biases_are_imported(function):
+    for seed in range(4):
+        torch.manual_seed(seed)
+        layers = [nn.Linear(11, 64, bias=False), function(), nn.Linear(64, 64, bias=False), function()]
+        assert actq.import_policy(nn.Sequential(*layers, nn.Linear(64, 3, bias=False)), torch.zeros(1, 11)).act_len == 3
+
+
+class Exported(nn.Module):
+    """Computes something else while it is exported."""
+
+    def __init__(self, exported):
+        super().__init__()
+        torch.manual_seed(0)
+        self.first, self.out, self.exported = nn.Linear(11, 64, bias=False), nn.Linear(64, 3, bias=False), exported
+
+    def forward(self, obs):
+        hidden = self.first(obs)
+        return 0.01 * self.out(self.exported(hidden) if torch.onnx.is_in_onnx_export() else torch.tanh(hidden))
+
+
+@pytest.mark.parametrize("exported", [nn.Hardtanh(), nn.ELU(), lambda x: 1.0003 * torch.tanh(x), lambda x: torch.tanh(x + 3e-5)])
+def test_another_function_or_weight_is_refused(exported):
+    with pytest.raises(actq.Error, match="more than roundings explain. If forward computes outside of torch"):
+        actq.import_policy(Exported(exported), torch.zeros(1, 11))
+    assert actq.import_policy(Exported(torch.tanh), torch.zeros(1, 11)).act_len == 3
+
+
+def test_errors_of_functions_are_summed():
+    from actq._functions import bounds
+
+    torch.manual_seed(0)
+    first, out = nn.Linear(5, 7), nn.Linear(7, 2)
+    weights = out.weight.detach().abs().sum(dim=1).double().numpy()
+    x, both = torch.randn(1, 5), np.array([0, 1])
+    for function, error in [(nn.Tanh(), 1.5e-7), (nn.ELU(2.0), 2.4e-7), (nn.Sigmoid(), 1.1e-7)]:
+        found = bounds(lambda given: out(function(first(*given))), [x], both)
+        np.testing.assert_allclose(found, error * weights, rtol=1e-5)
+        # Also of a script, and of a module that changes its input in place.
+        script = torch.jit.script(nn.Sequential(first, function, out))
+        np.testing.assert_allclose(bounds(lambda given: script(*given), [x], both), error * weights, rtol=1e-5)
+        found = bounds(lambda given: out(function(first(given[0].clamp_(-1, 1)))), [x], both[1:])
+        np.testing.assert_allclose(found, error * weights[1:], rtol=1e-5)
+    hidden = first(x).detach().abs().clamp(min=1.0)[0]
+    expected = 1.4e-7 * (out.weight.detach().abs() * hidden).sum(dim=1).numpy()
+    np.testing.assert_allclose(bounds(lambda given: out(nn.functional.silu(first(*given))), [x], both), expected, rtol=1e-5)
+    np.testing.assert_array_equal(bounds(lambda given: first(*given), [x], both), 0)

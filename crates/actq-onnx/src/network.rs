@@ -170,7 +170,12 @@ impl Imported {
             format!("output {name:?} is named action, too, and is left out, as it cannot be imported: {why}. The policy is {chosen:?} alone")
         });
         let (guards, refused) = (self.guards.clone(), refused.collect());
-        Ok(Policy { guards, refused, ports: self.ports() + &self.cut(), ..self.source.policy(folder, file)? })
+        Ok(Policy { guards, refused, ports: self.described(), ..self.source.policy(folder, file)? })
+    }
+
+    /// Returns [`Self::ports`] and [`Self::cut`].
+    pub fn described(&self) -> String {
+        self.ports() + &self.cut()
     }
 
     /// Describes the observed inputs in order, the states and the action output, a line for each.

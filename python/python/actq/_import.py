@@ -129,6 +129,7 @@ def import_policy(
     if model is not None:
         source, example = model.module, model.example if example is None else example
         input_names, output_names = input_names or model.input_names, output_names or model.output_names
+        limits = model.limits(limits, name)
     if example is None:
         raise _actq.Error(f"{name}: pass an example of the module's input, as torch.zeros(1, n_obs)")
     policy = import_module(

@@ -10,7 +10,8 @@ import torch
 
 from . import _sb3
 from ._actq import Error, Policy
-from ._torch import TOLERANCE, copied
+from ._functions import beyond
+from ._torch import TOLERANCE, copied, reason, tensors
 from ._typing import Array, Limits
 
 log = logging.getLogger("actq")
@@ -31,13 +32,29 @@ class Model(NamedTuple):
     #: Typical observations of one episode [frame, value], and what the model itself does at them.
     observations: Array
     predict: Callable[[Array], Array]
+    #: Lowest and highest values that the environment takes of an action, if they are known besides those of the module.
+    bounds: Tuple[List[float], List[float]] = ([], [])
+
+    def limits(self, stated: Limits, name: str) -> Limits:
+        """Returns limits of a caller with those of the environment, of two the stricter."""
+        return _sb3.stricter(stated, self.bounds, name)
 
     def compare(self, policy: Policy, name: str, limits: Limits) -> None:
         """Refuses a policy that gives other actions than the model within these limits."""
         low, high, _ = limits
         expected = np.clip(self.predict(self.observations), low or -np.inf, high or np.inf)
-        found = policy(self.observations)
-        error = np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-30)
+        difference, largest = np.abs(policy(self.observations) - expected), max(np.abs(expected).max(), 1e-30)
+        lengths = [tensor.numel() for tensor in self.example]
+        # Not with states, whose errors of earlier steps are not known.
+        if sum(lengths) == self.observations.shape[1]:
+
+            def inputs(row: int) -> List[torch.Tensor]:
+                parts = torch.from_numpy(self.observations[row]).split(lengths)
+                return [part.reshape(like.shape).to(like) for part, like in zip(parts, self.example)]
+
+            tolerance = np.full_like(difference, TOLERANCE * largest)
+            difference = beyond(difference, tolerance, lambda given: next(tensors(self.module(*given), "output", name))[1], inputs)
+        error = difference.max() / largest
         if not error <= TOLERANCE:
             raise Error(f"{name}: the policy is off by {error:.1e} of the largest action that the model predicts; please report it")
 
@@ -91,11 +108,7 @@ def _of_sb3(model: Any, name: str) -> Model:
         log.warning(
             "%s: the model has no environment; if it was trained with VecNormalize, load it with env=VecNormalize.load(..)", name
         )
-    vec = model.get_vec_normalize_env()
-    vec = vec if vec is not None and vec.norm_obs else None
-    stacked = _stacked_frames(model.get_env())
-    # Frames that are normalized one by one, before they are stacked.
-    times = stacked if vec is not None and vec.observation_space.shape != model.observation_space.shape else 1
+    vec, stacked, times = _wrappers(model.get_env(), name)
     if vec is not None and stacked > 1 and (step.is_dict or len(step.parts[""]) > 1):
         raise Error(f"{name}: only stacked frames of one axis are imported with VecNormalize; pass a module that normalizes them")
     means: List[Array] = []
@@ -115,7 +128,11 @@ def _of_sb3(model: Any, name: str) -> Model:
     mean, deviation = np.concatenate(means), np.concatenate(deviations)
     observations = (mean + deviation * drawn(mean.size)).astype(np.float32)
     if stacked > 1:
-        log.warning("%s: an observation is the last %d frames, the oldest first; the application keeps them", name, stacked)
+        along = "" if all(len(shape) == 1 for shape in step.parts.values()) else " along the axis that VecFrameStack stacks"
+        log.warning(
+            "%s: an observation is the last %d frames%s%s, the oldest first; the application keeps them",
+            name, stacked, " of each key" if step.is_dict else "", along,
+        )  # fmt: skip
 
     module: Any = step if vec is None else Normalized(step, step.lengths, mean, deviation, clips)
 
@@ -136,17 +153,30 @@ def _of_sb3(model: Any, name: str) -> Model:
     return Model(module, (torch.zeros(1, mean.size),), None, None, observations, predict)
 
 
-def _stacked_frames(env: Any) -> int:
+#: Wrappers of a vector environment that change no normalized observation: images are not normalized.
+TRANSPARENT = ("VecMonitor", "VecCheckNan", "VecTransposeImage")
+
+
+def _wrappers(env: Any, name: str) -> Tuple[Any, int, int]:
+    """Returns the VecNormalize of observations, the number of stacked frames, and how many of them are normalized one by one,
+    before they are stacked."""
+    vec, stacked, times, between = None, 1, 1, ""
     while env is not None:
-        if type(env).__name__ == "VecFrameStack":
-            return _last_axis(env.observation_space) // _last_axis(env.venv.observation_space)
+        kind = next((base.__name__ for base in type(env).__mro__ if base.__module__.startswith("stable_baselines3.")), "")
+        if kind == "VecFrameStack":
+            if stacked > 1:
+                raise Error(f"{name}: the environment stacks frames twice; pass a module that takes all frames")
+            stacked = int(env.stacked_obs.n_stack)
+        elif kind == "VecNormalize" and env.norm_obs:
+            if vec is not None:
+                raise Error(f"{name}: the environment has one VecNormalize within another; pass a module that normalizes as both do")
+            if between:
+                raise Error(f"{name}: {between} changes observations after VecNormalize; pass a module that does what both do")
+            vec, times = env, stacked
+        elif kind not in ("VecNormalize", *TRANSPARENT) and hasattr(env, "venv"):
+            between = between or type(env).__name__
         env = getattr(env, "venv", None)
-    return 1
-
-
-def _last_axis(space: Any) -> int:
-    """Returns the length of an observation's last axis; all parts of a Dict are stacked alike."""
-    return int(next(iter(getattr(space, "spaces", {"": space}).values())).shape[-1])
+    return vec, stacked, times
 
 
 def _of_rsl_rl(runner: Any, name: str) -> Model:
@@ -154,10 +184,18 @@ def _of_rsl_rl(runner: Any, name: str) -> Model:
     policy: Any = runner.alg.get_policy() if hasattr(runner.alg, "get_policy") else None
     if not hasattr(policy, "as_onnx"):
         raise Error(f"{name}: only runners of rsl_rl 5 can be imported; export the policy, and pass the file")
+    if type(getattr(policy, "distribution", None)).__name__ == "BetaDistribution":
+        raise Error(
+            f"{name}: the action of BetaDistribution is alpha / (alpha + beta), a quotient of values, which no kernel computes; pass a "
+            "module that returns what the distribution takes, and divide in the application, or train with GaussianDistribution"
+        )
     module: Any = policy.as_onnx(verbose=False).cpu().eval()
     example = tuple(tensor.cpu() for tensor in module.get_dummy_inputs())
     # Groups that a CNN reads are inputs of their own.
     images = dict(zip(getattr(policy, "obs_groups_2d", []), (tensor.shape[1:] for tensor in example[1:])))
+    if images:
+        order = [*policy.obs_groups, *(f"{group} {list(shape)}" for group, shape in images.items())]
+        log.warning("%s: an observation is the groups %s: those of images are last", name, ", ".join(order))
     lengths = [example[0].shape[-1], *(shape.numel() for shape in images.values())]
     observations = drawn(sum(lengths))
 
@@ -172,7 +210,11 @@ def _of_rsl_rl(runner: Any, name: str) -> Model:
             actions.append(own(step).detach().numpy())
         return np.concatenate(actions)
 
-    return Model(module, example, list(module.input_names), list(module.output_names), observations, predict)
+    # As the wrappers of Isaac Lab and mjlab clip what the policy gives.
+    clip = getattr(runner.env, "clip_actions", None)
+    is_number = isinstance(clip, (int, float)) and not isinstance(clip, bool)
+    bounds = ([-float(clip)], [float(clip)]) if is_number else ([], [])
+    return Model(module, example, list(module.input_names), list(module.output_names), observations, predict, bounds)
 
 
 class _SacAction(torch.nn.Module):
@@ -215,11 +257,17 @@ def _of_clean_rl(agent: Any, name: str) -> Optional[Model]:
             return np.asarray(module(obs).detach().cpu().numpy())
         seen: List[Tuple[Any, Any]] = []
         hook = module.register_forward_hook(lambda _, given, found: seen.append((given[0], found)))
-        with torch.random.fork_rng([]):
-            agent.get_action_and_value(obs)
+        failure: Optional[Exception] = None
+        try:
+            with torch.random.fork_rng([]):
+                agent.get_action_and_value(obs)
+        except Exception as error:
+            failure = error
         hook.remove()
-        if len(seen) != 1 or seen[0][0].shape != obs.shape or not torch.equal(seen[0][0], obs):
-            raise Error(f"{name}: the agent computes before its actor; pass a module that returns the mean action")
+        if failure is not None or len(seen) != 1 or seen[0][0].shape != obs.shape or not torch.equal(seen[0][0], obs):
+            # Its actor takes other values than the agent, or the agent more than an observation, as a recurrent state.
+            why = "" if failure is None else f" ({reason(failure)})"
+            raise Error(f"{name}: the agent computes before its actor{why}; pass a module that returns the mean action") from failure
         return np.asarray(seen[0][1].detach().cpu().numpy())
 
     example = torch.zeros(1, first.in_features, device=device)

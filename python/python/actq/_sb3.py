@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, Tuple
+from typing import Any, Dict, List, Tuple
 
 import numpy as np
 import torch
@@ -57,7 +57,7 @@ class Deterministic(torch.nn.Module):
             centre(policy.action_net if q_net is None else getattr(q_net, "q_net", q_net))
         if self.kind == "Box" and policy.squash_output:
             for side in ("low", "high"):
-                values = torch.from_numpy(getattr(space, side).astype(np.float32)).to(policy.device)
+                values = torch.from_numpy(getattr(space, side).astype(np.float32).reshape(-1)).to(policy.device)
                 self.register_buffer(side, values, persistent=False)
 
     def forward(self, given: torch.Tensor) -> Any:
@@ -71,8 +71,8 @@ class Deterministic(torch.nn.Module):
             return policy.action_net(policy.mlp_extractor.forward_actor(features))
         action = policy._predict(obs, deterministic=True)
         if policy.squash_output:
-            return self.low + 0.5 * (action + 1.0) * (self.high - self.low)
-        return action
+            return self.low + 0.5 * (action.flatten(1) + 1.0) * (self.high - self.low)
+        return action.flatten(1)
 
     def limits(self) -> Tuple[Array, Array]:
         """Returns lowest and highest actions; an action that is scaled to them has no others."""
@@ -101,6 +101,12 @@ def parts(space: Any, name: str) -> Dict[str, Tuple[int, ...]]:
     return {key: tuple(int(n) for n in part.shape) for key, part in spaces.items()}
 
 
+def named_parts(module: Any) -> List[Tuple[str, int]]:
+    """Returns the keys of a Dict of observations, in their order in the vector, with their numbers of values."""
+    parts = next((part for part in module.modules() if isinstance(part, Deterministic) and part.is_dict), None)
+    return [] if parts is None else list(zip(parts.parts, parts.lengths))
+
+
 def limited(module: Any, limits: Limits, name: str) -> Limits:
     """Returns limits of a caller with those of the action space, of two the stricter."""
     for part in module.modules():
@@ -108,15 +114,25 @@ def limited(module: Any, limits: Limits, name: str) -> Limits:
             raise Error(f"{name}: the actions are scores, of which the largest is chosen; they take no low, high and max_step")
         if isinstance(part, Deterministic) and part.limits()[0].size:
             low, high = part.limits()
-            for given in limits[:2]:
-                if len(given) > 1 and len(given) != low.size:
-                    raise Error(f"{name}: {len(given)} limits for {low.size} actions; give one for each, or one for all")
-            lowest, highest = np.maximum(low, limits[0] or -np.inf), np.minimum(high, limits[1] or np.inf)
-            if (lowest > highest).any():
-                i = int((lowest > highest).argmax())
-                raise Error(f"{name}: no value of action {i} is within your limits and those of the action space, {low[i]} to {high[i]}")
-            return lowest.astype(float).tolist(), highest.astype(float).tolist(), limits[2]
+            return stricter(limits, (low.tolist(), high.tolist()), name)
     return limits
+
+
+def stricter(limits: Limits, space: Tuple[List[float], List[float]], name: str) -> Limits:
+    """Returns limits of a caller within the lowest and highest actions of an environment, if it has some."""
+    low, high = (np.asarray(side, np.float64) for side in space)
+    if not low.size:
+        return limits
+    for given in limits[:2]:
+        if len(given) > 1 and low.size > 1 and len(given) != low.size:
+            raise Error(f"{name}: {len(given)} limits for {low.size} actions; give one for each, or one for all")
+    lowest, highest = np.maximum(low, limits[0] or -np.inf), np.minimum(high, limits[1] or np.inf)
+    lows, highs = np.broadcast_arrays(lowest, highest)
+    if (lows > highs).any():
+        i = int((lows > highs).argmax())
+        first, last = (side[min(i, len(side) - 1)] for side in (low, high))
+        raise Error(f"{name}: no value of action {i} is within your limits and those of the action space, {first} to {last}")
+    return lowest.tolist(), highest.tolist(), limits[2]
 
 
 def refuse_other_actions(module: Any, probes: Array, name: str) -> None:
@@ -128,10 +144,13 @@ def refuse_other_actions(module: Any, probes: Array, name: str) -> None:
         (expected,), _ = policy.predict(module.observation(row), deterministic=True)
         found = module(torch.from_numpy(row).to(policy.device))[0].cpu().numpy()
         low, high = module.limits()
-        found = np.clip(found.reshape(expected.shape), low.reshape(expected.shape), high.reshape(expected.shape)) if low.size else found
+        found = np.clip(found, low, high) if low.size else found
         if module.kind == "Discrete":
-            is_same = found[int(expected)] >= found.max() - 1e-5 * np.abs(found).max()
+            # Torch rounds the logarithm of a share, at most that of the number of choices, its exponential and a quotient: scores of
+            # an untrained policy that are closer are equal to it.
+            rounded = (4 + np.log(len(found))) * np.finfo(np.float32).eps
+            is_same = found[int(expected)] >= found.max() - 1e-5 * np.abs(found).max() - rounded
         else:
-            is_same = np.abs(found - expected).max() <= 1e-5 * max(1.0, np.abs(expected).max())
+            is_same = np.abs(found - expected.reshape(-1)).max() <= 1e-5 * max(1.0, np.abs(expected).max())
         if not is_same:
             raise Error(f"{name}: policy.predict gives other actions than the policy's modules; pass a module of its actor")

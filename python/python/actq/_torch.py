@@ -16,6 +16,7 @@ import torch
 
 from . import _actq, _sb3
 from ._actq import Error, Policy
+from ._functions import beyond
 from ._memory import changed_values, depends_on, kept_tensors, values_of, wrapped
 from ._typing import Array, Limits
 
@@ -104,6 +105,7 @@ class Source:
         step = self.copied()
         self.is_script = isinstance(step, torch.jit.ScriptModule)
         self.limits = limits if self.is_script else _sb3.limited(step, limits, name)
+        self.parts = [] if self.is_script else _sb3.named_parts(step)
         try:
             outputs = step(*inputs)
         except Exception as error:
@@ -145,7 +147,7 @@ class Source:
         try:
             policy, self.plan = _actq.import_onnx(
                 content, name=self.name, output=output, states=list(states), observe=observe, limits=self.limits,
-                rate_hz=self.rate_hz,
+                rate_hz=self.rate_hz, parts=self.parts,
             )  # fmt: skip
         except Error as error:
             changed = self.kept_values()
@@ -209,8 +211,6 @@ class Source:
         """Runs a copy over observations [block, frame, value], with its states carried on; returns outputs [block, frame,
         value]. Those of a step that raises are not a number."""
         positions = {name: i for i, name in enumerate(self.input_names)}
-        observed = [(positions.get(name, 0), length) for name, length in plan["inputs"]]
-        which = self.output_names.index(plan["output"]) if self.output_names else 0
         # A module that keeps its states by itself has no inputs for them.
         carried = [(positions[of], self.output_names.index(to)) for of, to in plan["states"] if of in positions]
         held = list(self.inputs)
@@ -219,13 +219,10 @@ class Source:
         rows: List[Array] = []
         failure: Optional[Exception] = None
         for row in probes.reshape(-1, probes.shape[-1]):
-            at = 0
-            for i, length in observed:
-                held[i] = torch.from_numpy(row[at : at + length].copy()).reshape(held[i].shape).to(held[i])
-                at += length
+            self.observe(plan, row, held)
             try:
-                outputs = [tensor for _, tensor in tensors(module(*held), "output", self.name)]
-                rows.append(outputs[which].reshape(-1).double().cpu().numpy())
+                outputs = self.outputs(module, held)
+                rows.append(outputs[self.action(plan)].reshape(-1).double().cpu().numpy())
                 for i, k in carried:
                     held[i] = outputs[k].reshape(held[i].shape)
             except Exception as error:
@@ -237,6 +234,38 @@ class Source:
             raise Error(f"{self.name}: the length of the module's action depends on its observation")
         return np.stack(rows).reshape(*probes.shape[:2], -1)
 
+    def observe(self, plan: Dict[str, Any], row: Array, held: List[torch.Tensor]) -> None:
+        """Replaces the observed ones of a module's inputs."""
+        positions, at = {name: i for i, name in enumerate(self.input_names)}, 0
+        for name, length in plan["inputs"]:
+            i = positions.get(name, 0)
+            held[i] = torch.from_numpy(row[at : at + length].copy()).reshape(held[i].shape).to(held[i])
+            at += length
+
+    def outputs(self, module: Any, inputs: Sequence[torch.Tensor]) -> List[torch.Tensor]:
+        return [tensor for _, tensor in tensors(module(*inputs), "output", self.name)]
+
+    def action(self, plan: Dict[str, Any]) -> int:
+        """Returns the place of the action in the outputs."""
+        return self.output_names.index(plan["output"]) if self.output_names else 0
+
+    def beyond_functions(self, plan: Dict[str, Any], found: Array) -> Array:
+        """Returns the differences [block, frame, value] of policy and module, less what the errors of actq's functions may
+        change. With states, the errors of earlier steps are not known, and nothing is allowed."""
+        difference = np.abs(plan["actions"] - found)
+        if plan["states"]:
+            return difference
+        module, values = self.copied(), found.shape[-1]
+
+        def inputs(row: int) -> List[torch.Tensor]:
+            held = list(self.inputs)
+            self.observe(plan, plan["probes"].reshape(-1, plan["probes"].shape[-1])[row], held)
+            return held
+
+        tolerance = np.broadcast_to(TOLERANCE * scale(found), found.shape).reshape(-1, values)
+        output = lambda given: self.outputs(module, given)[self.action(plan)]  # noqa: E731
+        return beyond(difference.reshape(-1, values), tolerance, output, inputs).reshape(found.shape)
+
     def compare(self, plan: Dict[str, Any], branches: Sequence[warnings.WarningMessage]) -> None:
         """Refuses a policy that differs from the module, with the cause."""
         probes, actions = plan["probes"], plan["actions"]
@@ -244,9 +273,11 @@ class Source:
         found = self.run(used, plan, probes)
         _sb3.refuse_other_actions(used, probes, self.name)
         changed = changed_values(self.copied(), used)
-        error = share(actions - found, found)
+        error, difference = share(actions - found, found), np.abs(actions - found)
+        if error > TOLERANCE and not changed:
+            difference = self.beyond_functions(plan, found)
         traced = [warning for warning in branches if f"{torch.__path__[0]}/" not in warning.filename]
-        if error > TOLERANCE and not self._is_rounding(plan, found):
+        if share(difference, found) > TOLERANCE and not self._is_rounding(plan, found, difference):
             raise Memory(self.name, changed, self.is_script) if changed else Error(f"{self.name}: {self._cause(plan, found, error, traced)}")
         if changed and depends_on(used, changed, lambda: self.run(used, plan, probes[:1]), found[:1], share):
             raise Memory(self.name, changed, self.is_script)
@@ -268,12 +299,12 @@ class Source:
                 return changed_values(self.copied(), used)
         return []
 
-    def _is_rounding(self, plan: Dict[str, Any], found: Array) -> bool:
-        """Returns `True` if the policy differs as the module itself does when its weights change by a rounding: what
-        float32 loses is no more than that."""
+    def _is_rounding(self, plan: Dict[str, Any], found: Array, difference: Array) -> bool:
+        """Returns `True` if the policy differs, beyond the errors of its functions, as the module itself does when its weights
+        change by a rounding: what float32 loses is no more than that."""
         if share(self.run(self.copied(), plan, plan["probes"]) - found, found) > 0:
             return False
-        error, allowed = np.abs(plan["actions"] - found).max(axis=1), TOLERANCE * scale(found)[:, 0]
+        error, allowed = difference.max(axis=1), TOLERANCE * scale(found)[:, 0]
         random = torch.Generator().manual_seed(1)
         for _ in range(DRAWS):
             module = self.copied()
@@ -296,7 +327,10 @@ class Source:
         off = f"the policy is off by {error:.1e} of the largest action on drawn observations"
         if traced:
             return f"{off}: {branch(traced[0])}; choose by torch.where, or pass a module of one branch"
-        return f"{off}; forward computes outside of torch, or reads values from elsewhere, which an import makes constants"
+        return (
+            f"{off}, more than roundings explain. If forward computes outside of torch, or reads values from elsewhere, an import makes "
+            "them constants: pass a module that takes them as inputs; if it does neither, please report it"
+        )
 
 
 def branch(warning: warnings.WarningMessage) -> str:
