@@ -50,11 +50,18 @@ def test_open_questions_are_listed(tmp_path):
     assert "says profile lerobot" in text and "\nthe bundle (family lerobot) leaves 1 question open; " in text
 
 
-def test_engines_of_the_speed_comparison_agree():
+def test_engines_of_the_speed_comparison_agree(tmp_path, monkeypatch):
     pytest.importorskip("torch", reason="torch is not installed (requirements-optional.txt)")
+    pytest.importorskip("onnxruntime", reason="onnxruntime is not installed (requirements-optional.txt)")
     import speed
 
-    ours, by_onnx, by_torch = (step() for step in speed.engines(robots=64, cores=1).values())
+    monkeypatch.setenv("RAYON_NUM_THREADS", "1")
+    path, observations = str(tmp_path / "speed.onnx"), np.random.default_rng(0).normal(size=(64, speed.LAYERS[0])).astype(np.float32)
+    speed.write_onnx(path)
+    engines = {}
+    for engine in (speed.by_actq, speed.by_onnxruntime, speed.by_torch):
+        engines.update(engine(path, 64, observations, 1))
+    ours, by_onnx, by_torch = (engines[name]() for name in ("actq, 2 bits", "onnxruntime, f32", "torch, f32"))
     assert np.abs(by_onnx[0] - by_torch.numpy()).max() < 1e-5
     # 2 bits, not learned: near enough to be the same network.
     assert ours.shape == (64, 12) and np.corrcoef(ours.ravel(), by_onnx[0].ravel())[0, 1] > 0.5

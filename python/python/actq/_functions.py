@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any, Callable, Iterator, List, Sequence
+from typing import Any, Callable, Iterator, List, Sequence, cast
 
 import numpy as np
 import torch
@@ -49,9 +49,9 @@ def beyond(
 def bounds(output: Callable[[Sequence[torch.Tensor]], torch.Tensor], inputs: Sequence[torch.Tensor], values: Array) -> Array:
     """Returns how much the errors of all functions may change each of these values together: to the first order, the sum over
     all elements of functions of |d value / d element| times the element's largest error. 0 if it has no gradients."""
-    found = np.zeros(len(values))
+    found, script = np.zeros(len(values)), cast(Any, torch.jit)
     # Scripts without fused functions, which have no names.
-    with torch.enable_grad(), torch.jit.optimized_execution(False):
+    with torch.enable_grad(), script.optimized_execution(False):
         leaves = [value.detach().clone().requires_grad_(value.is_floating_point()) for value in inputs]
         try:
             # Not the leaves themselves, which no operation may change in place.

@@ -49,7 +49,7 @@ class Model(NamedTuple):
         if sum(lengths) == self.observations.shape[1]:
 
             def inputs(row: int) -> List[torch.Tensor]:
-                parts = torch.from_numpy(self.observations[row]).split(lengths)
+                parts = torch.split(torch.from_numpy(self.observations[row]), lengths)
                 return [part.reshape(like.shape).to(like) for part, like in zip(parts, self.example)]
 
             tolerance = np.full_like(difference, TOLERANCE * largest)
@@ -212,8 +212,9 @@ def _of_rsl_rl(runner: Any, name: str) -> Model:
 
     # As the wrappers of Isaac Lab and mjlab clip what the policy gives.
     clip = getattr(runner.env, "clip_actions", None)
-    is_number = isinstance(clip, (int, float)) and not isinstance(clip, bool)
-    bounds = ([-float(clip)], [float(clip)]) if is_number else ([], [])
+    bounds: Tuple[List[float], List[float]] = ([], [])
+    if isinstance(clip, (int, float)) and not isinstance(clip, bool):
+        bounds = ([-float(clip)], [float(clip)])
     return Model(module, example, list(module.input_names), list(module.output_names), observations, predict, bounds)
 
 
