@@ -245,7 +245,10 @@ pub(crate) fn import_path(
             return import_bundle(&path, accept_profile, &answers, profile.as_deref(), &options.limits);
         }
         if !options.limits.is_empty() && DeployFolder.accepts(&path) {
-            return Err(error!("{}: was imported already; import its bundle with limits, or set them in deploy.toml", path.display()));
+            return Err(error!(
+                "{}: was imported already; import its bundle with limits, or set them in deploy.toml",
+                path.display()
+            ));
         }
         if is_answered {
             return Err(error!("{}: only a deploy bundle takes accept_profile, answers and profile", path.display()));
@@ -257,7 +260,8 @@ pub(crate) fn import_path(
         if options.limits.is_empty() {
             return Ok(Policy::new(policy, Some(own)));
         }
-        let own = limited(own, &options.limits).map_err(|error| error.context(path.display().to_string())).or_raise()?;
+        let own =
+            limited(own, &options.limits).map_err(|error| error.context(path.display().to_string())).or_raise()?;
         let names = FILES.map(|name| path.join(name));
         let policy = actq::policy::Policy::of_files(&path, [&names[0], &names[1]], &own[0], &own[1]).or_raise()?;
         Ok(Policy::new(policy, Some(own)))
