@@ -348,7 +348,7 @@ pub(crate) fn import_onnx<'py>(
         let (imported, policy) = import(&options)?;
         let probes = probes(&imported, &policy, &MAGNITUDES, FRAMES);
         let actions = actions(&policy, &probes);
-        let (source, policy) = match limits.is_empty() {
+        let (source, mut policy) = match limits.is_empty() {
             true => (imported.source.clone(), policy),
             false => {
                 let (limited, policy) = import(&ImportOptions { limits, ..options })?;
@@ -356,7 +356,6 @@ pub(crate) fn import_onnx<'py>(
             }
         };
         let files = source.files().or_raise()?;
-        let mut policy = policy;
         if let [(_, len)] = imported.inputs[..]
             && len == parts.iter().map(|(_, len)| len).sum::<usize>()
         {
