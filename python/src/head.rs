@@ -25,6 +25,9 @@ pub(crate) struct Head {
     batch: Arc<Mutex<Option<Batch>>>,
 }
 
+/// Makes this number of states in their beginning.
+type States<'a> = &'a dyn Fn(usize) -> PyResult<Batch>;
+
 /// Bytes of an image times heads from which work takes so long that Ctrl-C must end the wait for it: about 10 ms.
 const LONG: usize = 1 << 26;
 
@@ -35,7 +38,7 @@ impl Head {
         &self,
         py: Python<'_>,
         heads: usize,
-        work: impl FnOnce(&mut Option<Batch>, &dyn Fn(usize) -> PyResult<Batch>) -> PyResult<T> + Send + 'static,
+        work: impl FnOnce(&mut Option<Batch>, States<'_>) -> PyResult<T> + Send + 'static,
     ) -> PyResult<T> {
         let (image, seed, batch) = (self.image.clone_ref(py), self.seed, Arc::clone(&self.batch));
         let is_long = heads.saturating_mul(image.get().buffer().bytes().len()) >= LONG;

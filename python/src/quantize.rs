@@ -125,8 +125,11 @@ fn width(name: &str, bits: u32) -> PyResult<Width> {
     Width::from_bits(bits).ok_or_else(|| error!("{name} is {bits}; use 2, 3, 4 or 8 bits"))
 }
 
-/// Quantizes a policy. Returns the image, its error on frames that it did not learn from, or else on its recordings,
-/// warnings, and notes that matter on a motor controller only.
+/// An image, its error on frames that it did not learn from, or else on its recordings, warnings, and notes that matter
+/// on a motor controller only.
+type Quantized = (Image, Option<f64>, Vec<String>, Vec<String>);
+
+/// Quantizes a policy.
 #[pyfunction]
 #[pyo3(signature = (policy, recordings, heldout, request, progress))]
 pub(crate) fn quantize(
@@ -136,7 +139,7 @@ pub(crate) fn quantize(
     heldout: Option<&Bound<'_, PyAny>>,
     #[pyo3(from_py_with = given)] request: Request,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Image, Option<f64>, Vec<String>, Vec<String>)> {
+) -> PyResult<Quantized> {
     let (calib, heldout) = (passed(recordings, "recordings")?, passed(heldout, "heldout")?);
     let folder = policy.folder();
     let found = folder.map(|folder| Recording::Calib.find(folder)).transpose().or_raise()?.flatten();
