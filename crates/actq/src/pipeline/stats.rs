@@ -13,7 +13,7 @@ use crate::error::{Context, Result, ensure};
 use crate::graph::WeightMatrix;
 use crate::measure::size::{bits_per_weight, hex};
 use crate::methods::distill::balance::balance_bytes;
-use crate::methods::{Method, Options, Outcome, Quantized};
+use crate::methods::{Activations, Effort, Method, Options, Outcome, Quantized};
 use crate::strict_json;
 
 /// Version of the file's format. It changes when a field changes its meaning or disappears, not when one is added.
@@ -45,6 +45,9 @@ pub struct Stats {
     pub seed: u64,
     /// Steps of distillation; 0 for methods that do not learn.
     pub steps: usize,
+    /// The other options, as `actq quantize` takes them.
+    #[serde(default)]
+    pub options: Vec<String>,
     /// Bytes of the means and factors that balance the matrices' columns (distill).
     #[serde(default)]
     pub balance: usize,
@@ -98,6 +101,22 @@ pub struct AllocationRecord {
     pub importance: Vec<f64>,
 }
 
+/// Returns the options beside method, budget, seed and steps.
+fn given(options: &Options) -> Vec<String> {
+    let effort = Effort::ALL.into_iter().find(|(_, effort)| *effort == options.effort && *effort != Effort::Default);
+    let of_effort = effort.map(|(name, _)| format!("--effort {name}"));
+    let minutes = options.minutes.map(|minutes| format!("--minutes {minutes}"));
+    let relative = options.relative.then(|| "--relative".to_owned());
+    let forced = options.forced.iter().map(|(name, width)| format!("--width {name}={}", width.bits()));
+    let group = format!("--group {}", options.group);
+    let activations = match options.activations {
+        Activations::Int8 => Some("--activations 8".to_owned()),
+        Activations::Int16 => Some("--activations 16".to_owned()),
+        Activations::Auto | Activations::Unmeasured => None,
+    };
+    [group].into_iter().chain(activations).chain(of_effort).chain(minutes).chain(relative).chain(forced).collect()
+}
+
 impl Stats {
     /// Collects the statistics of the image that `quantizer` made with `options`.
     pub fn new(quantizer: &Quantizer<'_>, options: &Options, quantized: &QuantizedPolicy) -> Result<Self> {
@@ -117,6 +136,7 @@ impl Stats {
             budget: options.budget,
             seed: options.seed,
             steps: quantized.steps(),
+            options: given(options),
             balance: balance_bytes(&quantized.policy.graph),
             matrices: matrices.map(|(source, outcome)| matrix(source, outcome, scores.next())).collect(),
         })

@@ -387,6 +387,7 @@ fn made(image: &Image<'_>, core: Core, stats: Option<&Stats>) -> Vec<(&'static s
             ("budget", stats.budget.to_string()),
             ("seed", stats.seed.to_string()),
             ("steps of distillation", stats.steps.to_string()),
+            ("other options", printable(&stats.options.join(" ")).into_owned()),
             ("made by actq", printable(&stats.actq).into_owned()),
         ]);
     }
