@@ -128,7 +128,7 @@ pub(super) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) ->
         return super::portable::quantize(x, inverse, plan, out);
     }
     let out = out.get_mut(..plan.room(x.len()))?;
-    let columns = plan.padded / plan.groups;
+    let columns = plan.padded.checked_div(plan.groups)?;
     let mut x = x;
     for words in out.chunks_exact_mut(1 + columns / 4) {
         let (now, rest) = x.split_at(columns.min(x.len()));
