@@ -96,9 +96,9 @@ impl Target {
         ["thumbv7em", "thumbv8m.main"].iter().any(|core| self.triple().starts_with(core))
     }
 
-    /// Returns the flags of rustc, if they are not those of the triple in cargo's configuration.
-    pub fn rustflags(self) -> Option<&'static str> {
-        (self == Self::M55).then_some("-C target-cpu=cortex-m55 -C target-feature=-mve")
+    /// Returns cargo's variable with the flags of rustc, if they are not those of the triple in cargo's configuration.
+    pub fn rustflags(self) -> Option<(&'static str, &'static str)> {
+        (self == Self::M55).then_some(("RUSTFLAGS", "-C target-cpu=cortex-m55 -C target-feature=-mve"))
     }
 
     /// Returns the profile of a build (`Cargo.toml`).

@@ -1,6 +1,6 @@
 const ROBOTS = [
   { title: "Balancer", hertz: 100, push: 4, unit: "m/s", error: "speed error", goals: [["speed, m/s", -0.6, 0.6], ["turn rate, rad/s", -1.5, 1.5]], draw: drawBalancer,
-    task: "An episode succeeds if the robot stands to its end and follows the speed and the turn rate at the end of each command." },
+    task: "An episode succeeds if the robot stays upright to its end and follows the speed and the turn rate at the end of each command." },
   { title: "UR3 arm", hertz: 50, push: 12, unit: "mm", error: "distance to the goal", goals: [["x, m", -0.45, -0.15], ["y, m", -0.3, 0.3], ["z, m", 0.05, 0.45]], draw: drawArm,
     task: "An episode succeeds if the tool is near both of its goals, in position and direction, in the last 0.4 s of each." },
 ];

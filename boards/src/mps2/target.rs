@@ -7,14 +7,14 @@ use core::cell::Cell;
 use crate::hal::{self, Cause, Clock, Source};
 use crate::ram::Ram;
 pub use crate::target::cmsdk::{Uart, Watchdog};
-#[cfg(not(any(feature = "mps2-an505", feature = "mps3-an547")))]
+#[cfg(not(feature = "armv8m"))]
 pub use crate::target::mpu::guard_stack;
-#[cfg(any(feature = "mps2-an505", feature = "mps3-an547"))]
+#[cfg(feature = "armv8m")]
 pub use crate::target::msplim::guard_stack;
 use crate::target::vectors::interrupts;
 
 /// Clocks and addresses of AN385, AN386 and AN500.
-#[cfg(not(any(feature = "mps2-an505", feature = "mps3-an547")))]
+#[cfg(not(feature = "armv8m"))]
 mod map {
     pub(super) const HZ: u32 = 25_000_000;
     pub(super) const UART: (usize, u32) = (0x4000_4000, HZ);
@@ -38,7 +38,7 @@ mod map {
 }
 
 // Received bytes of UART 0; transmitted ones have another interrupt.
-#[cfg(not(any(feature = "mps2-an505", feature = "mps3-an547")))]
+#[cfg(not(feature = "armv8m"))]
 interrupts!(0 of 32);
 // All events of UART 0.
 #[cfg(feature = "mps2-an505")]

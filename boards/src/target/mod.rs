@@ -2,9 +2,9 @@
 
 #[cfg(feature = "cmsdk")]
 pub(crate) mod cmsdk;
-#[cfg(not(any(feature = "mps2-an505", feature = "mps3-an547")))]
+#[cfg(not(feature = "armv8m"))]
 pub(crate) mod mpu;
-#[cfg(any(feature = "mps2-an505", feature = "mps3-an547"))]
+#[cfg(feature = "armv8m")]
 pub(crate) mod msplim;
 pub(crate) mod stack;
 pub(crate) mod vectors;

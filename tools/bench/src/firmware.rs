@@ -172,7 +172,7 @@ fn build(
     let mut arguments = vec!["--package", package, "--target", target.triple(), "--profile", profile];
     arguments.extend(["--features", features]);
     arguments.extend(binaries.iter().flat_map(|binary| ["--bin", binary]));
-    let environment: Vec<_> = environment.iter().copied().chain(target.rustflags().map(|f| ("RUSTFLAGS", f))).collect();
+    let environment: Vec<_> = environment.iter().copied().chain(target.rustflags()).collect();
     cargo_build(&format!("{package} for {}", target.board().name), &arguments, &environment)?;
     let built = target_dir().join(target.triple()).join(profile);
     let own = built.join(if features.is_empty() { target.board().name } else { features });

@@ -169,9 +169,7 @@ fn build(
     }
     command.current_dir(root()).args(["build", "--package", "actq-firmware-demo", "--bin", "controller"]);
     command.args(["--profile", target.profile(), "--target", target.triple(), "--features", &features]);
-    if let Some(flags) = target.rustflags() {
-        command.env("RUSTFLAGS", flags);
-    }
+    command.envs(target.rustflags());
     // defmt's own default logs only errors.
     if std::env::var_os("DEFMT_LOG").is_none() {
         command.env("DEFMT_LOG", "info");

@@ -18,10 +18,10 @@ use actq_jobs::store::Store;
 use actq_kernels::{Image, PortKind};
 use anyhow::{Context as _, Result, ensure};
 use ndarray::Array3;
-use sha2::{Digest as _, Sha256};
 
 use crate::args::ReportArgs;
 use crate::importers::{load, policy_files};
+use crate::report::export::sha256;
 use crate::report::notes::{targets_without_limits, useless, without_limits};
 use crate::report::page::facts::Facts;
 use crate::report::page::parts::PARTS;
@@ -136,7 +136,7 @@ fn refuse_unnamed(file: &Path) -> Result<()> {
 
 fn digest(file: &Path) -> Result<String> {
     let bytes = fs::read(file).with_context(|| format!("{}: cannot read the file", file.display()))?;
-    Ok(hex(&Sha256::digest(&bytes)))
+    Ok(sha256(&bytes))
 }
 
 /// Reads the policy of a folder; refuses another than that of the image.
@@ -208,8 +208,10 @@ fn sweep_of(folder: &Path, facts: &Facts, clock_hz: f64) -> Result<Sweep> {
             if sweep.own().is_some() {
                 return Ok(sweep);
             }
-            of_name |= policy.policy == facts.name;
-            if sources(&store, &policy).any(|source| source == facts.source) {
+            // A policy's digest covers its name: of another name, no image need be read.
+            let has_name = policy.policy == facts.name;
+            of_name |= has_name;
+            if has_name && sources(&store, &policy).any(|source| source == facts.source) {
                 of_policy = Some(sweep);
             }
         }

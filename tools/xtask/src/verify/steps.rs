@@ -182,8 +182,11 @@ impl Steps {
             arguments.extend(target.board().binaries.iter().flat_map(|binary| ["--bin", binary]));
             arguments.extend(["--features", target.feature().unwrap_or_default()]);
             arguments.extend(DENY);
-            let flags = target.rustflags().map(|flags| ("RUSTFLAGS", flags));
-            self.add_of_firmware(&format!("lints of the firmware, {target:?}"), &arguments, flags.as_slice());
+            self.add_of_firmware(
+                &format!("lints of the firmware, {target:?}"),
+                &arguments,
+                target.rustflags().as_slice(),
+            );
         }
     }
 
@@ -195,7 +198,11 @@ impl Steps {
             let features = [name, "defmt-rtt", "faults"].map(|feature| format!("{APPLICATION}/{feature}")).join(",");
             let packages = ["--package", APPLICATION, "--package", "actq-boards"];
             let arguments = [&["clippy"], &build_for(target)[..], &packages, &programs, &[&features], &DENY].concat();
-            self.add_of_firmware(&format!("lints of the application, {name}"), &arguments, &[]);
+            self.add_of_firmware(
+                &format!("lints of the application, {name}"),
+                &arguments,
+                target.rustflags().as_slice(),
+            );
         }
         let fpu = build_for(Target::Fpu);
         let features = ["mps2-an386,tick-8khz,foc,signed"];

@@ -75,7 +75,7 @@ pub struct Facts {
     pub is_trained: bool,
     /// Names of the action contract's arrays, and their values for each action.
     pub contract: Vec<(&'static str, Vec<f32>)>,
-    /// How the image was made, by name; with its statistics, also by which options.
+    /// Origin of the image, by name: method, options and seed need its statistics.
     pub made: Vec<(&'static str, String)>,
 }
 

@@ -29,7 +29,7 @@
     if (facts.periods > 1) notes.push(`A step may take ${facts.periods} periods, as the rest of a chunk plays meanwhile, if it runs in slices.`);
     notes.push("Predicted for memory that never waits; flash with wait states takes longer.");
     const time = hertz > 0 ? `${milliseconds(cycles, hertz)} at ${part.megahertz} MHz, ${is_modelled ? "predicted" : "an estimate"}` : "no clock";
-    // What does not fit is drawn after the end of the flash.
+    // The part that does not fit is drawn after the end of the flash.
     const all = Math.max(part.flash, bytes + runtime);
     const block = (bytes, colour) => el("i", { style: `--c: var(${colour}); flex: ${Math.max(bytes, 0)} 0 0` });
     const end = el("b", { style: `left: ${(100 * part.flash) / all}%`, hidden: free < 0 ? undefined : "" });
