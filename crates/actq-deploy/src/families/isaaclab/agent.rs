@@ -46,8 +46,11 @@ const WIDTHS: [&str; 5] = [
     "models.policy.network.0.layers",
     "policy_kwargs.net_arch",
 ];
-/// Keys of rl_games and skrl that say whether the action is limited.
-const LIMITED: [&str; 2] = ["params.config.clip_actions", "models.policy.clip_actions"];
+/// Keys of rl_games, skrl and Stable-Baselines3 that say whether the action is limited.
+const LIMITED: [&str; 3] = [RESCALED, "models.policy.clip_actions", "policy_kwargs.squash_output"];
+/// With this key, or without it, rl_games limits the action to ±1 and multiplies it by the limit in [`SCALE`].
+const RESCALED: &str = "params.config.clip_actions";
+const SCALE: &str = "params.env.clip_actions";
 /// Keys of the recurrent cells, below "actor" or "policy".
 const RECURRENT: [&str; 3] = ["rnn_type", "rnn_hidden_dim", "rnn_num_layers"];
 /// Activations that are one operation of a graph, and other names of them.
@@ -64,10 +67,8 @@ const FUNCTIONS: [(&str, &str); 9] = [
 ];
 
 impl Agent {
-    /// Reads a file.
     pub(super) fn of(yaml: &Document) -> Result<Self> {
-        let limit = |node: &Node| node.number().filter(|limit| *limit > 0.0);
-        let limit = yaml.optional("clip_actions", "a number above 0, or null", limit)?;
+        let clip = clip(yaml)?;
         // Wrappers that limit nothing; those that do are a question.
         for path in LIMITED {
             if yaml.peek(path).is_some_and(|node| node.truth() == Some(false)) {
@@ -78,7 +79,6 @@ impl Agent {
         if yaml.peek("policy").is_some_and(|node| node.text().is_some()) {
             yaml.node("policy");
         }
-        let clip = limit.map(|limit| Sourced { numbers: vec![limit], from: yaml.location("clip_actions") });
         // The network has another name in later versions.
         let path = ["obs_groups.actor", "obs_groups.policy"].into_iter().find(|path| yaml.peek(path).is_some());
         let group = match path.map(|path| Ok::<_, actq::error::Error>((path, yaml.texts(path)?))).transpose()? {
@@ -95,6 +95,19 @@ impl Agent {
         };
         Ok(Self { clip, group })
     }
+}
+
+/// Reads the limit of the action. That of rl_games is one if it does not scale the action, too; else it is a question.
+fn clip(yaml: &Document) -> Result<Option<Sourced>> {
+    let truth = |path: &str| yaml.peek(path).and_then(Node::truth);
+    let is_limit = truth(RESCALED) == Some(false) || yaml.peek(SCALE).and_then(Node::number) == Some(1.0);
+    let path = if is_limit { SCALE } else { "clip_actions" };
+    if is_limit {
+        yaml.node(RESCALED);
+    }
+    let limit = |node: &Node| node.number().filter(|limit| *limit > 0.0);
+    let limit = yaml.optional(path, "a number above 0, or null", limit)?;
+    Ok(limit.map(|limit| Sourced { numbers: vec![limit], from: yaml.location(path) }))
 }
 
 /// Refuses a graph that is not the network of a learner's configuration, unless the user decides for the graph.
@@ -122,7 +135,10 @@ pub(super) fn agrees(yaml: &Document, graph: &Graph, file: &str, facts: &mut Fac
 /// Returns what differs, the key that declares it, what it declares, and what the graph has.
 fn difference(yaml: &Document, graph: &Graph) -> Option<(&'static str, String, String, String)> {
     let layers = Layers::of(graph);
-    let normalized = NORMALIZERS.iter().filter_map(|path| Some((*path, is_normalized(yaml, path)?)));
+    // From skrl 2 on, states are those of the critic, and observations have a key of their own.
+    let has_own = yaml.peek("agent.observation_preprocessor").is_some();
+    let normalized = NORMALIZERS.iter().filter(|path| !has_own || **path != "agent.state_preprocessor");
+    let normalized = normalized.filter_map(|path| Some((*path, is_normalized(yaml, path)?)));
     let normalized: Vec<(&str, bool)> = normalized.collect();
     let declared = normalized.iter().find(|(_, is)| *is).or(normalized.first());
     if let Some((path, declared)) = declared
