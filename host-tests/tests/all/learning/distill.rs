@@ -1,4 +1,4 @@
-//! The method distill on whole policies: budgets, determinism, and limits of the error.
+//! The method distill on whole policies: determinism, and limits of the error.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -42,18 +42,6 @@ fn distill(bits: f64, steps: usize) -> Options {
 }
 
 #[test]
-fn budgets_are_kept_and_used() -> Result<()> {
-    let quantizer = quantizer()?;
-    for bits in [1.0, 1.5, 2.0, 2.5, 3.0, 4.0] {
-        let bpw = report(&ur3(), &image(&quantizer, &distill(bits, 2))?)?.bpw;
-        assert!(bpw <= bits && bpw > bits - 0.1, "{bpw} bits for a budget of {bits}");
-    }
-    let error = image(&quantizer, &distill(1e-6, 2)).expect_err("no image is so small");
-    assert!(error.budget().is_some(), "{error:#}");
-    Ok(())
-}
-
-#[test]
 fn the_image_is_independent_of_the_thread_count() -> Result<()> {
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
@@ -65,23 +53,7 @@ fn the_image_is_independent_of_the_thread_count() -> Result<()> {
             )
         })
     };
-    let one = on(1)?;
-    for threads in [2, 3, 8] {
-        assert!(one == on(threads)?, "{threads} threads");
-    }
-    Ok(())
-}
-
-#[test]
-fn an_image_fits_its_flash_budget() -> Result<()> {
-    let quantizer = quantizer()?;
-    for bytes in [64 << 10, 96 << 10, 200 << 10] {
-        let options = Options { budget: Budget::ImageBytes(bytes), ..distill(1.0, 2) };
-        let len = image(&quantizer, &options)?.len();
-        assert!(len <= bytes && len > bytes - bytes / 10, "{len} bytes for a budget of {bytes}");
-    }
-    let tiny = Options { budget: Budget::ImageBytes(1000), ..distill(1.0, 2) };
-    assert!(image(&quantizer, &tiny).is_err());
+    assert!(on(1)? == on(3)?);
     Ok(())
 }
 
@@ -108,31 +80,35 @@ fn another_seed_gives_another_image() -> Result<()> {
 
 /// Errors below half of GPTQ's at about the same bits (GPTQ has one scale per row and one width, so it gets slightly
 /// more), with the effort quick: all of its steps, or fewer.
-fn halves_gptq(dir: &Path, steps: Option<usize>, budgets: &[(f64, Width)]) -> Result<()> {
+fn halves_gptq(dir: &Path, steps: Option<usize>, bits: f64, width: Width) -> Result<()> {
     let policy = Policy::load(dir)?;
     let recordings = Recordings::load(&policy)?;
     let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     let gptq = Quantizer::new(&policy, &recordings, Method::Gptq, None, |_| {})?;
-    for &(bits, width) in budgets {
-        let options =
-            Options { steps, effort: Effort::Quick, ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
-        let ours = report(dir, &image(&quantizer, &options)?)?;
-        let theirs = report(dir, &image(&gptq, &Options::new(Method::Gptq, Budget::Width(width)))?)?;
-        assert!(ours.bpw < theirs.bpw);
-        assert!(ours.nmse < 0.5 * theirs.nmse, "{}: {} against {}", policy.name, ours.nmse, theirs.nmse);
-    }
+    let options =
+        Options { steps, effort: Effort::Quick, ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
+    let ours = report(dir, &image(&quantizer, &options)?)?;
+    let theirs = report(dir, &image(&gptq, &Options::new(Method::Gptq, Budget::Width(width)))?)?;
+    assert!(ours.bpw < theirs.bpw);
+    assert!(ours.nmse < 0.5 * theirs.nmse, "{}: {} against {}", policy.name, ours.nmse, theirs.nmse);
     Ok(())
 }
 
 #[test]
 fn the_ur3_head_halves_gptqs_error() -> Result<()> {
-    halves_gptq(&ur3(), None, &[(3.0, Width::W3), (2.0, Width::W2)])
+    halves_gptq(&ur3(), Some(500), 2.0, Width::W2)
+}
+
+#[test]
+#[ignore = "learns for minutes"]
+fn the_ur3_head_halves_gptqs_error_at_3_bits() -> Result<()> {
+    halves_gptq(&ur3(), None, 3.0, Width::W3)
 }
 
 #[test]
 fn a_recurrent_policy_halves_gptqs_error() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
-    halves_gptq(&policies.join("g1_lstm256"), Some(100), &[(2.0, Width::W2)])
+    halves_gptq(&policies.join("g1_lstm256"), Some(100), 2.0, Width::W2)
 }
 
 /// The errors of a shared policy, at bits per weight and after learning steps, stay below limits.
@@ -157,11 +133,23 @@ fn a_recurrent_policy_without_normalization_keeps_its_error() -> Result<()> {
     stays_below("g1_lstm64", &[(2.0, Some(1500), 0.027)])
 }
 
-/// All learning steps, as the command's default, for the smallest policies, and the first steps for the others.
+/// The limit of an error at bits per weight after learning steps, from its recorded value.
+fn recorded(bits: f64, steps: Option<usize>, nmse: f64) -> (f64, Option<usize>, f64) {
+    (bits, steps, TOLERANCE * nmse)
+}
+
+const FIRST: Option<usize> = Some(1000);
+
 #[test]
 fn shared_policies_keep_their_errors() -> Result<()> {
-    const FIRST: Option<usize> = Some(1000);
-    let recorded = |bits, steps, nmse| (bits, steps, TOLERANCE * nmse);
-    stays_below("go1_mlp", &[recorded(2.5, None, 5.2e-3), recorded(2.0, FIRST, 8.9e-3), recorded(3.0, FIRST, 4.1e-3)])?;
-    stays_below("fetch_pickplace", &[recorded(2.0, FIRST, 3.5e-2), recorded(3.0, FIRST, 2.3e-2)])
+    stays_below("go1_mlp", &[recorded(2.0, FIRST, 8.9e-3)])?;
+    stays_below("fetch_pickplace", &[recorded(2.0, FIRST, 3.5e-2)])
+}
+
+/// All learning steps, as the command's default, and more bits.
+#[test]
+#[ignore = "learns for minutes"]
+fn shared_policies_keep_their_errors_to_the_end() -> Result<()> {
+    stays_below("go1_mlp", &[recorded(2.5, None, 5.2e-3), recorded(3.0, FIRST, 4.1e-3)])?;
+    stays_below("fetch_pickplace", &[recorded(3.0, FIRST, 2.3e-2)])
 }

@@ -51,8 +51,13 @@ fn hold(method: Method, bits: f64, relative: bool, nmse: f64, tracking: f64) -> 
 
 #[test]
 fn distill_keeps_its_error_and_every_episode() -> Result<()> {
+    hold(Method::Distill, 2.0, false, 5.1e-3, 1.14)
+}
+
+#[test]
+#[ignore = "learns for minutes"]
+fn distill_keeps_its_errors_at_3_bits_and_relative_to_the_axes() -> Result<()> {
     hold(Method::Distill, 3.0, false, 1.4e-3, 1.0)?;
-    hold(Method::Distill, 2.0, false, 5.1e-3, 1.14)?;
     hold(Method::Distill, 2.0, true, 6.3e-3, 1.15)
 }
 

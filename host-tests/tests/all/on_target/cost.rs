@@ -26,12 +26,19 @@ const STEPS: usize = 24;
 /// Largest relative error of a predicted step.
 const ERROR: f64 = 0.01;
 
+/// Returns some of the recorded frames: they and learning change the weights' values, on which no time depends.
+fn recordings(policy: &Policy) -> Result<Recordings> {
+    const FRAMES: usize = 1000;
+    let all = Recordings::load(policy)?.calib.context("a recording")?;
+    let calib = all.thinned(FRAMES, policy.graph.state_len() > 0).into_owned();
+    Ok(Recordings { calib: Some(calib), heldout: None })
+}
+
 fn image(policy: &Policy, options: &Options) -> Result<Vec<u8>> {
-    Ok(quantize(policy, &Recordings::load(policy)?, options, ())?.image)
+    Ok(quantize(policy, &recordings(policy)?, options, ())?.image)
 }
 
 pub(super) fn distill(bits: f64) -> Options {
-    // Learning changes the weights' values, on which no time depends.
     Options { steps: Some(2), ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) }
 }
 
@@ -210,7 +217,7 @@ fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
 #[test]
 fn a_budget_of_time_is_kept_and_used() -> Result<()> {
     let policy = Policy::load(&ur3())?;
-    let recordings = Recordings::load(&policy)?;
+    let recordings = recordings(&policy)?;
     let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     let within = |milliseconds| {
         let budget = Budget::Time(TimeLimit { milliseconds, core: Core::M4f, clock_hz: CLOCK, image_bytes: None });

@@ -19,9 +19,7 @@ const FIRMWARE: [&str; 2] = ["actq-firmware-support", "actq-firmware-bench"];
 const APPLICATION: &str = "actq-firmware-demo";
 /// The head in user firmware.
 const STYLES: &str = "actq-firmware-styles";
-/// The comparison of the ONNX importer with tract, which takes minutes to build.
-const ONNX_TESTS: &str = "actq-onnx-tests";
-/// The check of the C header, whose generator takes long to build, too.
+/// The check of the C header, whose generator takes long to build.
 const C_HEADER: &str = "actq-capi-header";
 
 /// The tests in QEMU beyond the smoke run, a module of `host-tests/tests/all`.
@@ -102,11 +100,10 @@ pub(super) fn all(installed: Installed) -> Vec<Step> {
 const TESTS: [&str; 4] = ["test", "--profile", PROFILE, "--no-fail-fast"];
 const DENY: [&str; 3] = ["--", "-D", "warnings"];
 
-/// Returns all packages for the host, without those built only for boards, and without those that take minutes to
-/// build.
+/// Returns all packages for the host, without those built only for boards, and without one that takes long to build.
 fn host_packages() -> Vec<&'static str> {
     let [support, benches] = FIRMWARE;
-    vec!["--workspace", "--exclude", support, "--exclude", benches, "--exclude", ONNX_TESTS, "--exclude", C_HEADER]
+    vec!["--workspace", "--exclude", support, "--exclude", benches, "--exclude", C_HEADER]
 }
 
 /// Returns the command of all tests: with one selection of packages, cargo builds each crate with one set of features.
