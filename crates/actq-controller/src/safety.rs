@@ -42,7 +42,6 @@ pub struct Safety<const AXES: usize> {
     pub(crate) built: Built<AXES>,
     health: Health,
     state: State<AXES>,
-    /// The last fault.
     fault: Option<Fault>,
     /// Ticks since the last valid observation; `u32::MAX` if there was none.
     since_observation: u32,

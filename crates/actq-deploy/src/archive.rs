@@ -58,7 +58,6 @@ impl Archive {
         Ok(Some(Self { folder, names }))
     }
 
-    /// Returns the path of one of its files.
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }

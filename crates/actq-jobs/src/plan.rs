@@ -116,7 +116,6 @@ impl Jobs {
     }
 }
 
-/// A plan in the making.
 struct Plan<'a> {
     spec: &'a Spec,
     /// Files that the drive command depends on.

@@ -4,7 +4,6 @@ use actq_balancer as balancer;
 use actq_ur3::kinematics::{chain, norm, subtract, tool};
 use actq_ur3::task as arm;
 
-/// The tasks.
 enum Task {
     Balancer(Box<balancer::Task>),
     Arm(Box<arm::Task>),

@@ -19,7 +19,6 @@ use proptest::prelude::*;
 
 use crate::ops::wide;
 
-/// Length of an action.
 const ACT: usize = 2;
 
 /// An image that returns its observation as the raw output.

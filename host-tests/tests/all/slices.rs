@@ -15,7 +15,6 @@ use actq_kernels::{Head, StepError, Width};
 use anyhow::{Context, Result, ensure};
 use proptest::prelude::*;
 
-/// Length of the observations.
 const OBSERVATION: usize = 37;
 /// Steps of a run.
 const STEPS: usize = 7;

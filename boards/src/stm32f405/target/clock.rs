@@ -33,7 +33,6 @@ pub(super) fn start(rcc: &pac::RCC, flash: &pac::FLASH, power: &pac::PWR) -> Clo
     FALLBACK
 }
 
-/// Returns the running clock.
 pub(super) fn running(rcc: &pac::RCC) -> Clock {
     if rcc.cfgr().read().sws().bits() == PLL { FAST } else { FALLBACK }
 }

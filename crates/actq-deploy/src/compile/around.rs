@@ -32,7 +32,6 @@ struct Compiler<'a> {
     plan: &'a Plan,
     joined: &'a Joined,
     to: Operations,
-    /// Place of each value.
     placed: Vec<Option<Slice>>,
     /// Place of each state.
     states: Vec<Slice>,

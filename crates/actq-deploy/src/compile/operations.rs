@@ -115,7 +115,6 @@ impl Operations {
         self.normalize(src, &mean, &vec![1.0; src.len], f32::INFINITY)
     }
 
-    /// Returns constants as a value.
     pub(super) fn constant(&mut self, numbers: &[f32]) -> Slice {
         let dst = self.value(numbers.len());
         self.emit(OpKind::Constant, dst, None, None, StepData::Constants(numbers.to_vec()));

@@ -21,7 +21,6 @@ use crate::yaml::Node;
 #[derive(Debug)]
 pub(super) struct Leapp;
 
-/// Keys of the file.
 const KEYS: [&str; 3] = ["models", "pipeline", "system information"];
 
 impl Family for Leapp {

@@ -111,7 +111,6 @@ fn all<M: Message + Default>(list: &[Bytes], what: &str) -> Result<Vec<M>> {
 }
 
 impl Model {
-    /// Reads a file.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let size = fs::metadata(path).context("cannot read the file")?.len();
         ensure!(size <= MAX_BYTES, "the file has {size} bytes; the limit for an ONNX file is {MAX_BYTES}");

@@ -13,7 +13,6 @@ use crate::values::expr::{Expr, Exprs, Id};
 
 /// The observed inputs, one after the other.
 pub(super) struct Observation {
-    /// Names and lengths.
     pub(super) inputs: Vec<(String, usize)>,
     /// Names of those that the file takes as integers.
     pub(super) integers: Vec<String>,

@@ -86,7 +86,6 @@ fn mean_squares(graph: &Graph, calib: Option<&Dataset>) -> Vec<Vec<f64>> {
 
 /// The elements of all values, one after the other, joined to classes of one unit.
 struct Elements {
-    /// First element of each value.
     starts: Vec<usize>,
     /// Another element of the same class; itself at the root.
     parents: Vec<usize>,

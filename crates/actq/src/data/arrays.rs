@@ -17,7 +17,6 @@ const NAMES: [&str; 5] = ["obs", "action", "length", "state", "noise"];
 /// File name extensions of recordings.
 pub(super) const ENDINGS: [&str; 3] = ["npz", "npy", "safetensors"];
 
-/// The named arrays of a file.
 pub(super) struct Arrays {
     /// All names in the file.
     names: Vec<String>,

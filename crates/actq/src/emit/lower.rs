@@ -106,7 +106,6 @@ fn placed_data(data: &StepData, region: impl Fn(Slice) -> Region) -> StepData {
     }
 }
 
-/// Buffer of the observation.
 const OBSERVATION: BufferId = 0;
 
 /// Buffers without offsets.

@@ -12,7 +12,6 @@ use actq_kernels::{ImageInfo, include_image};
 use actq_link::code::{Crash, ResetCause};
 use actq_link::report::Breadcrumb;
 
-/// The built-in image.
 static BUILT_IN: &[u8] = include_image!(env!(
     "ACTQ_IMAGE",
     "set ACTQ_IMAGE to the absolute path of the image to build in; `cargo xtask firmware` does"

@@ -18,7 +18,6 @@ use actq_kernels::layout::Lanes;
 use actq_kernels::math::Function;
 use anyhow::{Result, ensure};
 
-/// Length of the observation.
 const OBSERVATION: usize = 41;
 
 /// Returns an image with every width, rows of mixed widths and of none, rows and columns that fill no strip and no unit, both

@@ -14,7 +14,6 @@ use actq_kernels::ops::denoise::Coefficients;
 use actq_kernels::{PortKind, Width};
 use anyhow::Result;
 
-/// Length of the observations.
 const OBSERVATION: usize = 150;
 
 /// Largest magnitude of the raw values of [`around`].

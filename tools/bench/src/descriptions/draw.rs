@@ -34,7 +34,6 @@ pub(super) struct Draw {
 }
 
 impl Draw {
-    /// Draws the description of a seed.
     pub(super) fn description(seed: u64) -> Self {
         let description = Description {
             schema: SCHEMA,

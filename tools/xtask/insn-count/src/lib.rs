@@ -71,7 +71,6 @@ static OUT: Mutex<Option<BufWriter<File>>> = Mutex::new(None);
 /// Every translated instruction by its address. They live as long as QEMU does.
 static INSTRUCTIONS: Mutex<BTreeMap<u64, &'static Instruction>> = Mutex::new(BTreeMap::new());
 
-/// End of the flash.
 const FLASH_END: u64 = 0x2000_0000;
 /// Bytes of a line, as a power of two.
 const LINE: u32 = 4;

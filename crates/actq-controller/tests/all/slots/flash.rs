@@ -10,7 +10,6 @@ pub(super) trait Fails: NorFlash + Clone {
     /// Creates a flash with arbitrary content, as after another use.
     fn new(sectors: usize, seed: u64) -> Self;
 
-    /// Its bytes.
     fn bytes(&self) -> Vec<u8>;
 
     /// Changes so far.

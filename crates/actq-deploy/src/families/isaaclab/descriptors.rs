@@ -32,7 +32,6 @@ pub(super) fn joints(yaml: &Document, asset: &str) -> Result<Joints> {
     Joints::new(yaml.texts(&path)?, yaml.location(&path))
 }
 
-/// Reads a file.
 pub(super) fn read(yaml: &Document, asset: &str, group: &str, joints: Joints) -> Result<Policy> {
     let rate = rate(yaml)?;
     let of_joints = |key: &str| {

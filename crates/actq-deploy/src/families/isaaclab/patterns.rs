@@ -42,7 +42,6 @@ impl Joints {
         self.names.len()
     }
 
-    /// Returns the joints at these places.
     pub(super) fn at(&self, places: &[usize]) -> Self {
         let names = places.iter().filter_map(|place| self.names.get(*place).cloned()).collect();
         Self { names, from: self.from.clone(), open: self.open }

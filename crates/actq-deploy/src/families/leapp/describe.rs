@@ -34,7 +34,6 @@ pub(super) struct Builder<'a> {
     orders: BTreeMap<Vec<String>, String>,
 }
 
-/// Makes the description.
 pub(super) fn describe(
     bundle: &Bundle,
     yaml: &Document,

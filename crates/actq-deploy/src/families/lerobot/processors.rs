@@ -15,7 +15,6 @@ use crate::yaml::Node;
 pub(super) const PROCESSORS: [&str; 2] = ["policy_preprocessor.json", "policy_postprocessor.json"];
 /// Their steps that normalize.
 const NORMALIZERS: [&str; 2] = ["normalizer_processor", "unnormalizer_processor"];
-/// File of the weights.
 const WEIGHTS: &str = "model.safetensors";
 /// Mode of a kind of features that no file names.
 const IDENTITY: &str = "IDENTITY";

@@ -15,7 +15,6 @@ fn kept_units(units: &Units, share: f64) -> usize {
 /// A graph that has lost units.
 #[derive(Clone, Debug)]
 pub(super) struct Cut {
-    /// The graph.
     pub(super) graph: Graph,
     /// Former rows and columns of every matrix.
     pub(super) rows: Vec<Vec<usize>>,

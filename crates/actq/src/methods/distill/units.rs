@@ -17,7 +17,6 @@ use crate::graph::{Graph, ValueId};
 pub(super) struct Units {
     /// Their group of the network's elements.
     pub(super) group: usize,
-    /// Number of units.
     pub(super) len: usize,
     /// Readers of their vectors; of a cell, its state comes first.
     pub(super) readers: Vec<Reading>,

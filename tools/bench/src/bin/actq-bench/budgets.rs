@@ -131,7 +131,6 @@ fn compare(budgets: &Budgets, measured: &Figures, rustc: &str) -> Vec<Excess> {
         .collect()
 }
 
-/// Measures all figures.
 fn measure() -> Result<Figures> {
     let counter = Counter::build()?;
     let mut figures = code()?;

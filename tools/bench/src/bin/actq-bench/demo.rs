@@ -123,7 +123,6 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
 }
 
 impl Trial<'_> {
-    /// Returns the image of this name.
     fn path(&self, image: &str) -> PathBuf {
         folder().join(format!("{} {image}.actq", self.name).to_lowercase().replace(' ', "-"))
     }

@@ -25,7 +25,6 @@ pub(super) struct Site {
 /// Columns of a matrix, with the elements of a value that they read.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Reading {
-    /// Index of the matrix.
     pub(super) matrix: usize,
     /// Element of the value that each column reads; `None` for a column that reads another value.
     pub(super) elements: Vec<Option<usize>>,
