@@ -30,6 +30,7 @@
 //! - `norm`: layer norm and RMS norm. `recurrent`: LSTM and GRU cells. `flow`: flow and diffusion policies.
 //! - `chunks`: action chunks of more than one action, with overlap and temporal ensemble.
 //! - `around`: the operations around a network (`docs/DEPLOY.md`): raw values in, targets out.
+//! - `attention`: attention, with a cache of keys and values.
 //!
 //! These make the code smaller when they are off; all are on by default. An image that needs one that the build leaves
 //! out does not compile in [`include_image!`], and is refused with [`ImageError::LeftOut`] at run time; `actq inspect`

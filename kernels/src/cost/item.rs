@@ -79,6 +79,22 @@ kinds! {
     }
 }
 kinds! {
+    /// Items of attention.
+    Attention {
+        Keep "keep: once"
+        KeptHead "keep: a head of a token"
+        KeptValue "keep: a value of a key or a value"
+        Attend "attend: once"
+        Head "attend: a head of a query"
+        QueryWord "attend: four columns of a query"
+        Output "attend: a value"
+        Score "attend: a token that a head of a query sees"
+        KeyWord "attend: four columns of a key"
+        ValueRow "attend: two columns of values"
+        ValueWord "attend: two columns of two values"
+    }
+}
+kinds! {
     /// Features of preparing a vector, for each layout.
     Prepare {
         Vector "a vector"
@@ -117,15 +133,18 @@ kinds! {
 const _: () = assert!(QUAD == 4 && STRIP == 8);
 
 const OPERATIONS: usize = SINGLES.len();
-const FUNCTIONS: usize = OPERATIONS + op::NAMES.len() * Operation::ALL.len();
+const FUNCTIONS: usize = OPERATIONS + BEFORE_ATTENTION * Operation::ALL.len();
+/// Operations before those of attention, whose items are last: without these, a program has fewer rates.
+const BEFORE_ATTENTION: usize = op::KEEP as usize - 1;
 const PREPARES: usize = FUNCTIONS + Function::ALL.len();
 const GEMVS: usize = PREPARES + LAYOUTS * Prepare::ALL.len();
+const ATTENTION: usize = GEMVS + LAYOUTS * Strips::ALL.len() * Gemv::ALL.len();
 /// Layouts, each with row scales and with group scales.
 const LAYOUTS: usize = Width::ALL.len() * Lanes::DSP.len() * Scales::ALL.len();
 
 impl CostItem {
     /// Number of items.
-    pub const COUNT: usize = GEMVS + LAYOUTS * Strips::ALL.len() * Gemv::ALL.len();
+    pub const COUNT: usize = ATTENTION + if cfg!(feature = "attention") { Attention::ALL.len() } else { 0 };
 
     /// Iterates over all items.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -144,6 +163,10 @@ impl CostItem {
 
     const fn of_code(code: u8, which: Operation) -> Self {
         Self((OPERATIONS + (code as usize).saturating_sub(1) * Operation::ALL.len() + which as usize) as u16)
+    }
+
+    pub(super) const fn attention(which: Attention) -> Self {
+        Self((ATTENTION + which as usize) as u16)
     }
 
     /// Returns the item of an element of a function.
@@ -197,10 +220,12 @@ impl CostItem {
         } else if i < GEMVS {
             let i = i - PREPARES;
             Kind::Prepare(layout(i / Prepare::ALL.len())?, Prepare::ALL.get(i % Prepare::ALL.len())?)
-        } else {
+        } else if i < ATTENTION {
             let (set, which) = ((i - GEMVS) / Gemv::ALL.len(), (i - GEMVS) % Gemv::ALL.len());
             let strips = Strips::ALL.get(set % Strips::ALL.len())?;
             Kind::Gemv(layout(set / Strips::ALL.len())?, strips, Gemv::ALL.get(which)?)
+        } else {
+            Kind::Attention(Attention::ALL.get(i - ATTENTION)?)
         })
     }
 }
@@ -221,6 +246,7 @@ enum Kind {
     Function(Function),
     Prepare(Layout, &'static (Prepare, &'static str)),
     Gemv(Layout, &'static (Strips, &'static str), &'static (Gemv, &'static str)),
+    Attention(&'static (Attention, &'static str)),
 }
 
 impl fmt::Debug for CostItem {
@@ -236,6 +262,7 @@ impl fmt::Debug for CostItem {
             Some(Kind::Gemv((width, lanes, (scales, _)), (strips, _), (which, _))) => {
                 write!(f, "CostItem::gemv({width:?}, {lanes:?}, {scales:?}, {strips:?}, Gemv::{which:?})")
             }
+            Some(Kind::Attention((which, _))) => write!(f, "CostItem::attention(Attention::{which:?})"),
             None => write!(f, "CostItem({})", self.0),
         }
     }
@@ -259,6 +286,7 @@ impl fmt::Display for CostItem {
                 layout(f, of)?;
                 write!(f, ", {strips}: {which}")
             }
+            Some(Kind::Attention((_, text))) => f.write_str(text),
             None => write!(f, "{self:?}"),
         }
     }

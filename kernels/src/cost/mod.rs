@@ -25,7 +25,7 @@ mod scalar;
 #[cfg(all(feature = "writer", feature = "scalar", feature = "helium"))]
 pub use self::cores::{CORES, Core, rates_of};
 pub use self::item::CostItem;
-use self::item::{Gemv, Prepare, Strips};
+use self::item::{Attention, Gemv, Prepare, Strips};
 use self::rates::RATES;
 use crate::activations::{Extent, Plan};
 use crate::image::op;
@@ -74,10 +74,14 @@ const fn column(which: usize) -> [u32; CostItem::COUNT] {
     let mut i = 0;
     while i < RATES.len() {
         let (item, rates, _) = RATES[i];
+        i += 1;
+        // A build without attention has none of its items.
+        if item.index() >= CostItem::COUNT {
+            continue;
+        }
         assert!(!rated[item.index()], "rates.rs has an item twice");
         rated[item.index()] = true;
         column[item.index()] = in_1024ths(rates[which]);
-        i += 1;
     }
     column
 }
@@ -229,6 +233,9 @@ pub fn items(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
 
 /// Counts the items of `len` values of an operation. (It takes all denoising steps to be like the first.)
 fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(CostItem, usize)) {
+    if cfg!(feature = "attention") && op.kind.is_attention() {
+        return heads(op, op.units(), true, add);
+    }
     add(values(op).1, len);
     rest(op.kind, len % EIGHT, add);
     if op.kind == OpKind::History {
@@ -239,6 +246,32 @@ fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(CostItem, usize)) {
         let ([sample_x, sample_v, _, _, _, sigma, _], _) = op.coefficients(0);
         add(CostItem::LIMITED, if [sample_x, sample_v] == [0.0; 2] { 0 } else { len });
         add(CostItem::NOISY, if sigma == 0.0 { 0 } else { len });
+    }
+}
+
+/// Counts the items of `units` heads of tokens. Of those that a query sees, `is_expected` takes all that a cache has room
+/// for, fewer if the queries are causal; otherwise, always all.
+fn heads(op: &Op<'_>, units: usize, is_expected: bool, add: &mut dyn FnMut(CostItem, usize)) {
+    let mut add = |which, count| add(CostItem::attention(which), count);
+    let cache = op.cache();
+    if op.kind == OpKind::Keep {
+        add(Attention::KeptHead, units);
+        return add(Attention::KeptValue, 2 * units * cache.dim);
+    }
+    add(Attention::Head, units);
+    add(Attention::QueryWord, units * cache.key_words());
+    add(Attention::Output, units * cache.dim);
+    add(Attention::ValueRow, units * cache.value_rows());
+    let of_tokens = |add: &mut dyn FnMut(Attention, usize), heads: usize, seen: usize| {
+        add(Attention::Score, heads * seen);
+        add(Attention::KeyWord, heads * seen * cache.key_words());
+        add(Attention::ValueWord, heads * cache.value_rows() * seen.div_ceil(2));
+    };
+    if op.is_causal() && is_expected {
+        let tokens = units.checked_div(op.query_heads()).unwrap_or(0);
+        (0..tokens).for_each(|later| of_tokens(&mut add, op.query_heads(), cache.slots.saturating_sub(later)));
+    } else {
+        of_tokens(&mut add, units, cache.slots);
     }
 }
 
@@ -273,6 +306,9 @@ pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
 
 /// Counts the items of one value of an operation, in the denoising step with the highest cost.
 pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
+    if cfg!(feature = "attention") && op.kind.is_attention() {
+        return heads(op, 1, false, add);
+    }
     add(values(op).1, 1);
     if op.kind == OpKind::History {
         // A frame may be one value long.
@@ -287,12 +323,24 @@ pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(CostItem, 
 /// Returns the item of an operation, the item of its values, and their number: 0 for a linear operation, whose
 /// parts are counted one by one.
 pub fn values(op: &Op<'_>) -> (CostItem, CostItem, usize) {
+    if cfg!(feature = "attention") && op.kind.is_attention() {
+        return attention(op);
+    }
     let values = match op.kind {
         OpKind::Linear { .. } => 0,
         OpKind::History => op.units(),
         _ => op.dst().len,
     };
     (CostItem::operation(op.code()), value(op.kind, op.code()), values)
+}
+
+/// Returns the items of an operation of attention, and the number of the values that it writes.
+fn attention(op: &Op<'_>) -> (CostItem, CostItem, usize) {
+    let (once, value, len) = match op.kind {
+        OpKind::Keep => (Attention::Keep, Attention::KeptValue, 2 * op.src().len),
+        _ => (Attention::Attend, Attention::Output, op.dst().len),
+    };
+    (CostItem::attention(once), CostItem::attention(value), len)
 }
 
 /// Returns the item of a value of an operation of this code.

@@ -1,5 +1,6 @@
 //! The check of an image: everything in it, once. `docs/FORMAT.md` has the list.
 
+use super::attention::{MAX_DIM, MAX_SLOTS};
 use super::contract::{ARRAY_BINARISE, CONTRACT_ARRAYS};
 use super::front::Front;
 use super::header::{self as h, Words};
@@ -264,6 +265,8 @@ impl<'a> Image<'a> {
             if i != 0 || self.first_denoising_op() == 0 {
                 return Err(ImageError::Denoising);
             }
+        } else if cfg!(feature = "attention") && op.kind.is_attention() {
+            self.check_attention(op, front)?;
         } else if let Some(kind) = op.kind.around() {
             check_around(kind, op, front)?;
         } else if *constants > 0 {
@@ -290,6 +293,43 @@ impl<'a> Image<'a> {
             return Err(ImageError::Arena);
         }
         Ok(written.max(dst.end()))
+    }
+
+    /// Checks an operation of attention: its sizes, and that the work area has room for a head.
+    #[inline(never)]
+    fn check_attention(&self, op: &Op<'_>, front: &mut Front<'a>) -> Result<(), ImageError> {
+        front.take(op.data(), usize::from(op.form.uses.constants))?;
+        let (cache, [dst, _, third]) = (op.cache(), op.regions);
+        let heads = if op.kind == OpKind::Attend { op.query_heads() } else { cache.heads };
+        if [heads, cache.heads, cache.dim, cache.slots].contains(&0) || !heads.is_multiple_of(cache.heads) {
+            return Err(ImageError::Shape);
+        }
+        if cache.dim > MAX_DIM || cache.slots > MAX_SLOTS {
+            return Err(ImageError::Overflow);
+        }
+        if op.kind == OpKind::Keep {
+            if op.half(3) > 1 {
+                return Err(ImageError::Reserved);
+            }
+            // What a ring has kept is zeroed by a reset.
+            let is_kept = !op.is_ring() || dst.end() <= self.state().end();
+            return match dst.len == cache.words() {
+                false => Err(ImageError::Shape),
+                true if is_kept => Ok(()),
+                true => Err(ImageError::Unwritten),
+            };
+        }
+        if op.half(4) > 1 || op.half(5) != 0 {
+            return Err(ImageError::Reserved);
+        }
+        let (token, most) = (heads * cache.dim, if op.is_causal() { cache.slots } else { dst.len });
+        if !dst.len.is_multiple_of(token) || dst.len > most.saturating_mul(token) || third.len > h::MAX_SCRATCH {
+            return Err(ImageError::Shape);
+        }
+        if !is_positive(op.score_factor()) {
+            return Err(ImageError::Constant);
+        }
+        if cache.work_words() > self.work().len { Err(ImageError::Arena) } else { Ok(()) }
     }
 
     /// Checks an operation that differs between denoising steps: it is one that these run, with constants for each.

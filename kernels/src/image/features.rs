@@ -34,8 +34,9 @@ const SCALAR: u8 = 2;
 const HELIUM: u8 = 3;
 
 /// The features in the order of Cargo.toml.
-const FEATURES: [Feature; 17] = features! {
+const FEATURES: [Feature; 18] = features! {
     "w2" "w3" "w4" "w8" "single" "paired" "groups" "elu" "silu" "functions" "norm" "recurrent" "flow" "chunks" "around"
+    "attention"
     "scalar" or "convert the image to the layouts of this core with `actq repack`"
     "helium" or "convert the image to the layouts of this core with `actq repack`"
 };
@@ -168,7 +169,7 @@ mod tests {
         }
         assert_eq!(refusal_of(needed(VALID), all), None);
         assert_eq!(refusal_of(all, all & !bit("around")), Some(FEATURES[14].refusal));
-        assert!(FEATURES[15..].iter().all(|feature| feature.refusal.contains("actq repack")));
+        assert!(FEATURES[16..].iter().all(|feature| feature.refusal.contains("actq repack")));
     }
 
     #[test]

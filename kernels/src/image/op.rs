@@ -64,6 +64,11 @@ pub enum OpKind {
     /// `dst` = frames of several steps, of which `src` is the newest; `third` keeps the others in a ring. Data: its
     /// sizes.
     History,
+    /// `dst`, a cache ([`crate::ops::attention`]), takes the keys in `src` and the values in `third`. Data: its sizes.
+    Keep,
+    /// `dst` = the outputs of attention of the queries in `src` to the cache in `third`. Data: its sizes, the factor of the
+    /// scores.
+    Attend,
 }
 
 /// An operation around a network ([`crate::ops::around`]): see [`OpKind`].
@@ -82,6 +87,12 @@ impl OpKind {
     /// Returns `true` if the operation differs between denoising steps.
     pub(super) fn is_of_step(self) -> bool {
         cfg!(feature = "flow") && matches!(self, Self::Table | Self::Denoise)
+    }
+
+    /// Returns `true` for an operation of attention ([`crate::ops::attention`]).
+    #[inline(always)]
+    pub(crate) fn is_attention(self) -> bool {
+        matches!(self, Self::Keep | Self::Attend)
     }
 
     /// Returns the operation around a network; `None` for all others, and in a build without these operations.
@@ -111,7 +122,9 @@ impl OpKind {
             | Self::Mul
             | Self::Noise
             | Self::Table
-            | Self::Denoise => return None,
+            | Self::Denoise
+            | Self::Keep
+            | Self::Attend => return None,
         })
     }
 
@@ -286,4 +299,8 @@ operations! {
     STANDSTILL = 19 "standstill": OpKind::Standstill, Uses { src: 1, third: 1, constants: 2, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
     /// [`OpKind::History`], whose data has the lengths of `src` and of the third region.
     HISTORY = 20 "history": OpKind::History, Uses { src: 1, third: 1, constants: 3, ..Uses::NONE }, if "around";
+    /// [`OpKind::Keep`], whose data has the lengths of `src` and of the third region.
+    KEEP = 21 "keep" "values": OpKind::Keep, Uses { src: 1, third: 1, constants: 2, ..Uses::NONE }, if "attention";
+    /// [`OpKind::Attend`], whose data has the length of the third region.
+    ATTEND = 22 "attend" "cache": OpKind::Attend, Uses { src: 1, third: 1, constants: 4, ..Uses::NONE }, if "attention";
 }

@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use super::header::{self as h, MATRIX_WORDS, OP_WORDS};
+use super::header::{self as h, MATRIX_WORDS, OP_WORDS, Words};
 use super::matrix::{Matrix, matrix};
 use super::op::{Around, FORMS, Form, IS_PARTIAL, NAMES, OpKind};
 use super::region::Region;
@@ -125,8 +125,12 @@ impl<'a> Op<'a> {
     }
 
     /// Returns the units that slices can cut the operation into: its elements, for each pass over them. A history also
-    /// keeps those of the new frame.
+    /// keeps those of the new frame. Attention is cut between the heads of tokens.
     pub(crate) fn units(&self) -> usize {
+        if cfg!(feature = "attention") && self.kind.is_attention() {
+            // At least one, which a damaged image does not have: it fails.
+            return self.src().len.checked_div(self.cache().dim).unwrap_or(0).max(1);
+        }
         let kept = if self.kind == OpKind::History { self.src().len } else { 0 };
         self.dst().len * usize::from(self.form.uses.passes) + kept
     }
@@ -144,7 +148,15 @@ impl<'a> Op<'a> {
 
     /// Returns `true` if the operation reads its destination.
     pub fn reads_dst(&self) -> bool {
-        self.form.uses.reads_dst || self.kind == OpKind::Linear { accumulate: true }
+        self.form.uses.reads_dst
+            || self.kind == OpKind::Linear { accumulate: true }
+            || cfg!(feature = "attention") && self.kind == OpKind::Keep && self.is_ring()
+    }
+
+    /// Returns the arena region of the work area.
+    pub(crate) fn work(&self) -> Region {
+        let header = self.image.first_chunk().map(Words);
+        header.map_or(Region::default(), |header| Region { offset: header.work(), len: header.work_len() })
     }
 
     pub(super) fn is_linear(&self) -> bool {
@@ -223,7 +235,14 @@ impl<'a> Image<'a> {
         };
         let dst = Region { offset: low(places), len };
         let src = Region { offset: high(places), len: src };
-        Ok(Op { kind, regions: [dst, src, third], record: op, form, image: self.words })
+        let mut op = Op { kind, regions: [dst, src, third], record: op, form, image: self.words };
+        if cfg!(feature = "attention") && kind.is_attention() {
+            let lengths = op.attention_lengths();
+            for (region, len) in op.regions.iter_mut().skip(1).zip(lengths) {
+                region.len = len;
+            }
+        }
+        Ok(op)
     }
 
     /// Iterates over the matrices in the order of their records, without biases.

@@ -1,6 +1,7 @@
 //! The operations of an image: each in its file, and here their list and the executor, which runs one of them.
 
 mod around;
+pub mod attention;
 pub mod cells;
 pub mod denoise;
 pub mod elementwise;
@@ -64,6 +65,10 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         denoise(&by, op.constant(0), v, z, x, y);
         return Ok(units.end == len);
     }
+    if cfg!(feature = "attention") && op.kind.is_attention() {
+        attention::run(op, arena, &units)?;
+        return Ok(units.end == len);
+    }
     if let Some(kind) = op.kind.around() {
         around::run(kind, op, arena, &units)?;
         return Ok(units.end == len);
@@ -113,8 +118,9 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
                 norm::layer_norm_units(done, moments, f(dst), first, second, constant);
             }
         }
-        // The match has no wildcard: it does not compile without an arm for every operation. `Linear`, `Denoise` and
-        // the operations around a network have returned above, and a checked image has none that the build leaves out.
+        // The match has no wildcard: it does not compile without an arm for every operation. `Linear`, `Denoise`,
+        // attention and the operations around a network have returned above, and a checked image has none that the
+        // build leaves out.
         OpKind::Linear { .. }
         | OpKind::Denoise
         | OpKind::LstmCell
@@ -125,7 +131,9 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         | OpKind::Initial
         | OpKind::TableRow
         | OpKind::Standstill
-        | OpKind::History => return Err(Fault::Damaged),
+        | OpKind::History
+        | OpKind::Keep
+        | OpKind::Attend => return Err(Fault::Damaged),
     }
     Ok(units.end == len)
 }

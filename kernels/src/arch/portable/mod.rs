@@ -1,5 +1,6 @@
 //! All kernels in Rust, for any target: the arithmetic of the assembler backends, operation for operation.
 
+mod attention;
 #[cfg(feature = "scalar")]
 mod bytes;
 mod cells;
@@ -14,6 +15,7 @@ mod vector;
 #[cfg(feature = "helium")]
 mod vectors;
 
+pub use attention::{query_keys, weigh_values};
 pub use cells::{gru_elements, lstm_elements};
 pub use elementwise::{denoise, normalize};
 pub use gemv::gemv;

@@ -123,7 +123,7 @@ fn table(rates: &BTreeMap<CostItem, Row>) -> String {
          //! most; for the cores of a writer expected instructions and cycles.\n\n\
          #[cfg(all(feature = \"writer\", feature = \"scalar\", feature = \"helium\"))]\n\
          use super::Core;\n\
-         use super::item::{{CostItem, Gemv, Prepare, Scales::*, Strips::*}};\n\
+         use super::item::{{Attention, CostItem, Gemv, Prepare, Scales::*, Strips::*}};\n\
          use crate::image::op;\n\
          use crate::layout::{{Lanes::*, Width::*}};\n\
          use crate::math::Function;\n\n\

@@ -1,0 +1,115 @@
+//! Sizes of a cache of keys and values, and where its parts are. `docs/FORMAT.md` has its content.
+
+use super::header::MAX_SCRATCH;
+use super::op::OpKind;
+use super::record::Op;
+use super::region::Region;
+
+/// Largest dimension of a head: 256 times a sum of products of int8 fits int32, `256 * 127 * 127 * 512 < 2^31`.
+pub const MAX_DIM: usize = 512;
+/// Most slots of a cache. The weights of its tokens add up to at most 32767 and half of each rounding, so 257 times a sum
+/// of their products with int8 fits int32, `257 * 127 * (32767 + 256) < 2^31`.
+pub const MAX_SLOTS: usize = 512;
+
+const _: () = assert!(256 * 127 * 127 * MAX_DIM < 1 << 31 && 257 * 127 * (32767 + MAX_SLOTS / 2) < 1 << 31);
+
+/// The sizes of a cache.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cache {
+    /// Heads of keys and values.
+    pub heads: usize,
+    /// Dimension of a head.
+    pub dim: usize,
+    /// Tokens that it has room for.
+    pub slots: usize,
+}
+
+impl Cache {
+    /// Returns the words of all: a count, the scales, keys and values. A product of sizes that are too large is longer
+    /// than an arena.
+    pub const fn words(self) -> usize {
+        let keys = self.slots.saturating_mul(2 + self.key_words());
+        let values = self.value_rows().saturating_mul(self.row_words());
+        1 + product([self.heads, keys.saturating_add(values), 1])
+    }
+
+    /// Returns the words of the work area that a head of a query needs: its scores and its integers.
+    pub const fn work_words(self) -> usize {
+        self.slots + 2 * self.key_words()
+    }
+
+    /// Returns the words of a key: four columns each.
+    pub const fn key_words(self) -> usize {
+        self.dim.div_ceil(4)
+    }
+
+    /// Returns the rows of a head's values: two columns each.
+    pub const fn value_rows(self) -> usize {
+        self.dim.div_ceil(2)
+    }
+
+    /// Returns the words of a row of the values: two tokens each.
+    pub const fn row_words(self) -> usize {
+        self.slots.div_ceil(2)
+    }
+
+    /// Returns the parts of a head, as regions of the cache: the scales of its keys and of its values, keys and values.
+    /// Their offsets wrap for a head that the cache does not have.
+    pub(crate) fn parts(self, head: usize) -> ([Region; 3], Region) {
+        let values = self.value_rows() * self.row_words();
+        let mut before = 1usize;
+        let [key_scales, value_scales, keys, values] = [self.slots, self.slots, self.slots * self.key_words(), values]
+            .map(|len| {
+                let offset = before.wrapping_add(head.wrapping_mul(len));
+                before = before.wrapping_add(self.heads.wrapping_mul(len));
+                Region { offset, len }
+            });
+        ([key_scales, value_scales, keys], values)
+    }
+}
+
+/// Returns the product of sizes, or a number of words that no arena has.
+pub(super) const fn product(sizes: [usize; 3]) -> usize {
+    let [a, b, c] = sizes;
+    let product = a.saturating_mul(b).saturating_mul(c);
+    if product > MAX_SCRATCH { MAX_SCRATCH + 1 } else { product }
+}
+
+impl Op<'_> {
+    /// Returns the cache of an operation of attention.
+    pub(crate) fn cache(&self) -> Cache {
+        let first = usize::from(self.kind == OpKind::Attend);
+        let [heads, dim, slots] = [0, 1, 2].map(|i| self.half(first + i));
+        Cache { heads, dim, slots }
+    }
+
+    /// Returns the heads of the queries.
+    pub(crate) fn query_heads(&self) -> usize {
+        self.half(0)
+    }
+
+    /// Returns the factor of the scores.
+    pub(crate) fn score_factor(&self) -> f32 {
+        self.constant(3)
+    }
+
+    /// Returns `true` if a step keeps one token, after those of earlier steps.
+    pub(crate) fn is_ring(&self) -> bool {
+        self.half(3) & 1 != 0
+    }
+
+    /// Returns `true` if a query does not see the tokens after its own.
+    pub(crate) fn is_causal(&self) -> bool {
+        self.half(4) & 1 != 0
+    }
+
+    /// Returns the lengths of `src` and of the third region.
+    pub(super) fn attention_lengths(&self) -> [usize; 2] {
+        let cache = self.cache();
+        if self.kind == OpKind::Attend {
+            return [self.dst().len, cache.words().min(MAX_SCRATCH + 1)];
+        }
+        let tokens = if self.is_ring() { 1 } else { cache.slots };
+        [product([tokens, cache.heads, cache.dim]); 2]
+    }
+}

@@ -1,0 +1,231 @@
+//! Attention in integers: `keep` writes keys and values to a cache, and `attend` computes the outputs of queries.
+//!
+//! For each head of a query, with the head of keys and values that it shares (`docs/FORMAT.md` has the cache):
+//!
+//! 1. The query becomes int8 integers `q` with their own scale, as keys and values did.
+//! 2. `score_j = (sum_i q_i * k_ji) * ((factor * q_scale) * k_scale_j)` for each token j that the query sees.
+//! 3. `e_j = exp(score_j - max)`, `z = sum_j e_j`, `w_j = e_j * v_scale_j`, `total = sum_j w_j`, in the order of the slots.
+//! 4. `p_j = round(w_j * (32767 / total))`, and `y_i = (sum_j p_j * v_ji) * ((total / 32767) / z)`.
+//!
+//! Sums of products are exact; all else is f32, rounded after each operation. A key, value, query, score or total that is
+//! not finite fails the step, so a cache holds only finite numbers.
+
+use core::ops::Range;
+
+use crate::activations::Scale;
+use crate::arch::{query_keys, weigh_values};
+use crate::arena::regions;
+use crate::error::Fault;
+use crate::image::{Cache, Op, OpKind, Region};
+use crate::math::{Native, Real, exp};
+
+/// Largest integer of a key, a value or a query.
+const MAX: u16 = 127;
+/// Sum of a query's weights.
+const TOTAL: u16 = 32767;
+
+/// Returns the words of a cache of `slots` tokens with `kv_heads` heads of dimension `dim`; more than an arena has if
+/// a size is too large.
+pub const fn cache_words(kv_heads: usize, dim: usize, slots: usize) -> usize {
+    Cache { heads: kv_heads, dim, slots }.words()
+}
+
+/// Returns the words of the work area that attending to such a cache needs.
+pub const fn work_words(dim: usize, slots: usize) -> usize {
+    Cache { heads: 1, dim, slots }.work_words()
+}
+
+/// Runs a range of an operation's units: a token's head each.
+///
+/// # Errors
+///
+/// [`Fault::NotFinite`] as above, or if a query sees no token. [`Fault::Damaged`] if the image does not have the
+/// operation's regions or data.
+#[inline(never)]
+pub(super) fn run(op: &Op<'_>, arena: &mut [u32], units: &Range<usize>) -> Result<(), Fault> {
+    let f = bytemuck::must_cast_slice_mut::<u32, f32>;
+    if op.kind == OpKind::Keep {
+        let [cache, keys, values, _] = regions(arena, &op.regions, Region::default());
+        return keep(op, units, cache, f(keys), f(values));
+    }
+    let [dst, src, cache, work] = regions(arena, &op.regions, op.work());
+    attend(op, units, f(dst), f(src), cache, work)
+}
+
+fn keep(op: &Op<'_>, units: &Range<usize>, cache: &mut [u32], keys: &[f32], values: &[f32]) -> Result<(), Fault> {
+    let (shape, count) = (op.cache(), *cache.first().ok_or(Fault::Damaged)?);
+    for unit in units.clone() {
+        let token = unit.checked_div(shape.heads).ok_or(Fault::Damaged)?;
+        let slot = if op.is_ring() { (count as usize).checked_rem(shape.slots) } else { Some(token) };
+        let (scales_and_keys, values_part) = shape.parts(unit - token * shape.heads);
+        let [key_scales, value_scales, kept_keys, kept_values] = regions(cache, &scales_and_keys, values_part);
+        let slot = slot.ok_or(Fault::Damaged)?;
+        let key = Integers::of(vector(keys, unit, shape.dim)?, key_scales.get_mut(slot))?;
+        let words = slot * shape.key_words()..(slot + 1) * shape.key_words();
+        for (i, word) in kept_keys.get_mut(words).ok_or(Fault::Damaged)?.iter_mut().enumerate() {
+            *word = key.pair(2 * i) | key.pair(2 * i + 1) << 16;
+        }
+        let value = Integers::of(vector(values, unit, shape.dim)?, value_scales.get_mut(slot))?;
+        for (i, row) in kept_values.chunks_mut(shape.row_words().max(1)).enumerate() {
+            let (word, shift) = (row.get_mut(slot / 2).ok_or(Fault::Damaged)?, 16 * (slot % 2));
+            *word = *word & !(0xffff << shift) | value.pair(i) << shift;
+        }
+    }
+    if units.end == op.units() {
+        // A ring counts on from the slots when it reaches twice as many. A caller may have written any count.
+        let (slots, next) = (shape.slots as u32, count.saturating_add(1));
+        let next = if op.is_ring() && next < 2 * slots { next } else { slots };
+        *cache.first_mut().ok_or(Fault::Damaged)? = next;
+    }
+    Ok(())
+}
+
+fn attend(
+    op: &Op<'_>,
+    units: &Range<usize>,
+    outputs: &mut [f32],
+    queries: &[f32],
+    cache: &mut [u32],
+    work: &mut [u32],
+) -> Result<(), Fault> {
+    let (shape, heads) = (op.cache(), op.query_heads());
+    let kept = (*cache.first().ok_or(Fault::Damaged)? as usize).min(shape.slots);
+    let last = op.units().checked_div(heads).ok_or(Fault::Damaged)?;
+    for unit in units.clone() {
+        let token = unit.checked_div(heads).ok_or(Fault::Damaged)?;
+        let seen = if op.is_causal() { kept.saturating_sub(last.saturating_sub(1 + token)) } else { kept };
+        let shared = (unit - token * heads).checked_div(heads / shape.heads.max(1)).ok_or(Fault::Damaged)?;
+        let (scales_and_keys, values_part) = shape.parts(shared);
+        let head = regions(cache, &scales_and_keys, values_part).map(|part| &*part);
+        let [scores, query] = split(work, seen, 2 * shape.key_words())?;
+        let y = outputs.get_mut(unit * shape.dim..(unit + 1) * shape.dim).ok_or(Fault::Damaged)?;
+        attend_head(shape, op.score_factor(), vector(queries, unit, shape.dim)?, head, scores, query, y)?;
+    }
+    Ok(())
+}
+
+/// Computes the output `y` of a head of a query `x`, from the parts of the cache's head ([`Cache::parts`]): of the tokens
+/// in its first slots, as many as `scores` has.
+#[inline(never)]
+fn attend_head(
+    shape: Cache,
+    factor: f32,
+    x: &[f32],
+    [key_scales, value_scales, keys, values]: [&[u32]; 4],
+    scores: &mut [u32],
+    query: &mut [u32],
+    y: &mut [f32],
+) -> Result<(), Fault> {
+    let mut scale = 0;
+    let x = Integers::of(x, Some(&mut scale))?;
+    for (i, [odd, even]) in query.as_chunks_mut().0.iter_mut().enumerate() {
+        [*odd, *even] = x.factors(4 * i);
+    }
+    query_keys(keys, query, scores);
+    scale_scores(factor, f32::from_bits(scale), key_scales, scores)?;
+    let sum = softmax(value_scales, scores);
+    let total = Scale::of_magnitude(scores.iter().fold(Native::of(0.0), add).get().to_bits(), TOTAL)?;
+    let pairs = to_pairs(total, scores);
+    let weights = scores.get(..pairs).ok_or(Fault::Damaged)?;
+    weigh_values(values, shape.row_words(), weights, bytemuck::must_cast_slice_mut(y));
+    let scale = (Native::of(total.get()) / Native::of(sum)).get();
+    for y in y {
+        *y = scaled(y.to_bits(), scale);
+    }
+    Ok(())
+}
+
+fn add(sum: Native, bits: &u32) -> Native {
+    sum + Native::of(f32::from_bits(*bits))
+}
+
+/// Returns a sum of products times its scale. All sums are below 2^24, and so exact in f32.
+fn scaled(sum: u32, scale: f32) -> f32 {
+    (Native::of(sum as i32 as f32) * Native::of(scale)).get()
+}
+
+/// Converts sums of products to the bits of scores.
+fn scale_scores(factor: f32, query_scale: f32, key_scales: &[u32], scores: &mut [u32]) -> Result<(), Fault> {
+    let scale = Native::of(factor) * Native::of(query_scale);
+    let mut is_finite = !scores.is_empty();
+    for (score, key_scale) in scores.iter_mut().zip(key_scales) {
+        let key_scale = Native::of(f32::from_bits(*key_scale));
+        let scaled = scaled(*score, (scale * key_scale).get());
+        is_finite &= scaled.is_finite();
+        *score = scaled.to_bits();
+    }
+    if is_finite { Ok(()) } else { Err(Fault::NotFinite) }
+}
+
+/// Converts finite scores to the tokens' weights, before rounding, and returns the sum of the exponentials.
+fn softmax(value_scales: &[u32], scores: &mut [u32]) -> f32 {
+    let max = scores.iter().fold(f32::NEG_INFINITY, |max, bits| {
+        let score = f32::from_bits(*bits);
+        if score > max { score } else { max }
+    });
+    let mut sum = Native::of(0.0);
+    for (score, value_scale) in scores.iter_mut().zip(value_scales) {
+        let power = exp(Native::of(f32::from_bits(*score)) - Native::of(max));
+        sum = sum + power;
+        *score = (power * Native::of(f32::from_bits(*value_scale))).get().to_bits();
+    }
+    sum.get()
+}
+
+/// Rounds weights, and packs two a word, to the start of the same words; returns the number of packed words.
+fn to_pairs(scale: Scale, weights: &mut [u32]) -> usize {
+    let rounded =
+        |bits: Option<&u32>| bits.map_or(0, |bits| Native::of(f32::from_bits(*bits)).rounded(scale.inverse()) & 0xffff);
+    let pairs = weights.len().div_ceil(2);
+    for i in 0..pairs {
+        let pair = rounded(weights.get(2 * i)) | rounded(weights.get(2 * i + 1)) << 16;
+        if let Some(word) = weights.get_mut(i) {
+            *word = pair;
+        }
+    }
+    pairs
+}
+
+/// A head's vector in integers.
+struct Integers<'x> {
+    x: &'x [f32],
+    inverse: f32,
+}
+
+impl<'x> Integers<'x> {
+    /// Finds the scale of a vector, and writes its bits to `scale`.
+    fn of(x: &'x [f32], scale: Option<&mut u32>) -> Result<Self, Fault> {
+        let found = Scale::new(x, MAX)?;
+        *scale.ok_or(Fault::Damaged)? = found.get().to_bits();
+        Ok(Self { x, inverse: found.inverse() })
+    }
+
+    /// Returns the integer of a column; 0 after the last.
+    fn column(&self, i: usize) -> i32 {
+        self.x.get(i).map_or(0, |x| i32::from(Native::of(*x).rounded(self.inverse) as i16))
+    }
+
+    /// Returns columns `2 i` and `2 i + 1` in 16 bits: `even + 256 odd`.
+    fn pair(&self, i: usize) -> u32 {
+        (self.column(2 * i) + 256 * self.column(2 * i + 1)) as u32 & 0xffff
+    }
+
+    /// Returns what four columns of a key from column `i` on are multiplied with: their pairs with the first word, and
+    /// the even columns of the pairs with the second.
+    fn factors(&self, i: usize) -> [u32; 2] {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|next| self.column(i + next));
+        let lanes = |low: i32, high: i32| low as u32 & 0xffff | (high as u32) << 16;
+        [lanes(b, d), lanes(256 * a - b, 256 * c - d)]
+    }
+}
+
+/// Returns the vector of a unit.
+fn vector(all: &[f32], unit: usize, dim: usize) -> Result<&[f32], Fault> {
+    all.get(unit * dim..(unit + 1) * dim).ok_or(Fault::Damaged)
+}
+
+/// Splits the work area in two parts of these lengths.
+fn split(work: &mut [u32], first: usize, second: usize) -> Result<[&mut [u32]; 2], Fault> {
+    let (first, rest) = work.split_at_mut_checked(first).ok_or(Fault::Damaged)?;
+    Ok([first, rest.get_mut(..second).ok_or(Fault::Damaged)?])
+}

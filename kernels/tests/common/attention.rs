@@ -1,0 +1,122 @@
+//! Images of one attention, without a matrix: queries, keys and values are the observation, the outputs are the action.
+#![allow(dead_code, reason = "each test uses some of it")]
+#![expect(clippy::expect_used, reason = "a test")]
+
+use actq_kernels::image::{Cache, Header, Kind, OpKind, OpRecord, Records, Region, header as h, seal};
+use actq_kernels::{Head, Image};
+use actq_testkit::Random;
+
+/// An attention of a step's queries, keys and values.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Attention {
+    /// Heads of the queries, a multiple of the cache's.
+    pub(crate) heads: usize,
+    pub(crate) cache: Cache,
+    /// Tokens of the queries.
+    pub(crate) tokens: usize,
+    /// One token of keys and values a step; else all slots in each.
+    pub(crate) is_ring: bool,
+    pub(crate) is_causal: bool,
+    pub(crate) factor: f32,
+}
+
+impl Attention {
+    /// Draws a small attention.
+    pub(crate) fn draw(random: &mut Random) -> Self {
+        let (groups, sharing) = (1 + random.below(4), 1 + random.below(4));
+        let cache = Cache { heads: groups, dim: 1 + random.below(20), slots: 1 + random.below(24) };
+        let is_ring = random.below(2) == 0;
+        let tokens = if is_ring { 1 } else { 1 + random.below(cache.slots) };
+        let factor = 1.0 / (cache.dim as f32).sqrt();
+        Self { heads: groups * sharing, cache, tokens, is_ring, is_causal: random.below(2) == 0, factor }
+    }
+
+    /// Returns the lengths of queries, keys and values.
+    pub(crate) fn lengths(&self) -> [usize; 3] {
+        let kept = if self.is_ring { 1 } else { self.cache.slots } * self.cache.heads * self.cache.dim;
+        [self.tokens * self.heads * self.cache.dim, kept, kept]
+    }
+
+    /// Returns the image. Its self-test is one step.
+    pub(crate) fn image(&self) -> Vec<u32> {
+        let [queries, keys, values] = self.lengths();
+        let cache = self.cache.words();
+        let state = if self.is_ring { cache } else { 0 };
+        let observed = state + queries + keys + values;
+        let (cache, output) = match self.is_ring {
+            true => (Region { offset: 0, len: cache }, observed),
+            false => (Region { offset: observed, len: cache }, observed + cache),
+        };
+        let output = Region { offset: output, len: queries };
+        let action = output.offset + output.len;
+        let work = Region { offset: action + queries, len: self.cache.work_words() };
+        let pair = |low: usize, high: usize| (low | high << 16) as u32;
+        let Cache { heads, dim, slots } = self.cache;
+        let flag = |flag: bool| usize::from(flag);
+        let mut words = vec![0; h::WORDS];
+        words.extend([pair(heads, dim), pair(slots, flag(self.is_ring))]);
+        words.extend([pair(self.heads, heads), pair(dim, slots), pair(flag(self.is_causal), 0), self.factor.to_bits()]);
+        let ops = words.len();
+        let [keep, attend] = [h::WORDS as u32, h::WORDS as u32 + 2];
+        let (src, third) = (state + queries, state + queries + keys);
+        let keep = OpRecord { kind: OpKind::Keep, dst: cache, src, third, bias: 0, data: keep };
+        let attend =
+            OpRecord { kind: OpKind::Attend, dst: output, src: state, third: cache.offset, bias: 0, data: attend };
+        for record in [keep, attend] {
+            words.extend(record.emit().expect("small sizes"));
+        }
+        let end = words.len() as u32;
+        words.push(u32::from_le_bytes(*b"heed"));
+        words.extend(vec![0; observed - state + queries]);
+        let header = Header {
+            kind: Kind::Step,
+            has_ports: false,
+            obs_len: observed - state,
+            act_len: queries,
+            chunk: 1,
+            execute: 1,
+            horizon: 0,
+            overlap: 0,
+            deadline: 0,
+            rate_hz: 50.0,
+            scratch: work.offset + work.len,
+            state: Region { offset: 0, len: state },
+            observation: state,
+            output: output.offset,
+            action,
+            work,
+            matrices: Records { offset: h::WORDS as u32, count: 0 },
+            ops: Records { offset: ops as u32, count: 2 },
+            first_denoising_op: 0,
+            denoising_steps: 0,
+            contract: end,
+            contract_flags: 0,
+            name: Records { offset: end, count: 4 },
+            self_test: Records { offset: end + 1, count: 1 },
+            weights: 0,
+            digest: [0; 32],
+        };
+        words[..h::WORDS].copy_from_slice(&header.emit().expect("small sizes"));
+        words.iter_mut().for_each(|word| *word = word.to_le());
+        let mut random = Random::new(5);
+        let observation: Vec<f32> = (0..header.obs_len).map(|_| random.unit()).collect();
+        let start = end as usize + 1;
+        for (word, x) in words[start..].iter_mut().zip(&observation) {
+            *word = x.to_bits().to_le();
+        }
+        seal(bytemuck::cast_slice_mut(&mut words)).expect("the length fits");
+        let action = on_head(&words, |head| head.step(&observation).expect("all is finite").to_vec());
+        for (word, x) in words[start + observation.len()..].iter_mut().zip(action) {
+            *word = x.to_bits().to_le();
+        }
+        seal(bytemuck::cast_slice_mut(&mut words)).expect("the length fits");
+        words
+    }
+}
+
+/// Runs `work` with a head of the image.
+pub(crate) fn on_head<T>(words: &[u32], work: impl FnOnce(&mut Head<'_, '_>) -> T) -> T {
+    let image = Image::new_checked(bytemuck::cast_slice(words)).expect("the image is valid");
+    let mut scratch = vec![0; image.scratch_words()];
+    work(&mut Head::new(image, &mut scratch).expect("enough memory"))
+}
