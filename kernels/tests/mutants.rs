@@ -3,14 +3,17 @@
 //! either, nor one that passes only `Image::new_checksummed`. The tests need only this crate, so that they also run
 //! with words of 32 bits and in Miri.
 
+#[path = "common/attention.rs"]
+mod attention;
 #[path = "common/draft.rs"]
 mod draft;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use actq_kernels::image::{header as h, op};
+use actq_kernels::image::{Cache, header as h, op};
 use actq_kernels::{Head, Image, StepError};
 use actq_testkit::Random;
+use attention::Attention;
 use draft::Draft;
 
 /// Mutations in each test.
@@ -19,9 +22,17 @@ const CASES: u64 = if cfg!(miri) { 20 } else { 20_000 };
 /// An image with every kind of section. A test in `host-tests/tests` writes the same bytes.
 const VALID: &[u8] = include_bytes!("valid.actq");
 
-/// Returns the words with the image's structure: header, operation, matrix and block records.
-fn structure() -> Vec<usize> {
-    let draft = Draft::of(VALID);
+/// Returns the valid images: that of all sections, and attention to a ring and to all tokens of a step.
+fn valid() -> Vec<Draft> {
+    let cache = Cache { heads: 2, dim: 6, slots: 4 };
+    let ring = Attention { heads: 4, cache, tokens: 1, is_ring: true, is_causal: false, factor: 0.4 };
+    let whole = Attention { tokens: 3, is_ring: false, is_causal: true, ..ring };
+    let attentions = [ring, whole].map(|attention| Draft(attention.image()));
+    [Draft::of(VALID)].into_iter().chain(attentions.into_iter().filter(|_| cfg!(feature = "attention"))).collect()
+}
+
+/// Returns the words with the image's structure: header, operation, matrix and block records, sizes of attention.
+fn structure(draft: &Draft) -> Vec<usize> {
     let (first, count) = (draft.offset(h::W_OPS), draft.high(h::W_KIND) as usize);
     let ops = first..first + count * h::OP_WORDS;
     let linear = ops.clone().step_by(h::OP_WORDS).filter(|at| draft.get(*at) as u8 == op::LINEAR);
@@ -31,7 +42,10 @@ fn structure() -> Vec<usize> {
         (at..at + h::MATRIX_WORDS).chain(blocks..blocks + count * h::BLOCK_WORDS)
     };
     let header = (h::W_KIND..h::W_DIGEST).chain(h::W_MATRICES..h::WORDS);
-    header.chain(ops).chain(linear.flat_map(matrix)).collect()
+    let is_attention = |at: &usize| [op::KEEP, op::ATTEND].contains(&(draft.get(*at) as u8));
+    let sizes = ops.clone().step_by(h::OP_WORDS).filter(is_attention).flat_map(|at| (0..4).map(move |i| (at, i)));
+    let sizes = sizes.map(|(at, i)| draft.offset(at + 3) + i);
+    header.chain(ops.clone()).chain(linear.flat_map(matrix)).chain(sizes).collect()
 }
 
 /// Changes up to three words at random, mostly words of the structure.
@@ -57,10 +71,12 @@ fn mutate(random: &mut Random, draft: &mut Draft, structure: &[usize]) {
 
 /// Returns the mutations of a test: the number of the case, its random numbers, and the image.
 fn mutations() -> impl Iterator<Item = (u64, Random, Draft)> {
-    let structure = structure();
+    let valid: Vec<_> = valid().into_iter().map(|draft| (structure(&draft), draft)).collect();
     (0..CASES).map(move |case| {
-        let (mut random, mut draft) = (Random::new(case), Draft::of(VALID));
-        mutate(&mut random, &mut draft, &structure);
+        // Every other case is of the first.
+        let (structure, draft) = &valid[if case % 2 == 0 { 0 } else { case as usize / 2 % valid.len() }];
+        let (mut random, mut draft) = (Random::new(case), draft.clone());
+        mutate(&mut random, &mut draft, structure);
         (case, random, draft)
     })
 }
@@ -140,7 +156,7 @@ fn a_reset_clears_everything() {
 
 #[test]
 fn damage_after_the_check_does_not_panic() {
-    let scratch = Draft::of(VALID).get(h::W_SCRATCH);
+    let scratch = valid().iter().map(|draft| draft.get(h::W_SCRATCH)).max().expect("there are images");
     let mut outcomes = [0; 2];
     for (case, _, mut draft) in mutations() {
         // The head's memory stays as the header had it.
