@@ -14,11 +14,14 @@ use actq_bench::networks::{Builder, Draw};
 use actq_bench::root;
 use actq_kernels::Width;
 use actq_kernels::math::Function;
+use actq_testkit::Random;
 use anyhow::{Result, ensure};
 use tempfile::TempDir;
 
+use crate::attention::Attention;
 use crate::denoising;
 use crate::deployed::Made;
+use crate::draft::Draft;
 
 /// Compiles a program that includes `policy.actq` of its folder, with these features of the kernels.
 fn compile(folder: &Path, features: &BTreeSet<&str>) -> Result<Output> {
@@ -53,6 +56,7 @@ fn images_without_their_features_do_not_compile() -> Result<()> {
         fs::read(root().join("kernels/tests/valid.actq"))?,
         emit::image(&policy, &outcomes)?,
         Made::deployment()?.1.four_bits()?,
+        Draft(Attention::draw(&mut Random::new(1)).image()).bytes().to_vec(),
     ];
     images.extend(denoising::images()?.first().map(|image| image.bytes().to_vec()));
     let mut tried = BTreeSet::new();
@@ -74,7 +78,7 @@ fn images_without_their_features_do_not_compile() -> Result<()> {
             ensure!(!output.status.success() && is_named, "without {feature}: {message}");
         }
     }
-    let all = "w2 w3 w4 w8 single paired groups elu silu functions norm recurrent flow chunks around";
+    let all = "w2 w3 w4 w8 single paired groups elu silu functions norm recurrent flow chunks around attention";
     ensure!(tried.len() == all.split(' ').count(), "not tried: all of {all} but {tried:?}");
     Ok(())
 }

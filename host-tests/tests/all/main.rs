@@ -1,6 +1,8 @@
 //! The tests of more than one crate: one binary, so that cargo links one, and the tests share their builds.
 
 mod accuracy;
+#[path = "../../../kernels/tests/common/attention.rs"]
+mod attention;
 mod budgets;
 mod c_ports;
 mod cli;

@@ -2,6 +2,7 @@
 //! `cargo verify` runs only those of [`crate::smoke`].
 
 pub(crate) mod application;
+mod attention;
 mod c;
 mod compact;
 mod cost;

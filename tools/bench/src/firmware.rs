@@ -63,19 +63,28 @@ fn build_once(key: Key, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathB
 /// Builds the harness, which serves an image through semihosting, with the same built-in image in all runs, and returns
 /// the path of the ELF file. Other images run from the slot.
 pub fn harness(target: Target) -> Result<PathBuf> {
-    let build = || harness_in_folder(target, built_in()?);
+    let build = || harness_in_folder(target, "", built_in()?);
     Ok(build_once((BENCH, HARNESS, "", target), build)?.join(HARNESS))
+}
+
+/// Does the same as [`harness`] with attention, which the other harness does not have: so it takes no instruction there.
+pub fn attention_harness(target: Target) -> Result<PathBuf> {
+    let feature = "attention";
+    let build = || harness_in_folder(target, feature, built_in()?);
+    Ok(build_once((BENCH, HARNESS, feature, target), build)?.join(HARNESS))
 }
 
 /// Builds the harness with `image` built in.
 pub fn harness_with(target: Target, image: &Path) -> Result<PathBuf> {
-    Ok(harness_in_folder(target, image)?.join(HARNESS))
+    Ok(harness_in_folder(target, "", image)?.join(HARNESS))
 }
 
-fn harness_in_folder(target: Target, image: &Path) -> Result<PathBuf> {
+fn harness_in_folder(target: Target, feature: &str, image: &Path) -> Result<PathBuf> {
     let image = fs::canonicalize(image).with_context(|| format!("cannot read {}", image.display()))?;
     let image = ("ACTQ_IMAGE", &*image.to_string_lossy());
-    build(BENCH, &[HARNESS], target.feature().unwrap_or_default(), target, target.profile(), &[image])
+    let features: Vec<_> =
+        target.feature().into_iter().chain(Some(feature).filter(|feature| !feature.is_empty())).collect();
+    build(BENCH, &[HARNESS], &features.join(","), target, target.profile(), &[image])
 }
 
 /// Builds the application for a target's board, with the image of [`harness`] and with more features, separated by

@@ -14,6 +14,9 @@ use clap::Args;
 use crate::setup::{self, cargo};
 use crate::{PROFILE, limits};
 
+/// Features of the kernels that the application has only for an image that needs them.
+const OPTIONAL: [&str; 2] = ["around", "attention"];
+
 /// The request.
 #[derive(Args, Debug, Default)]
 pub(crate) struct Options {
@@ -68,8 +71,8 @@ impl Options {
         let check = |image: &Path| check(image, &limits, tick_hz(is_fast), application, target);
         let given = image.as_deref().map(check).transpose()?;
         setup::rust_target(target.triple())?;
-        let (image, has_around) = given.map_or_else(|| check(&example()?), Ok)?;
-        let features = [features.as_deref(), has_around.then_some("around")];
+        let (image, needed) = given.map_or_else(|| check(&example()?), Ok)?;
+        let features = [features.as_deref(), needed.as_deref()];
         let elf = build(target, &image, &limits, &features, key.as_deref())?;
         write(&out, &elf)?;
         println!("{}: {} with {}", out.display(), target.board().name, image.display());
@@ -97,9 +100,15 @@ fn check_out(out: &Path, image: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// Returns the whole path of an image that the board's application runs with these limits and ticks, and whether it has
-/// operations around its network; an error tells why the application does not run it.
-fn check(path: &Path, limits: &[Limits], hz: u32, application: Application, target: Target) -> Result<(PathBuf, bool)> {
+/// Returns the whole path of an image that the board's application runs with these limits and ticks, and the features that
+/// the application needs for it; an error tells why the application does not run it.
+fn check(
+    path: &Path,
+    limits: &[Limits],
+    hz: u32,
+    application: Application,
+    target: Target,
+) -> Result<(PathBuf, Option<String>)> {
     let bytes = fs::read(path).with_context(|| format!("cannot read the image {}", path.display()))?;
     // Words, because an image must be aligned to 4 bytes.
     let mut words = vec![0u32; bytes.len().div_ceil(4)];
@@ -122,7 +131,9 @@ fn check(path: &Path, limits: &[Limits], hz: u32, application: Application, targ
             still.join(", ")
         );
     }
-    Ok((fs::canonicalize(path).with_context(|| path.display().to_string())?, image.has_around()))
+    let needed: Vec<_> = image.features().filter(|feature| OPTIONAL.contains(feature)).collect();
+    let needed = (!needed.is_empty()).then(|| needed.join(","));
+    Ok((fs::canonicalize(path).with_context(|| path.display().to_string())?, needed))
 }
 
 /// Makes the image of the UR3 policy: rounded, which takes a second.

@@ -1,0 +1,61 @@
+//! Attention on every core: the host's bits, and the predicted cost.
+
+use actq::runtime::{ImageBuffer, with_head};
+use actq_bench::profile::Harness;
+use actq_bench::{Target, bits, firmware};
+use actq_kernels::cost::{Core, Rates};
+use actq_kernels::image::Cache;
+use actq_testkit::Random;
+use anyhow::{Result, ensure};
+
+use crate::attention::Attention;
+use crate::draft::Draft;
+
+/// Largest relative error of a predicted step.
+const ERROR: f64 = 0.01;
+
+fn harness(target: Target) -> Result<Harness> {
+    Harness::of(target, firmware::attention_harness(target)?)
+}
+
+/// Returns observations for a ring that wraps around, some of them large or zero.
+fn observations(attention: &Attention, random: &mut Random) -> Vec<Vec<f32>> {
+    let len: usize = attention.lengths().iter().sum();
+    let steps = if attention.is_ring { attention.cache.slots + 3 } else { 3 };
+    let mut of_size = |size: f32| (0..len).map(|_| size * random.unit()).collect();
+    (0..steps).map(|step| of_size([1.0, 30.0, 1e-20, 0.0][step % 4])).collect()
+}
+
+/// Attentions of every kind: heads that share, columns and slots that are not multiples of a word's.
+fn attentions() -> Vec<Attention> {
+    let mut random = Random::new(11);
+    let cache = Cache { heads: 2, dim: 9, slots: 7 };
+    let ring = Attention { heads: 6, cache, tokens: 1, is_ring: true, is_causal: false, factor: 0.3 };
+    let wide = Attention { heads: 2, cache: Cache { heads: 1, dim: 64, slots: 5 }, ..ring };
+    let whole = Attention { tokens: 4, is_ring: false, is_causal: true, ..ring };
+    let drawn = (0..5).map(|_| Attention::draw(&mut random));
+    [ring, wide, whole].into_iter().chain(drawn).collect()
+}
+
+#[test]
+fn every_core_has_the_hosts_bits() -> Result<()> {
+    for target in [Target::Fpu, Target::NoFpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M55] {
+        let harness = harness(target)?;
+        let mut random = Random::new(12);
+        for attention in attentions() {
+            let (image, observations) = (Draft(attention.image()), observations(&attention, &mut random));
+            let (_, actions) = harness.regions(image.bytes(), "serve", &observations)?;
+            let (_, in_polls) = harness.regions(image.bytes(), "poll 20000", &observations)?;
+            let buffer = ImageBuffer::new(image.bytes());
+            with_head::<_, anyhow::Error>(buffer.image("attention".as_ref())?, |head| {
+                for ((observation, action), sliced) in observations.iter().zip(&actions).zip(&in_polls) {
+                    let expected = bits(head.step(observation)?);
+                    ensure!(bits(action) == expected, "{target:?}: {attention:?}");
+                    ensure!(bits(sliced) == expected, "{target:?}, in polls: {attention:?}");
+                }
+                Ok(())
+            })?;
+        }
+    }
+    Ok(())
+}
