@@ -35,22 +35,27 @@ impl Cache {
 
     /// Returns the words of the work area that a head of a query needs: its scores and its integers.
     pub const fn work_words(self) -> usize {
-        self.slots + 2 * self.key_words()
+        self.score_words() + 2 * self.key_words()
     }
 
-    /// Returns the words of a key: four columns each.
+    /// Returns the words of the scores.
+    pub const fn score_words(self) -> usize {
+        8 * self.slots.div_ceil(8)
+    }
+
+    /// Returns the words of a key, of four columns each: kernels take two at a time.
     pub const fn key_words(self) -> usize {
-        self.dim.div_ceil(4)
+        2 * self.dim.div_ceil(8)
     }
 
-    /// Returns the rows of a head's values: two columns each.
+    /// Returns the rows of a head's values, of two columns each: kernels take two at a time.
     pub const fn value_rows(self) -> usize {
-        self.dim.div_ceil(2)
+        2 * self.dim.div_ceil(4)
     }
 
-    /// Returns the words of a row of the values: two tokens each.
+    /// Returns the words of a row of the values, of two tokens each: kernels take four at a time.
     pub const fn row_words(self) -> usize {
-        self.slots.div_ceil(2)
+        self.score_words() / 2
     }
 
     /// Returns the parts of a head, as regions of the cache: the scales of its keys and of its values, keys and values.

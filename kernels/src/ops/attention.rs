@@ -96,43 +96,48 @@ fn attend(
         let seen = if op.is_causal() { kept.saturating_sub(last.saturating_sub(1 + token)) } else { kept };
         let shared = (unit - token * heads).checked_div(heads / shape.heads.max(1)).ok_or(Fault::Damaged)?;
         let (scales_and_keys, values_part) = shape.parts(shared);
-        let head = regions(cache, &scales_and_keys, values_part).map(|part| &*part);
-        let [scores, query] = split(work, seen, 2 * shape.key_words())?;
+        let [key_scales, value_scales, keys, values] = regions(cache, &scales_and_keys, values_part);
+        let head = Head { key_scales: key_scales.get(..seen).ok_or(Fault::Damaged)?, value_scales, keys, values };
         let y = outputs.get_mut(unit * shape.dim..(unit + 1) * shape.dim).ok_or(Fault::Damaged)?;
-        attend_head(shape, op.score_factor(), vector(queries, unit, shape.dim)?, head, scores, query, y)?;
+        head.attend(shape, op.score_factor(), vector(queries, unit, shape.dim)?, work, y)?;
     }
     Ok(())
 }
 
-/// Computes the output `y` of a head of a query `x`, from the parts of the cache's head ([`Cache::parts`]): of the tokens
-/// in its first slots, as many as `scores` has.
-#[inline(never)]
-fn attend_head(
-    shape: Cache,
-    factor: f32,
-    x: &[f32],
-    [key_scales, value_scales, keys, values]: [&[u32]; 4],
-    scores: &mut [u32],
-    query: &mut [u32],
-    y: &mut [f32],
-) -> Result<(), Fault> {
-    let mut scale = 0;
-    let x = Integers::of(x, Some(&mut scale))?;
-    for (i, [odd, even]) in query.as_chunks_mut().0.iter_mut().enumerate() {
-        [*odd, *even] = x.factors(4 * i);
+/// A head of a cache ([`Cache::parts`]).
+struct Head<'c> {
+    /// Of the tokens that a query sees.
+    key_scales: &'c [u32],
+    value_scales: &'c [u32],
+    keys: &'c [u32],
+    values: &'c [u32],
+}
+
+impl Head<'_> {
+    /// Computes the output `y` of a head of a query `x`.
+    #[inline(never)]
+    fn attend(&self, shape: Cache, factor: f32, x: &[f32], work: &mut [u32], y: &mut [f32]) -> Result<(), Fault> {
+        let (scores, query) = work.split_at_mut_checked(shape.score_words()).ok_or(Fault::Damaged)?;
+        let query = query.get_mut(..2 * shape.key_words()).ok_or(Fault::Damaged)?;
+        let mut scale = 0;
+        let x = Integers::of(x, Some(&mut scale))?;
+        for (i, [odd, even]) in query.as_chunks_mut().0.iter_mut().enumerate() {
+            [*odd, *even] = x.factors(4 * i);
+        }
+        let seen = self.key_scales.len();
+        let weights = scores.get_mut(..seen).ok_or(Fault::Damaged)?;
+        query_keys(self.keys, query, weights);
+        scale_scores(factor, f32::from_bits(scale), self.key_scales, weights)?;
+        let sum = softmax(self.value_scales, weights);
+        let total = Scale::of_magnitude(weights.iter().fold(Native::of(0.0), add).get().to_bits(), TOTAL)?;
+        let pairs = to_pairs(total, seen, scores).ok_or(Fault::Damaged)?;
+        weigh_values(self.values, shape.row_words(), pairs, bytemuck::must_cast_slice_mut(y));
+        let scale = (Native::of(total.get()) / Native::of(sum)).get();
+        for y in y {
+            *y = scaled(y.to_bits(), scale);
+        }
+        Ok(())
     }
-    query_keys(keys, query, scores);
-    scale_scores(factor, f32::from_bits(scale), key_scales, scores)?;
-    let sum = softmax(value_scales, scores);
-    let total = Scale::of_magnitude(scores.iter().fold(Native::of(0.0), add).get().to_bits(), TOTAL)?;
-    let pairs = to_pairs(total, scores);
-    let weights = scores.get(..pairs).ok_or(Fault::Damaged)?;
-    weigh_values(values, shape.row_words(), weights, bytemuck::must_cast_slice_mut(y));
-    let scale = (Native::of(total.get()) / Native::of(sum)).get();
-    for y in y {
-        *y = scaled(y.to_bits(), scale);
-    }
-    Ok(())
 }
 
 fn add(sum: Native, bits: &u32) -> Native {
@@ -172,18 +177,19 @@ fn softmax(value_scales: &[u32], scores: &mut [u32]) -> f32 {
     sum.get()
 }
 
-/// Rounds weights, and packs two a word, to the start of the same words; returns the number of packed words.
-fn to_pairs(scale: Scale, weights: &mut [u32]) -> usize {
-    let rounded =
-        |bits: Option<&u32>| bits.map_or(0, |bits| Native::of(f32::from_bits(*bits)).rounded(scale.inverse()) & 0xffff);
-    let pairs = weights.len().div_ceil(2);
-    for i in 0..pairs {
-        let pair = rounded(weights.get(2 * i)) | rounded(weights.get(2 * i + 1)) << 16;
-        if let Some(word) = weights.get_mut(i) {
-            *word = pair;
-        }
+/// Rounds the first `len` weights, and packs them two a word to the start of the same words, of which zeros fill the last
+/// four.
+fn to_pairs(scale: Scale, len: usize, weights: &mut [u32]) -> Option<&[u32]> {
+    let end = 4 * len.div_ceil(8);
+    for i in 0..end {
+        let of_lane = |lane: usize| match weights.get(2 * i + lane) {
+            Some(bits) if 2 * i + lane < len => Native::of(f32::from_bits(*bits)).rounded(scale.inverse()) & 0xffff,
+            _ => 0,
+        };
+        let pair = of_lane(0) | of_lane(1) << 16;
+        *weights.get_mut(i)? = pair;
     }
-    pairs
+    weights.get(..end)
 }
 
 /// A head's vector in integers.
@@ -222,10 +228,4 @@ impl<'x> Integers<'x> {
 /// Returns the vector of a unit.
 fn vector(all: &[f32], unit: usize, dim: usize) -> Result<&[f32], Fault> {
     all.get(unit * dim..(unit + 1) * dim).ok_or(Fault::Damaged)
-}
-
-/// Splits the work area in two parts of these lengths.
-fn split(work: &mut [u32], first: usize, second: usize) -> Result<[&mut [u32]; 2], Fault> {
-    let (first, rest) = work.split_at_mut_checked(first).ok_or(Fault::Damaged)?;
-    Ok([first, rest.get_mut(..second).ok_or(Fault::Damaged)?])
 }
