@@ -264,8 +264,9 @@ fn heads(op: &Op<'_>, units: usize, is_expected: bool, add: &mut dyn FnMut(CostI
     add(Attention::ValueRow, units * cache.value_rows());
     let of_tokens = |add: &mut dyn FnMut(Attention, usize), heads: usize, seen: usize| {
         add(Attention::Score, heads * seen);
-        add(Attention::KeyWord, heads * seen * cache.key_words());
-        add(Attention::ValueWord, heads * cache.value_rows() * seen.div_ceil(2));
+        // Kernels take two keys at a time, and the values of eight tokens.
+        add(Attention::KeyWord, heads * seen.next_multiple_of(2) * cache.key_words());
+        add(Attention::ValueWord, heads * cache.value_rows() * 4 * seen.div_ceil(8));
     };
     if op.is_causal() && is_expected {
         let tokens = units.checked_div(op.query_heads()).unwrap_or(0);

@@ -18,7 +18,7 @@ use actq::random::Random;
 use actq::runtime::ImageBuffer;
 use actq_bench::networks::Builder;
 use actq_bench::profile::Harness;
-use actq_bench::{Target, root};
+use actq_bench::{Target, firmware, root};
 use actq_cli::outputs::files;
 use actq_kernels::Width;
 use actq_kernels::cost::{self, CORES, Core, Cost, CostItem};
@@ -37,11 +37,12 @@ const WORST_SAMPLES: usize = 8;
 /// A budget too large to limit anything, which is counted all the same.
 const AMPLE_BUDGET: u32 = 100_000_000;
 
-/// Measures the rates of these cores; those of the others stay.
-pub(crate) fn run(cores: &[Core]) -> Result<()> {
+/// Measures the rates of these cores; those of the others stay. With `only`, a word of the items' names, all other items
+/// keep their rates, and only images with this word in their names are measured.
+pub(crate) fn run(cores: &[Core], only: Option<&str>) -> Result<()> {
     let mut rates: BTreeMap<CostItem, Row> = CostItem::all().map(|item| (item, cost::rates_of(item))).collect();
     for core in cores {
-        of_core(*core, &mut rates)?;
+        of_core(*core, only, &mut rates)?;
         let path = root().join("kernels/src/cost/rates.rs");
         files::write(&path, table(&rates).as_bytes())?;
         println!("{}: written with the rates of {}", path.display(), core.name());
@@ -52,7 +53,7 @@ pub(crate) fn run(cores: &[Core]) -> Result<()> {
 /// The rates of an item: of a Cortex-M4 with FPU, and of the other cores.
 type Row = ([f64; 3], [[f64; 2]; CORES.len()]);
 
-fn of_core(core: Core, all: &mut BTreeMap<CostItem, Row>) -> Result<()> {
+fn of_core(core: Core, only: Option<&str>, all: &mut BTreeMap<CostItem, Row>) -> Result<()> {
     let target = match core {
         Core::M0 => Target::V6m,
         Core::M3 => Target::NoDsp,
@@ -65,12 +66,17 @@ fn of_core(core: Core, all: &mut BTreeMap<CostItem, Row>) -> Result<()> {
         }
     };
     let harness = Harness::build(target)?;
+    let with_attention = Harness::of(target, firmware::attention_harness(target)?)?;
     let mut samples = Vec::new();
     let mut polls = Vec::new();
-    for (name, bytes) in images()? {
+    for (name, bytes) in images()?.into_iter().filter(|(name, _)| only.is_none_or(|word| name.contains(word))) {
         println!("measuring {name}");
         let bytes = repack(&bytes, core).with_context(|| name.clone())?;
-        measure((&name, &bytes), &harness, &mut samples, (core == Core::M4f).then_some(&mut polls))?;
+        let harness = if name.contains("attention") { &with_attention } else { &harness };
+        measure((&name, &bytes), harness, &mut samples, (core == Core::M4f).then_some(&mut polls))?;
+    }
+    if let Some(word) = only {
+        samples = samples.into_iter().filter_map(|sample| rest_of(sample, word, core)).collect();
     }
     let expected: Vec<&Sample> = samples.iter().filter(|s| s.expected).collect();
     let instructions = solve(&expected, |c| c.instructions);
@@ -95,7 +101,9 @@ fn of_core(core: Core, all: &mut BTreeMap<CostItem, Row>) -> Result<()> {
         );
     }
     // Budgets of slices are those of a Cortex-M4 on every core.
-    let most = if core == Core::M4f {
+    let most = if core == Core::M4f && only.is_some() {
+        Some(instructions.clone())
+    } else if core == Core::M4f {
         let mut most = most(&samples, &polls, &instructions);
         println!("measuring polls");
         let resumed = resumed(&harness, &most)?;
@@ -105,7 +113,7 @@ fn of_core(core: Core, all: &mut BTreeMap<CostItem, Row>) -> Result<()> {
         None
     };
     let rate = |rates: &Rates, item: CostItem| rates.get(&item).copied().unwrap_or(0.0);
-    for (item, (dsp, others)) in all {
+    for (item, (dsp, others)) in all.iter_mut().filter(|(item, _)| only.is_none_or(|word| has_word(**item, word))) {
         let now = [rate(&instructions, *item), rate(&cycles, *item)];
         if let Some(most) = &most {
             *dsp = [now[0], now[1], rate(most, *item)];
@@ -114,6 +122,27 @@ fn of_core(core: Core, all: &mut BTreeMap<CostItem, Row>) -> Result<()> {
         }
     }
     Ok(())
+}
+
+fn has_word(item: CostItem, word: &str) -> bool {
+    format!("{item:?}").contains(word)
+}
+
+/// Returns the part of an operation's cost that the items with this word in their names have; `None` for a sample without
+/// such an item.
+fn rest_of(sample: Sample, word: &str, core: Core) -> Option<Sample> {
+    let (items, known): (BTreeMap<_, _>, BTreeMap<_, _>) =
+        sample.items.into_iter().partition(|(item, _)| has_word(*item, word));
+    let rates = |item: &CostItem| match (cost::rates_of(*item), CORES.iter().position(|known| *known == core)) {
+        ((_, others), Some(at)) => others[at],
+        (([instructions, cycles, _], _), None) => [instructions, cycles],
+    };
+    let of = |which: usize| known.iter().map(|(item, n)| n * rates(item)[which]).sum::<f64>() as u64;
+    let Cost { instructions, cycles } = sample.cost;
+    let [instructions, cycles] = [instructions.saturating_sub(of(0)), cycles.saturating_sub(of(1))];
+    // Of the parts, only the operations themselves: whole steps have all items of an image.
+    let is_operation = !items.is_empty() && known.contains_key(&CostItem::POLL_OP);
+    is_operation.then_some(Sample { items, cost: Cost { instructions, cycles }, ..sample })
 }
 
 /// Writes the rates as the source of the kernels' table: an item's debug text is its key.

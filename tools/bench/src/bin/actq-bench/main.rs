@@ -127,6 +127,9 @@ enum Command {
         /// The cores
         #[arg(long, value_name = "CORE,..", value_delimiter = ',', default_value = "m4f,m4,m3,m0,rv32imac,m55", value_parser = core)]
         core: Vec<cost::Core>,
+        /// Only the items of the model, and only the images, with this word in their names: `attention`
+        #[arg(long, value_name = "WORD")]
+        only: Option<String>,
     },
     /// Package the C interface: header, static library, files for build systems, licences and a manifest
     Capi {
@@ -172,7 +175,7 @@ fn main() -> ExitCode {
         Command::Faults => faults::all(),
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
-        Command::Fit { core } => fit::run(&core),
+        Command::Fit { core, only } => fit::run(&core, only.as_deref()),
         Command::Gallery { out, robots, quick } => gallery::build(&out, &robots, quick),
         Command::Peers { ours, folder, words, json } => peers::run(ours, &words, folder.as_deref(), json.as_deref()),
         Command::Capi { target, out, image, compact } => capi(&target, &out, image.as_deref(), compact),

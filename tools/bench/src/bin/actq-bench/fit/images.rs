@@ -13,6 +13,7 @@ use actq::policy::Policy;
 use actq_bench::networks::Builder;
 use actq_kernels::Width;
 use actq_kernels::image::{Kind, OpKind};
+use actq_kernels::ops::attention::cache_words;
 use actq_kernels::ops::denoise::Coefficients;
 use anyhow::{Context as _, Result};
 
@@ -52,6 +53,9 @@ const LENGTHS: [usize; 5] = [8, 39, 64, 100, 256];
 const HIDDEN: [usize; 4] = [8, 24, 64, 100];
 /// Actions of chunks, and values of an action.
 const CHUNKS: [(usize, usize); 5] = [(2, 3), (8, 7), (16, 2), (20, 14), (50, 6)];
+/// Dimensions of heads, and slots of caches.
+const ATTENTIONS: [(usize, usize); 12] =
+    [(8, 16), (8, 40), (16, 64), (24, 8), (32, 16), (48, 16), (48, 50), (64, 32), (64, 64), (33, 10), (64, 4), (7, 2)];
 /// Longest observation.
 const OBSERVATION: usize = 700;
 /// Images with their names.
@@ -69,7 +73,65 @@ pub(super) fn images() -> Result<Vec<(String, Vec<u8>)>> {
     let name = "added biases";
     images.push((name.to_owned(), builder.accumulating(name)?));
     images.push(around()?);
+    for heads in [(1, 1), (4, 2)] {
+        for shapes in ATTENTIONS.chunks(4) {
+            images.push(attention(heads, shapes)?);
+        }
+    }
     Ok(images)
+}
+
+/// Attention of some shapes: of one query, and of two causal ones.
+fn attention((heads, kv_heads): (usize, usize), shapes: &[(usize, usize)]) -> Result<(String, Vec<u8>)> {
+    let name = format!("attention of {heads} heads of {kv_heads}, {shapes:?}");
+    let mut builder = Builder::new(8);
+    // Its work area is large enough for the scores, too.
+    builder.linear((8, 8), Activations::Int8, |_| Some(Width::W2), 0, true)?;
+    builder.linear((8, 512), Activations::Int8, |_| Some(Width::W2), 0, true)?;
+    let (policy, outcomes) = builder.finish(name.clone(), false);
+    let mut buffers = vec![Buffer { len: OBSERVATION, lifetime: Lifetime::Observation }];
+    let mut before = Vec::new();
+    let mut value = |len: usize| {
+        buffers.push(Buffer { len, lifetime: Lifetime::Step });
+        Slice { buffer: buffers.len() - 1, offset: 0, len }
+    };
+    let mut add = |kind, dst, src, third, data| before.push(Step { kind, dst, src, third, data });
+    let pair = |low: usize, high: usize| (low | high << 16) as u32;
+    for &(dim, slots) in shapes {
+        let [keys, values] = [0, 1].map(|first| {
+            let all = value(slots * kv_heads * dim);
+            for offset in (0..all.len).step_by(OBSERVATION / 2) {
+                let len = (all.len - offset).min(OBSERVATION / 2);
+                let from = Slice { buffer: 0, offset: first * OBSERVATION / 2, len };
+                add(OpKind::Copy, Slice { offset, len, ..all }, Some(from), None, StepData::None);
+            }
+            all
+        });
+        let cache = value(cache_words(kv_heads, dim, slots));
+        let sizes = StepData::Words(vec![pair(kv_heads, dim), pair(slots, 0)]);
+        add(OpKind::Keep, cache, Some(keys), Some(values), sizes);
+        for queries in 1..=slots.min(2) {
+            let len = queries * heads * dim;
+            let sizes =
+                [pair(heads, kv_heads), pair(dim, slots), pair(queries - 1, 0), (dim as f32).sqrt().recip().to_bits()];
+            let from = Slice { buffer: 0, offset: 3, len };
+            add(OpKind::Attend, value(len), Some(from), Some(cache), StepData::Words(sizes.to_vec()));
+        }
+    }
+    let [observation, action] = [512, 8].map(&mut value);
+    add(OpKind::Copy, observation, Some(Slice { buffer: 0, offset: 0, len: 512 }), None, StepData::None);
+    let output = Slice { buffer: OUTPUT, ..action };
+    let after = vec![Step { kind: OpKind::Copy, dst: action, src: Some(output), third: None, data: StepData::None }];
+    let around = Around {
+        buffers,
+        before,
+        observation: observation.buffer,
+        after,
+        action: action.buffer,
+        limits: None,
+        ports: Vec::new(),
+    };
+    Ok((name, emit::image_around(&policy, &outcomes, &around)?))
 }
 
 /// Operations around a network, each of every length.
@@ -310,8 +372,11 @@ mod tests {
             measured.extend(ops.flat_map(|(operation, value, _)| [operation, value]));
         }
         let name = |item: &CostItem| format!("{item:?}");
-        let expected =
-            CostItem::all().filter(|f| ["operation(", "function("].iter().any(|kind| name(f).contains(kind)));
+        let expected = CostItem::all().filter(|f| {
+            ["operation(", "function(", "Attention::Attend)", "Attention::Keep)"]
+                .iter()
+                .any(|kind| name(f).contains(kind))
+        });
         let missing: Vec<CostItem> = expected.filter(|item| !measured.contains(item)).collect();
         assert!(missing.is_empty(), "no image has {missing:?}");
         Ok(())
