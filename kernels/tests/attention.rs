@@ -264,6 +264,14 @@ fn an_overflow_fails_the_step_and_is_forgotten() {
 }
 
 #[test]
+fn the_self_test_wraps_around() {
+    let mut random = Random::new(6);
+    for _ in 0..CASES / 30 {
+        on_head(&Attention::draw(&mut random).image(), |head| assert_eq!(head.self_test(), Ok(())));
+    }
+}
+
+#[test]
 fn zeros_have_equal_weights() {
     let cache = Cache { heads: 2, dim: 4, slots: 3 };
     let attention = Attention { heads: 4, cache, tokens: 3, is_ring: false, is_causal: true, factor: 0.5 };

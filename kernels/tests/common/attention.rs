@@ -37,7 +37,12 @@ impl Attention {
         [self.tokens * self.heads * self.cache.dim, kept, kept]
     }
 
-    /// Returns the image. Its self-test is one step.
+    /// Returns the steps of the image's self-test: a ring wraps around.
+    fn steps(&self) -> usize {
+        if self.is_ring { self.cache.slots.min(20) + 2 } else { 1 }
+    }
+
+    /// Returns the image.
     pub(crate) fn image(&self) -> Vec<u32> {
         let [queries, keys, values] = self.lengths();
         let cache = self.cache.words();
@@ -65,9 +70,9 @@ impl Attention {
         for record in [keep, attend] {
             words.extend(record.emit().expect("small sizes"));
         }
-        let end = words.len() as u32;
+        let (end, step) = (words.len() as u32, observed - state + queries);
         words.push(u32::from_le_bytes(*b"heed"));
-        words.extend(vec![0; observed - state + queries]);
+        words.extend(vec![0; self.steps() * step]);
         let header = Header {
             kind: Kind::Step,
             has_ports: false,
@@ -92,21 +97,21 @@ impl Attention {
             contract: end,
             contract_flags: 0,
             name: Records { offset: end, count: 4 },
-            self_test: Records { offset: end + 1, count: 1 },
+            self_test: Records { offset: end + 1, count: self.steps() },
             weights: 0,
             digest: [0; 32],
         };
         words[..h::WORDS].copy_from_slice(&header.emit().expect("small sizes"));
         words.iter_mut().for_each(|word| *word = word.to_le());
         let mut random = Random::new(5);
-        let observation: Vec<f32> = (0..header.obs_len).map(|_| random.unit()).collect();
-        let start = end as usize + 1;
-        for (word, x) in words[start..].iter_mut().zip(&observation) {
-            *word = x.to_bits().to_le();
-        }
+        let observations: Vec<Vec<f32>> =
+            (0..self.steps()).map(|_| (0..header.obs_len).map(|_| random.unit()).collect()).collect();
         seal(bytemuck::cast_slice_mut(&mut words)).expect("the length fits");
-        let action = on_head(&words, |head| head.step(&observation).expect("all is finite").to_vec());
-        for (word, x) in words[start + observation.len()..].iter_mut().zip(action) {
+        let step = |head: &mut Head<'_, '_>, x: &[f32]| head.step(x).expect("all is finite").to_vec();
+        let actions: Vec<_> = on_head(&words, |head| observations.iter().map(|x| step(head, x)).collect());
+        let values =
+            observations.iter().zip(&actions).flat_map(|(observation, action)| observation.iter().chain(action));
+        for (word, x) in words[end as usize + 1..].iter_mut().zip(values) {
             *word = x.to_bits().to_le();
         }
         seal(bytemuck::cast_slice_mut(&mut words)).expect("the length fits");

@@ -7,9 +7,15 @@
 //!
 //! SMLAD sets the Q flag; the procedure call standard allows a call to change it.
 
+#[cfg(feature = "attention")]
+mod attention;
 mod table;
 
+#[cfg(feature = "attention")]
+pub(crate) use self::attention::{query_keys, weigh_values};
 use self::table::kernels;
+#[cfg(not(feature = "attention"))]
+pub(crate) use super::portable::{query_keys, weigh_values};
 use super::product::Product;
 use crate::layout::QUAD;
 
