@@ -7,6 +7,7 @@
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod action;
+mod caches;
 pub mod export;
 mod file;
 mod lower;

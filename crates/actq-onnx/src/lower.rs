@@ -7,7 +7,8 @@ use actq::error::{Context as _, Result, bail, ensure};
 use actq::import::json::{Input, JsonOp};
 use actq::import::values::{Tensor, Values};
 
-use crate::values::expr::{Cell, Expr, Exprs, Id, Matrix, Run, Unary};
+use crate::nodes::attention::{PRODUCT, SOFTMAX};
+use crate::values::expr::{Attention, Cell, Expr, Exprs, Id, Matrix, Run, Unary};
 
 /// A run of elements of a slot. Slot 0 is the observation, slot `i + 1` the output of op `i`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,8 +26,8 @@ const MAX_COPIES: usize = 64;
 pub(crate) struct Lowered {
     pub(crate) ops: Vec<JsonOp>,
     pub(crate) tensors: BTreeMap<String, Tensor>,
-    /// Input parts of each op, and the slot of its second operand.
-    reads: Vec<(Vec<Part>, Option<usize>)>,
+    /// Input parts of each op, and the slots of its other operands.
+    reads: Vec<(Vec<Part>, Vec<usize>)>,
     /// Length of the observation, then of each op's output.
     lens: Vec<usize>,
     /// The last number that was appended to a name in use.
@@ -107,7 +108,7 @@ impl Lowered {
         }
         let most = MAX_COPIES * MAX_COPIES;
         ensure!(n <= most, "repeats a value {n} times; the limit is {most}");
-        let copies = self.push(JsonOp::new("identity"), vec![one; MAX_COPIES].concat(), None, MAX_COPIES);
+        let copies = self.push(JsonOp::new("identity"), vec![one; MAX_COPIES].concat(), &[], MAX_COPIES);
         let rest = copies.iter().map(|part| Part { len: n % MAX_COPIES, ..*part }).filter(|part| part.len > 0);
         Ok(vec![copies.clone(); n / MAX_COPIES].concat().into_iter().chain(rest).collect())
     }
@@ -138,25 +139,28 @@ impl Lowered {
             Expr::Linear(x, w, b) => {
                 let name = self.matrix(w)?;
                 let b = self.bias(&name, b)?;
-                self.push(JsonOp::new("linear").key("w", Some(name)).key("b", b), self.place(*x), None, len)
+                self.push(JsonOp::new("linear").key("w", Some(name)).key("b", b), self.place(*x), &[], len)
             }
-            Expr::Unary(Unary::Known(f), x) => self.push(JsonOp::new(f.name()), self.place(*x), None, len),
+            Expr::Unary(Unary::Known(f), x) => self.push(JsonOp::new(f.name()), self.place(*x), &[], len),
             Expr::Add(x, y) | Expr::Mul(x, y) => {
                 let name = if matches!(exprs.get(id), Expr::Add(..)) { "add" } else { "mul" };
                 let with = self.whole(*y)?;
-                self.push(JsonOp::new(name), self.place(*x), Some(with), len)
+                self.push(JsonOp::new(name), self.place(*x), &[("with", with)], len)
             }
             Expr::LayerNorm(x, weight, bias, eps) => {
                 let w_ln = self.vector("norm.weight", weight)?;
                 let b_ln = self.bias(&w_ln, bias)?;
                 let op = JsonOp::new("layernorm").key("w_ln", Some(w_ln)).key("b_ln", b_ln).key("eps", Some(*eps));
-                self.push(op, self.place(*x), None, len)
+                self.push(op, self.place(*x), &[], len)
             }
             Expr::RmsNorm(x, weight, eps) => {
                 let w_ln = Some(self.vector("norm.weight", weight)?);
                 let op = JsonOp::new("rmsnorm").key("w_ln", w_ln).key("eps", Some(*eps));
-                self.push(op, self.place(*x), None, len)
+                self.push(op, self.place(*x), &[], len)
             }
+            Expr::Attention(of) => self.attention(of, len)?,
+            Expr::Products(_) => bail!("{PRODUCT}"),
+            Expr::Softmax(..) => bail!("{SOFTMAX}"),
             Expr::Cell(cell) => self.cell(cell, len)?,
             Expr::CellState(_) => bail!("an LSTM's cell state is read outside its cell; read the hidden state instead"),
             Expr::Unary(f, x) => {
@@ -182,13 +186,21 @@ impl Lowered {
         })
     }
 
+    fn attention(&mut self, of: &Attention, len: usize) -> Result<Vec<Part>> {
+        let (keys, values) = (self.whole(of.keys)?, self.whole(of.values)?);
+        let op = JsonOp::new("attention").key("heads", Some(of.heads)).key("kv_heads", Some(of.kv_heads));
+        let op = op.key("dim", Some(of.dim)).key("factor", Some(of.factor)).key("causal", Some(of.causal));
+        let op = op.key("context", (of.context > 0).then_some(of.context));
+        Ok(self.push(op, self.place(of.queries), &[("keys", keys), ("values", values)], len))
+    }
+
     fn cell(&mut self, cell: &Cell, hidden: usize) -> Result<Vec<Part>> {
         let (w_ih, w_hh) = (self.matrix(&cell.w_ih)?, self.matrix(&cell.w_hh)?);
         let (b_ih, b_hh) = (self.bias(&w_ih, &cell.b_ih)?, self.bias(&w_hh, &cell.b_hh)?);
         let name = if cell.lstm { "lstm" } else { "gru" };
         let op = JsonOp::new(name).key("hidden", Some(hidden)).key("w_ih", Some(w_ih)).key("w_hh", Some(w_hh));
         let op = op.key("b_ih", b_ih).key("b_hh", b_hh);
-        Ok(self.push(op, self.place(cell.x), None, hidden))
+        Ok(self.push(op, self.place(cell.x), &[], hidden))
     }
 
     /// Lowers `clip(a clip(x) + b)`, with or without either clip.
@@ -218,12 +230,13 @@ impl Lowered {
         let scale = Some(self.vector("normalize.scale", &scale)?);
         let op = JsonOp::new("normalize").key("mean", mean).key("scale", scale);
         let op = op.key("pre_clip", pre_clip).key("clip", clip);
-        Ok(self.push(op, self.place(at), None, len))
+        Ok(self.push(op, self.place(at), &[], len))
     }
 
-    fn push(&mut self, op: JsonOp, input: Vec<Part>, with: Option<usize>, len: usize) -> Vec<Part> {
-        self.ops.push(op.key("with", with.map(slot_name)));
-        self.reads.push((input, with));
+    /// Appends an op with other operands by their keys.
+    fn push(&mut self, op: JsonOp, input: Vec<Part>, others: &[(&str, usize)], len: usize) -> Vec<Part> {
+        self.ops.push(others.iter().fold(op, |op, (key, slot)| op.key(key, Some(slot_name(*slot)))));
+        self.reads.push((input, others.iter().map(|(_, slot)| *slot).collect()));
         self.lens.push(len);
         vec![Part { slot: self.ops.len(), from: 0, len }]
     }
@@ -235,7 +248,7 @@ impl Lowered {
             [Part { slot, from: 0, len }] if self.lens.get(slot) == Some(&len) => Ok(slot),
             _ => {
                 let n = place.iter().map(|part| part.len).sum();
-                let moved = self.push(JsonOp::new("identity"), place, None, n);
+                let moved = self.push(JsonOp::new("identity"), place, &[], n);
                 self.places.insert(id, moved);
                 Ok(self.ops.len())
             }
@@ -251,7 +264,7 @@ impl Lowered {
                 self.place(root) != [Part { slot: 0, from: 0, len: self.lens[0] }],
                 "the action is the observation itself"
             );
-            self.push(JsonOp::new("identity"), self.place(root), None, n);
+            self.push(JsonOp::new("identity"), self.place(root), &[], n);
         }
         Ok(())
     }
@@ -259,9 +272,9 @@ impl Lowered {
     /// Names the slots that are read by an op other than the next one.
     fn slots(&mut self) {
         let mut named = HashSet::new();
-        for (i, (input, with)) in self.reads.iter().enumerate() {
+        for (i, (input, others)) in self.reads.iter().enumerate() {
             let op = &mut self.ops[i];
-            named.extend(with.iter().copied());
+            named.extend(others.iter().copied());
             let whole = |part: &Part| part.from == 0 && part.len == self.lens[part.slot];
             op.input = match &input[..] {
                 [part] if whole(part) && part.slot == i => None,

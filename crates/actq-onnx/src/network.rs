@@ -22,12 +22,13 @@ use self::output::{actions, choose, refuse_batch, refused_actions};
 use crate::action;
 use crate::file::model::Model;
 use crate::lower::lower;
+use crate::nodes::attention::{PRODUCT, SOFTMAX};
 use crate::nodes::follow::Follower;
 use crate::patterns::simplify::simplify;
 use crate::signature::Signature;
 use crate::states::{Cells, Chosen, Output};
 use crate::values::elements::value;
-use crate::values::expr::{Exprs, Id};
+use crate::values::expr::{Expr, Exprs, Id};
 use crate::values::tensor::{Element, Tensor};
 
 /// An imported policy, and a summary of the import.
@@ -302,7 +303,10 @@ fn follow_outputs(model: &Model, options: &ImportOptions) -> Result<Followed> {
     let mut errors = Vec::new();
     for port in &model.graph.outputs {
         match follower.value(&port.name) {
-            Ok(value) => outputs.push(Output { name: port.name.clone(), value }),
+            Ok(value) => match refuse_parts_of_attention(model, &follower.exprs, &value) {
+                Ok(()) => outputs.push(Output { name: port.name.clone(), value }),
+                Err(error) => errors.push((port.name.clone(), error)),
+            },
             Err(error) => errors.push((port.name.clone(), error)),
         }
     }
@@ -313,6 +317,22 @@ fn follow_outputs(model: &Model, options: &ImportOptions) -> Result<Followed> {
         outputs.push(Output { name: inner.clone(), value });
     }
     Ok(Followed { exprs: follower.exprs, outputs, errors })
+}
+
+/// Refuses a value that needs a product of values or a softmax, except within attention.
+fn refuse_parts_of_attention(model: &Model, exprs: &Exprs, value: &Tensor) -> Result<()> {
+    let mut ids: Vec<Id> = value.elements().iter().filter_map(self::value).map(|(id, _)| id).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    for id in exprs.needed(&ids) {
+        let why = match exprs.get(id) {
+            Expr::Products(_) => PRODUCT,
+            Expr::Softmax(..) => SOFTMAX,
+            _ => continue,
+        };
+        return Err(at_node(model, exprs, id, Error::input(why)));
+    }
+    Ok(())
 }
 
 /// Makes one expression of an output's elements. A constant element becomes another one times 0, plus an offset.

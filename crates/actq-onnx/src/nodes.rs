@@ -1,6 +1,7 @@
 //! The conversion of each ONNX operator to expressions.
 
 pub(crate) mod arithmetic;
+pub(crate) mod attention;
 pub(crate) mod call;
 pub(crate) mod cells;
 pub(crate) mod conditions;

@@ -1,5 +1,6 @@
 //! Recognition of patterns that exporters decompose: norms, activations, cells, rows, slices.
 
+pub(crate) mod attention;
 pub(crate) mod build;
 pub(crate) mod forms;
 pub(crate) mod norm;

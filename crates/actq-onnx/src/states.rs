@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use actq::error::{Context as _, Error, Result, bail, ensure};
 use actq::text::printable;
 
+use crate::caches::Caches;
 use crate::file::model::Model;
 use crate::values::elements::value;
 use crate::values::expr::{Expr, Exprs, Id, Run};
@@ -24,6 +25,8 @@ pub(crate) type Pairs = Vec<(usize, usize)>;
 pub(crate) struct Cells {
     /// States after the step in the file, with the expressions of the cells that replace them.
     pub(crate) instead: HashMap<Id, Id>,
+    /// Attentions to the tokens of earlier steps.
+    pub(crate) caches: Caches,
 }
 
 impl Cells {
@@ -39,7 +42,8 @@ impl Cells {
         outputs: &[Output],
         named: &[(String, String)],
     ) -> Result<Self> {
-        let mut found = Self::default();
+        let caches = Caches::find(exprs, outputs);
+        let mut found = Self { instead: caches.instead.clone(), caches };
         for output in outputs {
             let elements = output.value.elements();
             let mut at = 0;
@@ -116,6 +120,11 @@ impl Cells {
                 if known.is_none() {
                     pairs.push((input, output));
                 }
+            }
+        }
+        for &pair in live.iter().filter_map(|id| self.caches.pairs.get(id)).flatten() {
+            if !pairs.contains(&pair) {
+                pairs.push(pair);
             }
         }
         Ok(pairs)
@@ -208,8 +217,8 @@ impl Chosen<'_> {
         named: &[(String, String)],
         observed: &[String],
     ) -> Result<()> {
-        let help = "only states of LSTM and GRU cells (in torch's forms) are carried from step to step; make any other memory an \
-                    observation, an input without an output";
+        let help = "only states of LSTM and GRU cells (in torch's forms) and tokens of attention are carried from step to step; make \
+                    any other memory an observation, an input without an output";
         for (from, to) in named {
             let is_pair =
                 |(i, o): &(usize, usize)| self.model.graph.inputs[*i].name == *from && self.outputs[*o].name == *to;
@@ -236,6 +245,12 @@ impl Chosen<'_> {
         for &i in live.iter().filter(is_open) {
             let port = &self.model.graph.inputs[i];
             let name = printable(&port.name);
+            if let Some(reason) = self.cells.caches.reasons.get(&i) {
+                bail!(
+                    "the input {name:?} holds tokens of earlier steps, and {reason}; if it is measured anew in each step, pass --observe \
+                     {name}"
+                );
+            }
             ensure!(
                 !self.is_read_by_cells(i),
                 "the action reads the input {name:?} before the cell that has it as its state; only the value after the step has an \

@@ -25,7 +25,7 @@ pub(super) fn choose(
             .context("no output depends on an input; export the policy with its observation as input")?;
         return Err(error.context(format!("output {:?} cannot be imported", printable(&name))));
     }
-    let is_paired = |i: &usize| is_state(cells, exprs, &outputs[*i].value);
+    let is_paired = |i: &usize| cells.caches.carries(*i) || is_state(cells, exprs, &outputs[*i].value);
     let named = |i: &usize| options.states.iter().any(|(_, to)| *to == outputs[*i].name);
     for keep in [
         &(|i: &usize| !is_paired(i) && !named(i)) as &dyn Fn(&usize) -> bool,

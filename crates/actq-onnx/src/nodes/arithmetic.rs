@@ -109,6 +109,13 @@ fn with_known(op: &str, exprs: &mut Exprs, x: Id, y: &[f64]) -> Result<Vec<Eleme
     let (ones, zeros) = (vec![1.0; y.len()], vec![0.0; y.len()]);
     let same = crate::values::compare::uniform(y);
     match op {
+        // The additive mask of an attention.
+        "Add" if y.contains(&f64::NEG_INFINITY) => {
+            let masked = |y: &f64| *y == f64::NEG_INFINITY;
+            let finite = y.iter().map(|y| if masked(y) { 0.0 } else { *y }).collect();
+            let sum = affine(exprs, x, ones, finite)?.into_iter().zip(y);
+            Ok(sum.map(|(sum, y)| if masked(y) { Element::Known(*y) } else { sum }).collect())
+        }
         "Add" => affine(exprs, x, ones, y.to_vec()),
         "Sub" => affine(exprs, x, ones, y.iter().map(|y| -y).collect()),
         "Mul" => affine(exprs, x, y.to_vec(), zeros),

@@ -109,13 +109,10 @@ impl<'a> Call<'a> {
             "SequenceAt" | "SequenceConstruct" | "SplitToSequence" | "ConcatFromSequence" => {
                 bail!("works on a list of tensors, as scripted modules do; export by tracing, or with dynamo=True")
             }
-            "Attention" | "MultiHeadAttention" | "GroupQueryAttention" => {
-                bail!("attention has no kernel here; export the part after it as a separate policy")
-            }
             "ConvTranspose" => {
                 bail!("has no kernel here; export the part after the encoder as a separate policy")
             }
-            "Softmax" | "LogSoftmax" | "ArgMax" | "TopK" => {
+            "LogSoftmax" | "ArgMax" | "TopK" => {
                 bail!(
                     "has no kernel here; if it only chooses among actions, pass the value before it to actq import --output NAME"
                 )

@@ -1,4 +1,4 @@
-//! Einsum of a value with a constant, as a matrix product.
+//! Einsum of two operands, as a matrix product.
 
 use actq::error::{Context as _, Result, ensure};
 
@@ -15,7 +15,7 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     }
     let equation = call.text("equation").context("has no equation")?;
     let plain: String = equation.chars().filter(|c| !c.is_whitespace()).collect();
-    let supported = "only the product of a value with a constant is supported, as bi,oi->bo";
+    let supported = "only a product of two operands is supported, as bi,oi->bo or bhqd,bhkd->bhqk";
     let (inputs, output) =
         plain.split_once("->").with_context(|| format!("{equation:?} names no output; {supported}"))?;
     let (a, b) = inputs.split_once(',').with_context(|| format!("{equation:?} has one operand; {supported}"))?;
@@ -28,25 +28,27 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
         x.shape,
         y.shape
     );
-    // Axes of both operands are summed over; all others are in the output.
-    let summed: Vec<char> = a.iter().copied().filter(|c| b.contains(c)).collect();
-    let rest = |axes: &[char]| axes.iter().copied().filter(|c| !summed.contains(c)).collect::<Vec<char>>();
-    let (of_a, of_b) = (rest(&a), rest(&b));
-    let joined = [of_a.clone(), of_b.clone()].concat();
+    // Axes of both operands are summed over, or are a batch in the output; all others are in the output.
+    let (batch, summed): (Vec<char>, Vec<char>) =
+        a.iter().copied().filter(|c| b.contains(c)).partition(|c| output.contains(c));
+    let rest = |axes: &[char], other: &[char]| axes.iter().copied().filter(|c| !other.contains(c)).collect::<Vec<char>>();
+    let (of_a, of_b) = (rest(&a, &b), rest(&b, &a));
+    let joined = [batch.clone(), of_a.clone(), of_b.clone()].concat();
     ensure!(
         joined.len() == output.len() && joined.iter().all(|c| output.contains(c)),
-        "{equation:?} sums over an axis of one operand only, or keeps an axis of both; {supported}"
+        "{equation:?} sums over an axis of one operand only; {supported}"
     );
-    let (left, of_a) = turned(x, &a, [&of_a, &summed])?;
-    let (right, of_b) = turned(y, &b, [&summed, &of_b])?;
-    let result = product(exprs, &left, &right, 1.0, budget)?.reshaped([&of_a[0][..], &of_b[1]].concat())?;
+    let (left, of_a) = turned(x, &a, [&batch, &of_a, &summed])?;
+    let (right, of_b) = turned(y, &b, [&batch, &summed, &of_b])?;
+    let shape = [&of_a[0][..], &of_a[1], &of_b[2]].concat();
+    let result = product(exprs, &left, &right, 1.0, budget)?.reshaped(shape)?;
     let order = output.iter().map(|c| joined.iter().position(|other| other == c));
     let order: Vec<usize> = order.collect::<Option<_>>().context("lost an axis; internal error; please report it")?;
     transposed(&result, &order).map(Some)
 }
 
-/// Returns a tensor as a matrix with these axes as rows and columns, and the lengths of the axes.
-fn turned(x: &Tensor, axes: &[char], sides: [&[char]; 2]) -> Result<(Tensor, [Vec<usize>; 2])> {
+/// Returns a tensor as matrices with these axes as batch, rows and columns, and the lengths of the axes.
+fn turned(x: &Tensor, axes: &[char], sides: [&[char]; 3]) -> Result<(Tensor, [Vec<usize>; 3])> {
     let place = |c: &char| axes.iter().position(|axis| axis == c);
     let order: Vec<usize> = sides
         .concat()
@@ -55,7 +57,13 @@ fn turned(x: &Tensor, axes: &[char], sides: [&[char]; 2]) -> Result<(Tensor, [Ve
         .collect::<Option<_>>()
         .context("lost an axis; internal error; please report it")?;
     let turned = transposed(x, &order)?;
-    let (rows, cols) = turned.shape.split_at(sides[0].len());
-    let matrix = turned.reshaped(vec![count(rows)?, count(cols)?])?;
-    Ok((Tensor { name: x.name.clone(), ..matrix }, [rows.to_vec(), cols.to_vec()]))
+    let (batch, rest) = turned.shape.split_at(sides[0].len());
+    let (rows, cols) = rest.split_at(sides[1].len());
+    let mut shape = vec![count(rows)?, count(cols)?];
+    if !batch.is_empty() {
+        shape.insert(0, count(batch)?);
+    }
+    let lens = [batch, rows, cols].map(<[usize]>::to_vec);
+    let matrix = turned.reshaped(shape)?;
+    Ok((Tensor { name: x.name.clone(), ..matrix }, lens))
 }

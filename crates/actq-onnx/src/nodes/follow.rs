@@ -9,6 +9,7 @@ use actq::text::printable;
 use crate::file::kinds;
 use crate::file::model::{Graph, MAX_DEPTH, Model, Node, Port};
 use crate::file::proto;
+use crate::nodes::attention;
 use crate::nodes::call::Call;
 use crate::nodes::cells;
 use crate::nodes::conditions;
@@ -224,6 +225,9 @@ impl<'m> Follower<'m> {
             return Ok(vec![output]);
         }
         let exprs = &mut self.exprs;
+        if let Some(outputs) = attention::run(call, exprs, &mut self.budget)? {
+            return Ok(outputs);
+        }
         if let Some(output) = products::run(call, exprs, &mut self.budget)? {
             return Ok(vec![output]);
         }

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use actq::error::{Context as _, Result, ensure};
+use actq::error::{Context as _, Result, bail, ensure};
 
 use crate::nodes::call::Call;
 use crate::nodes::moves::{expanded, transposed};
@@ -36,6 +36,7 @@ pub(crate) fn run(call: &Call<'_>, most: usize) -> Result<Option<Tensor>> {
         "ReduceProd" | "ReduceSum" | "ReduceMean" | "ReduceMax" | "ReduceMin" => reduce(call, given[0]).map(Some),
         "DequantizeLinear" => dequantized(call).map(Some),
         "NonZero" => nonzero(given[0]).map(Some),
+        "Trilu" => triangle(call).map(Some),
         _ => Ok(None),
     }
 }
@@ -50,6 +51,26 @@ fn nonzero(x: &Tensor) -> Result<Tensor> {
         rows.extend(places.iter().map(|place| (place / stride % len) as i64));
     }
     Ok(Tensor::new(vec![x.shape.len(), places.len()], Data::Int(rows)))
+}
+
+/// Keeps the upper or the lower triangle of matrices; the others become 0.
+fn triangle(call: &Call<'_>) -> Result<Tensor> {
+    let x = call.input(0)?;
+    let &[.., rows, cols] = &x.shape[..] else { bail!("needs a matrix and reads the shape {:?}", x.shape) };
+    let k = if call.optional(1).is_some() { call.integers(1, "the diagonal")?.first().copied().unwrap_or(0) } else { 0 };
+    let is_upper = call.int("upper").unwrap_or(1) != 0;
+    let stays = |i: usize| {
+        let over = (i % cols) as i64 - (i / cols % rows) as i64;
+        if is_upper { over >= k } else { over <= k }
+    };
+    let data = match &x.data {
+        Data::Int(v) => Data::Int(v.iter().enumerate().map(|(i, v)| if stays(i) { *v } else { 0 }).collect()),
+        _ => {
+            let v = x.reals().context("is not known")?;
+            Data::Real(v.iter().enumerate().map(|(i, v)| if stays(i) { *v } else { 0.0 }).collect())
+        }
+    };
+    Ok(Tensor::new(x.shape.clone(), data))
 }
 
 /// Dequantizes weights with one scale and zero point for all, for each index of an axis, or for each block of an axis.

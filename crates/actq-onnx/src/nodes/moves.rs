@@ -292,7 +292,7 @@ fn concat(call: &Call<'_>) -> Result<Tensor> {
 }
 
 /// Joins tensors along an axis.
-fn joined(parts: &[&Tensor], at: usize) -> Result<Tensor> {
+pub(crate) fn joined(parts: &[&Tensor], at: usize) -> Result<Tensor> {
     let first = parts.first().context("has no input to join")?;
     for part in parts {
         let fits = part.shape.len() == first.shape.len();

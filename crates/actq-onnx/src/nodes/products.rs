@@ -5,6 +5,7 @@ use std::sync::Arc;
 use actq::error::{Context as _, Result, bail, ensure};
 
 use crate::nodes::arithmetic::two;
+use crate::nodes::attention;
 use crate::nodes::call::Call;
 use crate::nodes::moves::{expanded, transposed};
 use crate::nodes::places::broadcast;
@@ -71,10 +72,7 @@ pub(crate) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, bu
             let y = product(exprs, &flat(b)?, &flat(a)?, factor, budget)?;
             return if a.shape.len() > 1 && b.shape.len() > 1 { flat(&y) } else { Ok(y) };
         }
-        (false, false) => bail!(
-            "multiplies two values of the network, as attention does, and only constant matrices are supported; export the part after \
-             it"
-        ),
+        (false, false) => return attention::product(exprs, a, b, factor, *budget),
     }
     // Leading axes of length 1 have no effect.
     let ones = b.shape.len().saturating_sub(2);

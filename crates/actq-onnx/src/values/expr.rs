@@ -69,6 +69,36 @@ pub(crate) struct Cell {
     pub(crate) states: Vec<Run>,
 }
 
+/// Products of the rows of two values, a batch of matrices each: `a b'` of `[batch, rows, inner]` and
+/// `[batch, cols, inner]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Products {
+    pub(crate) a: Id,
+    pub(crate) b: Id,
+    pub(crate) batch: usize,
+    pub(crate) rows: usize,
+    pub(crate) inner: usize,
+    pub(crate) cols: usize,
+}
+
+/// `softmax(factor q k') v`: queries, keys and values, each `[token, head, element]`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Attention {
+    pub(crate) queries: Id,
+    pub(crate) keys: Id,
+    pub(crate) values: Id,
+    pub(crate) heads: usize,
+    pub(crate) kv_heads: usize,
+    /// Elements of a head.
+    pub(crate) dim: usize,
+    pub(crate) factor: f64,
+    pub(crate) causal: bool,
+    /// Element of a graph input for each token that is seen only if it is 1, not 0; empty if all always are.
+    pub(crate) valid: Vec<Option<(Id, usize)>>,
+    /// Tokens that the state keeps, of which an evaluation has the last; 0: it has all.
+    pub(crate) context: usize,
+}
+
 /// An expression; [`Exprs`] holds its length.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Expr {
@@ -95,6 +125,13 @@ pub(crate) enum Expr {
     LayerNorm(Id, Vec<f64>, Vec<f64>, f64),
     /// Operand, weight, epsilon of the mean square.
     RmsNorm(Id, Vec<f64>, f64),
+    /// Products of values, in patterns only.
+    Products(Products),
+    /// Softmax of the rows of products times a factor, `true` if a row sees no later column than its own. The elements
+    /// are as in [`Attention::valid`]. In patterns only.
+    Softmax(Id, f64, bool, Vec<Option<(Id, usize)>>),
+    /// Attention of queries to keys and values.
+    Attention(Box<Attention>),
     /// The hidden state after the step.
     Cell(Box<Cell>),
     /// The cell state after the step of an LSTM.
@@ -108,6 +145,11 @@ impl Expr {
             Self::Input(_) | Self::Integers(_) => vec![],
             Self::Pick(runs) => runs.iter().map(|run| run.of).collect(),
             Self::Add(x, y) | Self::Mul(x, y) => vec![*x, *y],
+            Self::Products(of) => vec![of.a, of.b],
+            Self::Attention(of) => {
+                let valid = of.valid.iter().flatten().map(|(id, _)| *id);
+                [of.queries, of.keys, of.values].into_iter().chain(valid).collect()
+            }
             Self::Cell(cell) => vec![cell.x],
             Self::Spread(x)
             | Self::Affine(x, ..)
@@ -117,6 +159,7 @@ impl Expr {
             | Self::Clip(x, _)
             | Self::LayerNorm(x, ..)
             | Self::RmsNorm(x, ..)
+            | Self::Softmax(x, ..)
             | Self::CellState(x) => vec![*x],
         }
     }
@@ -127,6 +170,11 @@ impl Expr {
             Self::Input(_) | Self::Integers(_) => {}
             Self::Pick(runs) => runs.iter_mut().for_each(|run| run.of = of(&run.of)),
             Self::Add(x, y) | Self::Mul(x, y) => (*x, *y) = (of(x), of(y)),
+            Self::Products(products) => (products.a, products.b) = (of(&products.a), of(&products.b)),
+            Self::Attention(all) => {
+                let valid = all.valid.iter_mut().flatten().map(|(id, _)| id);
+                [&mut all.queries, &mut all.keys, &mut all.values].into_iter().chain(valid).for_each(|id| *id = of(id));
+            }
             Self::Cell(cell) => cell.x = of(&cell.x),
             Self::Spread(x)
             | Self::Affine(x, ..)
@@ -136,6 +184,7 @@ impl Expr {
             | Self::Clip(x, _)
             | Self::LayerNorm(x, ..)
             | Self::RmsNorm(x, ..)
+            | Self::Softmax(x, ..)
             | Self::CellState(x) => *x = of(x),
         }
         self

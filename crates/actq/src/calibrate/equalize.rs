@@ -148,7 +148,11 @@ impl Elements {
                     limited.into_iter().filter(|(limit, _)| limit.is_finite()).for_each(|(_, of)| elements.fix(of));
                 }
                 NodeKind::Table(_) => (),
-                NodeKind::Pointwise(_) | NodeKind::Normalize(_) | NodeKind::Balance(_) | NodeKind::Iterate(_) => {
+                NodeKind::Pointwise(_)
+                | NodeKind::Normalize(_)
+                | NodeKind::Balance(_)
+                | NodeKind::Attention(_)
+                | NodeKind::Iterate(_) => {
                     inputs.into_iter().chain([output]).for_each(|of| elements.fix(of));
                 }
             }

@@ -38,6 +38,20 @@ pub fn round_rows(x: ArrayView2<'_, f32>, x_max: u16) -> Array2<f32> {
     y
 }
 
+/// Returns `x` as integers up to `x_max` and a scale for every run of `len` values, as the kernels do; with 0, the values
+/// with scales of 1.
+pub fn rounded(x: &[f32], len: usize, x_max: u16) -> (Vec<f32>, Vec<f32>) {
+    let (mut integers, mut scales) = (x.to_vec(), vec![1.0; x.len() / len]);
+    let top = f32::from(x_max);
+    for (run, scale) in integers.chunks_exact_mut(len).zip(&mut scales).filter(|_| x_max > 0) {
+        let amax = run.iter().fold(0f32, |m, v| m.max(v.abs()));
+        let inverse = if amax > TINY { top / amax } else { 0.0 };
+        *scale = if amax > TINY { amax / top } else { 0.0 };
+        run.iter_mut().for_each(|v| *v = (*v * inverse + ROUND) - ROUND);
+    }
+    (integers, scales)
+}
+
 #[inline(always)]
 fn round(row: &mut [f32], top: f32) {
     let amax = row.iter().fold(0f32, |m, v| m.max(v.abs()));

@@ -81,7 +81,11 @@ fn constants(graph: &Graph) -> Marks {
             NodeKind::Pointwise(_) | NodeKind::Add(_) | NodeKind::Mul(_) | NodeKind::Balance(_) => {
                 (0..node.len).map(all).collect()
             }
-            NodeKind::Lstm(_) | NodeKind::Gru(_) | NodeKind::Iterate(_) | NodeKind::Table(_) => vec![false; node.len],
+            NodeKind::Attention(_)
+            | NodeKind::Lstm(_)
+            | NodeKind::Gru(_)
+            | NodeKind::Iterate(_)
+            | NodeKind::Table(_) => vec![false; node.len],
         };
         constant.push(is_constant);
     }
@@ -119,6 +123,11 @@ fn mark_inputs(graph: &Graph, n: usize, live: &mut Marks) {
         NodeKind::LayerNorm(_) | NodeKind::RmsNorm(_) => {
             let any = live[value].contains(&true);
             [value, node.inputs[0]].into_iter().for_each(|of| live[of].iter_mut().for_each(|mark| *mark |= any));
+        }
+        NodeKind::Attention(_) => {
+            let any = live[value].contains(&true);
+            let all = node.inputs.iter().copied().chain([value]);
+            all.for_each(|of| live[of].iter_mut().for_each(|mark| *mark |= any));
         }
         NodeKind::Concat(Concat(spans)) => {
             let mut from = 0;
@@ -270,6 +279,7 @@ impl Rebuilt {
             let read = match (product, &node.kind) {
                 (Some(product), _) => columns[product.matrix].clone(),
                 (None, NodeKind::LayerNorm(_) | NodeKind::RmsNorm(_)) => (0..node.len).collect(),
+                (None, NodeKind::Attention(_)) => self.kept[input].clone(),
                 (None, _) => kept.clone(),
             };
             self.select(input, read)

@@ -44,7 +44,7 @@ pub enum Elements {
     Inputs,
     /// These parts of the inputs, one after the other.
     Parts(Vec<Range<usize>>),
-    /// Together from outside the network: none can be removed.
+    /// Together from outside the network, or from all elements of the inputs: neither they nor those can be removed.
     Whole,
 }
 
@@ -202,6 +202,11 @@ impl<'a> Forward<'a> {
     /// Returns the value that the network reads of the iterate.
     pub fn iterate(&self) -> &'a Array2<f32> {
         self.iterate.unwrap_or(self.values.of(0))
+    }
+
+    /// Returns `true` if the image's activations are rounded.
+    pub fn is_rounded(&self) -> bool {
+        self.x_max.iter().any(|x_max| *x_max > 0)
     }
 
     /// Returns `x` as it enters the product with a matrix: rounded if the image's activations are.

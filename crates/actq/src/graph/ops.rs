@@ -14,6 +14,7 @@ macro_rules! learned {
 }
 
 mod add;
+mod attention;
 mod concat;
 mod function;
 mod gru;
@@ -29,6 +30,7 @@ mod table;
 use std::ops::{Deref, DerefMut};
 
 pub use add::Add;
+pub use attention::{Attention, MAX_ATTENTION, MAX_HEADS};
 pub use concat::{Concat, Span};
 pub use function::Pointwise;
 pub use gru::Gru;
@@ -110,6 +112,8 @@ operations! {
     Add,
     /// Product of two values, element by element.
     Mul,
+    /// Attention of queries to keys and values.
+    Attention,
     /// Concatenated parts of values.
     Concat,
     /// A recurrent cell with a cell state.

@@ -31,6 +31,9 @@ pub trait Keys {
     /// Returns a number that is not negative and has no fraction.
     fn count(&self, key: &str) -> Result<Option<usize>>;
 
+    /// Returns `true` or `false`.
+    fn truth(&self, key: &str) -> Result<Option<bool>>;
+
     /// Reads the tensor that the key names, which has `len` values.
     fn vector(&self, key: &str, len: usize) -> Result<Option<Vec<f32>>>;
 

@@ -92,7 +92,10 @@ impl Ties {
         for node in &graph.nodes {
             let inputs: Vec<Layout> = node.inputs.iter().map(|&value| values[value].clone()).collect();
             let layout = match node.kind.elements() {
-                Elements::Whole => vec![found.group(node.len, true)],
+                Elements::Whole => {
+                    inputs.iter().for_each(|input| found.fix(input));
+                    vec![found.group(node.len, true)]
+                }
                 Elements::Inputs => {
                     inputs.iter().skip(1).for_each(|other| found.tie(&inputs[0], other));
                     inputs[0].clone()

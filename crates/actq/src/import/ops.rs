@@ -216,6 +216,10 @@ impl Keys for OpKeys<'_, '_> {
         self.value(key, "a whole number that is not negative", |value| value.as_u64()?.try_into().ok())
     }
 
+    fn truth(&self, key: &str) -> Result<Option<bool>> {
+        self.value(key, "true or false", Value::as_bool)
+    }
+
     fn vector(&self, key: &str, len: usize) -> Result<Option<Vec<f32>>> {
         self.text(key)?.map(|name| self.builder.weights.vector(name, len)).transpose()
     }

@@ -228,6 +228,10 @@ impl Keys for Filled<'_> {
         Ok(None)
     }
 
+    fn truth(&self, _: &str) -> actq::error::Result<Option<bool>> {
+        Ok(None)
+    }
+
     fn vector(&self, _: &str, len: usize) -> actq::error::Result<Option<Vec<f32>>> {
         Ok(Some(vec![1.5; len]))
     }

@@ -1,0 +1,361 @@
+use std::ops::Range;
+
+use actq_kernels::math;
+use ndarray::Array2;
+
+use crate::error::{Result, bail, ensure};
+use crate::graph::arrays::{contiguous, contiguous_mut, rounded, sum_of_products};
+use crate::graph::lowering::{BufferId, Lowering};
+use crate::graph::operation::{Backward, Elements, Forward, NodeState, Operation, Saved};
+use crate::graph::syntax::{Keys, Syntax, required};
+use crate::graph::values::{ValueId, WeightMatrix};
+use crate::simd::wide;
+
+/// The most tokens that a query reads, and the largest head dimension: sums of an image's products stay in 32 bits.
+pub const MAX_ATTENTION: usize = 512;
+/// The most heads of queries.
+pub const MAX_HEADS: usize = 16;
+
+/// Largest magnitudes of keys, values and queries, and of the weights of a query, as the image rounds them.
+const TOKEN_MAX: u16 = 127;
+const WEIGHT_MAX: u16 = 32767;
+
+/// Scaled dot-product attention over three inputs: queries, keys and values, each `[token, head, element]`. Query head
+/// `h` reads key and value head `h / (heads / kv_heads)`:
+/// `softmax(factor q k') v`, with a softmax over the tokens that the query sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attention {
+    /// Heads of the queries.
+    pub heads: usize,
+    /// Heads of the keys and values; a divisor of `heads`.
+    pub kv_heads: usize,
+    /// Elements of a head.
+    pub dim: usize,
+    /// Factor of the products of queries and keys, above 0.
+    pub factor: f32,
+    /// `true` if a query sees no token after its own; the last query is at the last token.
+    pub causal: bool,
+    /// 0: the tokens are those of one evaluation. Else an evaluation has one token, and its query sees this many of the
+    /// last tokens, whose keys and values are the state.
+    pub context: usize,
+}
+
+/// Tokens of one attention, `[token, head, element]`.
+struct Tokens {
+    queries: Vec<f32>,
+    keys: Vec<f32>,
+    values: Vec<f32>,
+    /// Tokens before those of this pass.
+    before: usize,
+}
+
+/// Derivatives by [`Tokens`].
+struct Gradients {
+    queries: Vec<f32>,
+    keys: Vec<f32>,
+    values: Vec<f32>,
+}
+
+impl Attention {
+    /// Elements of a token's queries, and of its keys or values.
+    fn widths(&self) -> [usize; 2] {
+        [self.heads, self.kv_heads].map(|heads| heads * self.dim)
+    }
+
+    /// Returns the tokens that query `i` of `queries` sees among `tokens`.
+    fn seen(&self, i: usize, queries: usize, tokens: usize) -> Range<usize> {
+        let end = if self.causal || self.context > 0 { tokens + i + 1 - queries } else { tokens };
+        let start = if self.context > 0 { end.saturating_sub(self.context) } else { 0 };
+        start..end
+    }
+
+    /// Computes the softmax of a query over the keys that it sees; `weights` receives a value for each.
+    fn softmax(&self, query: &[f32], keys: &[f32], kv_head: usize, weights: &mut Vec<f32>) {
+        let width = self.kv_heads * self.dim;
+        weights.clear();
+        let key = |key: &[f32]| sum_of_products(query, &key[kv_head * self.dim..][..self.dim]) * self.factor;
+        weights.extend(keys.chunks_exact(width).map(key));
+        let most = weights.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        weights.iter_mut().for_each(|weight| *weight = math::exp(*weight - most));
+        let sum: f32 = weights.iter().sum();
+        weights.iter_mut().for_each(|weight| *weight /= sum);
+    }
+
+    /// Computes the outputs `[query, head, element]`; `is_rounded` rounds as an image does.
+    fn outputs(&self, tokens: &Tokens, is_rounded: bool) -> Vec<f32> {
+        let [width, kv_width] = self.widths();
+        let integers = |x: &[f32]| rounded(x, self.dim, if is_rounded { TOKEN_MAX } else { 0 });
+        let [(queries, of_queries), (keys, of_keys), (values, scales)] =
+            [&tokens.queries, &tokens.keys, &tokens.values].map(|x| integers(x));
+        // Scaled back, as the scores are f32 in an image, too.
+        let scaled = |x: Vec<f32>, scales: &[f32]| -> Vec<f32> {
+            x.chunks(self.dim).zip(scales).flat_map(|(x, scale)| x.iter().map(move |v| v * scale)).collect()
+        };
+        let (queries, keys) = (scaled(queries, &of_queries), scaled(keys, &of_keys));
+        let (count, all) = (queries.len() / width, keys.len() / kv_width);
+        let mut outputs = vec![0.0; queries.len()];
+        let mut weights = Vec::with_capacity(all);
+        for (at, (query, output)) in
+            queries.chunks_exact(self.dim).zip(outputs.chunks_exact_mut(self.dim)).enumerate()
+        {
+            let (i, head) = (at / self.heads, at % self.heads);
+            let (seen, kv_head) = (self.seen(i, count, all), head * self.kv_heads / self.heads);
+            self.softmax(query, &keys[seen.start * kv_width..seen.end * kv_width], kv_head, &mut weights);
+            let place = |token: usize| (seen.start + token) * self.kv_heads + kv_head;
+            weights.iter_mut().enumerate().for_each(|(token, weight)| *weight *= scales[place(token)]);
+            if is_rounded {
+                round_shares(&mut weights);
+            }
+            for (token, weight) in weights.iter().enumerate() {
+                let value = &values[place(token) * self.dim..][..self.dim];
+                output.iter_mut().zip(value).for_each(|(sum, value)| *sum += weight * value);
+            }
+        }
+        outputs
+    }
+
+    /// Returns the derivatives of the outputs without rounding; `dy` is the derivative by them.
+    fn gradients(&self, tokens: &Tokens, dy: &[f32]) -> Gradients {
+        let Tokens { queries, keys, values, .. } = tokens;
+        let [width, kv_width] = self.widths();
+        let (count, all) = (queries.len() / width, keys.len() / kv_width);
+        let zeros = |of: &[f32]| vec![0.0; of.len()];
+        let mut d = Gradients { queries: zeros(queries), keys: zeros(keys), values: zeros(values) };
+        let (mut weights, mut d_weights) = (Vec::with_capacity(all), Vec::with_capacity(all));
+        let heads = queries.chunks_exact(self.dim).zip(dy.chunks_exact(self.dim));
+        for (at, ((query, dy), d_query)) in heads.zip(d.queries.chunks_exact_mut(self.dim)).enumerate() {
+            let (i, head) = (at / self.heads, at % self.heads);
+            let (seen, kv_head) = (self.seen(i, count, all), head * self.kv_heads / self.heads);
+            self.softmax(query, &keys[seen.start * kv_width..seen.end * kv_width], kv_head, &mut weights);
+            let place = |token: usize| ((seen.start + token) * self.kv_heads + kv_head) * self.dim;
+            let of_value = |token: usize| sum_of_products(dy, &values[place(token)..][..self.dim]);
+            d_weights.clear();
+            d_weights.extend((0..weights.len()).map(of_value));
+            let mean = sum_of_products(&weights, &d_weights);
+            for (token, (weight, d_weight)) in weights.iter().zip(&d_weights).enumerate() {
+                let at = place(token);
+                let d_score = weight * (d_weight - mean) * self.factor;
+                add(&mut d.values[at..][..self.dim], dy, *weight);
+                add(&mut d.keys[at..][..self.dim], query, d_score);
+                add(d_query, &keys[at..][..self.dim], d_score);
+            }
+        }
+        d
+    }
+
+    /// Returns the tokens of a row of each input.
+    fn of_row(&self, inputs: [&Array2<f32>; 3], row: usize) -> Tokens {
+        let [queries, keys, values] = inputs.map(|x| contiguous(&x.row(row)).to_vec());
+        Tokens { queries, keys, values, before: 0 }
+    }
+
+    /// Returns the tokens of a sample of a sequence, those of its state first.
+    fn of_sequence(&self, inputs: [&Array2<f32>; 3], state: &NodeState, sample: usize) -> Tokens {
+        let [of_keys, of_values] = state.each_ref().map(|array| array.row(sample));
+        let (of_keys, of_values) = (contiguous(&of_keys), contiguous(&of_values));
+        let (count, width) = (of_keys[0] as usize, self.kv_heads * self.dim);
+        let before = count.min(self.context);
+        let in_order = |ring: &[f32]| -> Vec<f32> {
+            (count - before..count).flat_map(|token| &ring[token % self.context * width..][..width]).copied().collect()
+        };
+        let (mut keys, mut values) = (in_order(&of_keys[1..]), in_order(of_values));
+        let mut queries = Vec::new();
+        for row in (sample..inputs[0].nrows()).step_by(state[0].nrows()) {
+            queries.extend_from_slice(contiguous(&inputs[0].row(row)));
+            keys.extend_from_slice(contiguous(&inputs[1].row(row)));
+            values.extend_from_slice(contiguous(&inputs[2].row(row)));
+        }
+        Tokens { queries, keys, values, before }
+    }
+
+    /// Stores the last tokens of a sequence in a sample's state.
+    fn store(&self, tokens: &Tokens, state: &mut NodeState, sample: usize) {
+        let width = self.kv_heads * self.dim;
+        let [of_keys, of_values] = state;
+        let (mut of_keys, mut of_values) = (of_keys.row_mut(sample), of_values.row_mut(sample));
+        let (of_keys, of_values) = (contiguous_mut(&mut of_keys), contiguous_mut(&mut of_values));
+        let all = tokens.keys.len() / width;
+        // Token 0 of `tokens` is this one since the reset.
+        let first = of_keys[0] as usize - tokens.before;
+        for token in all.saturating_sub(self.context)..all {
+            let slot = (first + token) % self.context * width;
+            of_keys[1 + slot..][..width].copy_from_slice(&tokens.keys[token * width..][..width]);
+            of_values[slot..][..width].copy_from_slice(&tokens.values[token * width..][..width]);
+        }
+        of_keys[0] = self.counted(first + all) as f32;
+    }
+
+    /// Returns a count of tokens below twice the context that has the same slots.
+    fn counted(&self, count: usize) -> usize {
+        if count < 2 * self.context { count } else { self.context + count % self.context }
+    }
+
+    /// Adds the derivative by the state after a sequence to that by its tokens, and replaces it by that by the state
+    /// before.
+    fn pass_back(&self, tokens: &Tokens, d: &mut Gradients, count: usize, d_state: &mut NodeState, sample: usize) {
+        let width = self.kv_heads * self.dim;
+        let (all, first) = (tokens.keys.len() / width, count - tokens.before);
+        for (array, start, d) in [(0, 1, &mut d.keys), (1, 0, &mut d.values)] {
+            let mut row = d_state[array].row_mut(sample);
+            let ring = &mut contiguous_mut(&mut row)[start..];
+            let slot = |token: usize| (first + token) % self.context * width;
+            for token in all.saturating_sub(self.context)..all {
+                add(&mut d[token * width..][..width], &ring[slot(token)..][..width], 1.0);
+            }
+            ring.fill(0.0);
+            for token in 0..tokens.before {
+                ring[slot(token)..][..width].copy_from_slice(&d[token * width..][..width]);
+            }
+        }
+    }
+}
+
+impl Operation for Attention {
+    fn output_len(&self, _: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
+        let &[queries, keys, values] = inputs else {
+            bail!("takes queries, keys and values, not {} inputs", inputs.len())
+        };
+        let Self { heads, kv_heads, dim, factor, causal, context } = *self;
+        ensure!((1..=MAX_HEADS).contains(&heads), "has {heads} heads; 1 to {MAX_HEADS} are supported");
+        ensure!(
+            kv_heads > 0 && heads.is_multiple_of(kv_heads),
+            "has {kv_heads} heads of keys for {heads} of queries; it must be a divisor"
+        );
+        ensure!((1..=MAX_ATTENTION).contains(&dim), "has heads of {dim} values; 1 to {MAX_ATTENTION} are supported");
+        ensure!(factor > 0.0 && factor.is_finite(), "has the factor {factor}; it must be above 0 and finite");
+        let [width, kv_width] = self.widths();
+        ensure!(
+            queries > 0 && queries.is_multiple_of(width),
+            "its {queries} queries are not tokens of {heads} heads of {dim} values"
+        );
+        ensure!(
+            keys > 0 && keys.is_multiple_of(kv_width) && values == keys,
+            "its {keys} keys and {values} values are not tokens of {kv_heads} heads of {dim} values"
+        );
+        let (of_queries, tokens) = (queries / width, keys / kv_width);
+        ensure!(!causal || of_queries <= tokens, "has {of_queries} queries for {tokens} causal keys");
+        let most = tokens.max(context);
+        ensure!(most <= MAX_ATTENTION, "reads {most} tokens; at most {MAX_ATTENTION} are supported");
+        ensure!(
+            context == 0 || (of_queries, tokens) == (1, 1),
+            "keeps tokens from step to step, and reads {of_queries} queries and {tokens} keys in a step; it must be one"
+        );
+        Ok(queries)
+    }
+
+    fn syntax() -> Vec<Syntax<Self>> {
+        let read = |op: &mut dyn Keys| {
+            op.add_input("keys")?;
+            op.add_input("values")?;
+            let heads = required(op.count("heads")?, "heads")?;
+            let dim = required(op.count("dim")?, "dim")?;
+            let factor = op.number("factor")?.map_or(1.0 / (dim as f32).sqrt(), |factor| factor as f32);
+            Ok(Self {
+                heads,
+                kv_heads: op.count("kv_heads")?.unwrap_or(heads),
+                dim,
+                factor,
+                causal: op.truth("causal")?.unwrap_or(false),
+                context: op.count("context")?.unwrap_or(0),
+            })
+        };
+        let keys = &["keys", "values", "heads", "kv_heads", "dim", "factor", "causal", "context"];
+        vec![Syntax { name: "attention", keys, read }]
+    }
+
+    fn elements(&self) -> Elements {
+        Elements::Whole
+    }
+
+    /// Keys with the number of tokens since the reset before them, and values: rings of `context` tokens.
+    fn state_lens(&self) -> [usize; 2] {
+        let ring = self.context * self.kv_heads * self.dim;
+        [if self.context > 0 { 1 + ring } else { 0 }, ring]
+    }
+
+    fn forward(&self, run: &Forward<'_>, state: &mut NodeState) -> (Array2<f32>, Saved) {
+        let inputs = [run.input(0), run.input(1), run.input(2)];
+        let mut y = Array2::zeros(inputs[0].raw_dim());
+        let outputs = |tokens: &Tokens| {
+            wide(
+                #[inline(always)]
+                || self.outputs(tokens, run.is_rounded()),
+            )
+        };
+        if self.context == 0 {
+            for (row, mut y) in y.rows_mut().into_iter().enumerate() {
+                contiguous_mut(&mut y).copy_from_slice(&outputs(&self.of_row(inputs, row)));
+            }
+            return (y, Saved::default());
+        }
+        let start = state.clone();
+        let batch = state[0].nrows();
+        for sample in 0..batch {
+            let tokens = self.of_sequence(inputs, &start, sample);
+            let steps = outputs(&tokens);
+            for (row, step) in (sample..y.nrows()).step_by(batch).zip(steps.chunks_exact(inputs[0].ncols())) {
+                contiguous_mut(&mut y.row_mut(row)).copy_from_slice(step);
+            }
+            self.store(&tokens, state, sample);
+        }
+        (y, Saved { inner: start.into(), ..Saved::default() })
+    }
+
+    fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, d_state: &mut NodeState) {
+        let inputs = [run.input(0), run.input(1), run.input(2)];
+        let mut d_inputs = inputs.map(|x| Array2::zeros(x.raw_dim()));
+        let gradients = |tokens: &Tokens, dy: &[f32]| {
+            wide(
+                #[inline(always)]
+                || self.gradients(tokens, dy),
+            )
+        };
+        let mut give = |row: usize, parts: [&[f32]; 3]| {
+            for (d, part) in d_inputs.iter_mut().zip(parts) {
+                contiguous_mut(&mut d.row_mut(row)).copy_from_slice(part);
+            }
+        };
+        if self.context == 0 {
+            for (row, dy) in dy.rows().into_iter().enumerate() {
+                let d = gradients(&self.of_row(inputs, row), contiguous(&dy));
+                give(row, [&d.queries, &d.keys, &d.values]);
+            }
+        } else if let Ok(start) = NodeState::try_from(saved.inner) {
+            let [width, kv_width] = self.widths();
+            let batch = start[0].nrows();
+            for sample in 0..batch {
+                let tokens = self.of_sequence(inputs, &start, sample);
+                let of_sample: Vec<f32> =
+                    (sample..dy.nrows()).step_by(batch).flat_map(|row| dy.row(row).to_vec()).collect();
+                let mut d = gradients(&tokens, &of_sample);
+                self.pass_back(&tokens, &mut d, start[0][[sample, 0]] as usize, d_state, sample);
+                for (step, row) in (sample..dy.nrows()).step_by(batch).enumerate() {
+                    let token = (tokens.before + step) * kv_width;
+                    let of_token = |d: &'_ Vec<f32>| d[token..token + kv_width].to_vec();
+                    give(row, [&d.queries[step * width..][..width], &of_token(&d.keys), &of_token(&d.values)]);
+                }
+            }
+        }
+        for (i, d) in d_inputs.into_iter().enumerate() {
+            run.give(i, d);
+        }
+    }
+
+    fn lower(&self, _: &mut Lowering, _: &[ValueId], _: usize) -> BufferId {
+        unimplemented!()
+    }
+}
+
+/// Adds `factor x` to `sum`.
+#[inline(always)]
+fn add(sum: &mut [f32], x: &[f32], factor: f32) {
+    sum.iter_mut().zip(x).for_each(|(sum, x)| *sum += factor * x);
+}
+
+/// Rounds weights to multiples of a share of their sum, as an image does.
+fn round_shares(weights: &mut [f32]) {
+    let step = weights.iter().sum::<f32>() / f32::from(WEIGHT_MAX);
+    if step > 0.0 {
+        weights.iter_mut().for_each(|weight| *weight = (*weight / step).round_ties_even() * step);
+    }
+}
