@@ -58,6 +58,7 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
     let kept_len = kept + if contract.binarise.is_some() { act_len } else { 0 };
     let Some(denoising) = &graph.denoising else {
         lower_nodes(&graph.nodes, &mut lowering);
+        let work_len = work_len.max(lowering.work_words);
         if let Some(around) = around {
             let output = lowering.place(graph.output());
             lowering.steps.extend(around.after.iter().map(|step| after(step, output)));
@@ -71,10 +72,12 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
     let iterate = lowering.noise(graph.noise_len(), denoising.len);
     let (before, of_step) = graph.nodes.split_at(denoising.first);
     lower_nodes(before, &mut lowering);
-    let read: Vec<ValueId> =
-        of_step.iter().flat_map(|node| node.inputs.iter().copied()).filter(|value| *value <= denoising.first).collect();
+    let mut read: Vec<ValueId> =
+        of_step.iter().flat_map(|node| node.kind.prepare(&mut lowering, &node.inputs, denoising.first)).collect();
+    read.retain(|value| *value <= denoising.first);
     let first_denoising_op = lowering.begin_steps(iterate, &read);
     lower_nodes(of_step, &mut lowering);
+    let work_len = work_len.max(lowering.work_words);
     let mut constants = vec![denoising.limit, f32::from_bits(0)];
     constants.extend(denoising.steps.iter().flat_map(|step| step.to_array()));
     let (velocity, read_next) = (lowering.place(graph.output()), lowering.whole(lowering.iterate()));

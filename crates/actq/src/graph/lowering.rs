@@ -18,7 +18,7 @@ pub struct Step<R> {
     pub dst: R,
     /// First source.
     pub src: Option<R>,
-    /// Cell state, or the gates of the state.
+    /// Cell state, gates of the state, values of attention, or its cache.
     pub third: Option<R>,
     /// Data that its record points to.
     pub data: StepData,
@@ -103,18 +103,22 @@ pub struct Lowering {
     readers: Vec<usize>,
     /// Buffer of the value that the network reads of the iterate.
     iterate: BufferId,
+    /// Caches of attention that need not be written again, by their keys, values and heads.
+    caches: Vec<([usize; 3], BufferId)>,
+    /// Words of the work area that operations without a matrix need.
+    pub work_words: usize,
 }
 
 impl Lowering {
     /// Starts with the observation alone; `readers` holds how many nodes read each value.
     pub fn new(obs_len: usize, readers: Vec<usize>) -> Self {
         let observation = Buffer { len: obs_len, lifetime: Lifetime::Observation };
-        Self { steps: Vec::new(), buffers: vec![observation], places: vec![0], readers, iterate: 0 }
+        Self { steps: Vec::new(), buffers: vec![observation], places: vec![0], readers, iterate: 0, caches: Vec::new(), work_words: 0 }
     }
 
     /// Starts with buffers and operations around a network, whose observation is in `observation`.
     pub fn inside(steps: Vec<Step<Slice>>, buffers: Vec<Buffer>, observation: BufferId, readers: Vec<usize>) -> Self {
-        Self { steps, buffers, places: vec![observation], readers, iterate: 0 }
+        Self { steps, buffers, places: vec![observation], readers, iterate: 0, caches: Vec::new(), work_words: 0 }
     }
 
     /// Adds a buffer.
@@ -148,6 +152,16 @@ impl Lowering {
             }
         }
         self.steps.len()
+    }
+
+    /// Returns the cache with these keys, values and heads, if an operation before has written it.
+    pub fn cache(&self, of: [usize; 3]) -> Option<BufferId> {
+        self.caches.iter().find(|(known, _)| *known == of).map(|(_, cache)| *cache)
+    }
+
+    /// Records that a cache holds these keys, values and heads for all later operations.
+    pub fn add_cache(&mut self, of: [usize; 3], cache: BufferId) {
+        self.caches.push((of, cache));
     }
 
     /// Returns the buffer of the value that the network reads of the iterate.

@@ -123,6 +123,12 @@ pub trait Operation {
     /// receives. `d_state`, the derivative by the state after the step, becomes that by the state before it.
     fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, d_state: &mut NodeState);
 
+    /// Appends those of its operations that only need values up to `last`, before the first denoising step. Returns the
+    /// inputs that [`Self::lower`] reads in the steps.
+    fn prepare(&self, _to: &mut Lowering, inputs: &[ValueId], _last: ValueId) -> Vec<ValueId> {
+        inputs.to_vec()
+    }
+
     /// Appends its operations over the values `inputs`, and returns the buffer that then holds its output of `len`
     /// values.
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId;

@@ -240,7 +240,7 @@ pub(super) mod tests {
     use super::*;
     use crate::graph::Denoising;
     use crate::graph::ops::{
-        Add, Concat, Gru, LayerNorm, Linear, Lstm, Mul, NodeKind, Normalize, Pointwise, RmsNorm, Span,
+        Add, Attention, Concat, Gru, LayerNorm, Linear, Lstm, Mul, NodeKind, Normalize, Pointwise, RmsNorm, Span,
     };
     use crate::graph::ops::{Iterate, Table};
     use crate::graph::values::{ValueId, WeightMatrix};
@@ -286,6 +286,26 @@ pub(super) mod tests {
         let (input_bias, state_bias) = (vector(9, 9), vector(9, 10));
         last = push(Gru { hidden: 3, input: next + 2, state: next + 3, input_bias, state_bias }.into(), &[last]);
         push(Linear { matrix: next + 4, bias: vector(2, 11) }.into(), &[last]);
+        graph
+    }
+
+    /// Makes a network of attention: causal to the three tokens of an evaluation, with one head of keys and values for two
+    /// of queries, then to the last two steps.
+    pub(in crate::graph) fn attentive() -> Graph {
+        let mut seed = Random::new(14);
+        let mut graph = Graph::new(5);
+        let mut linear = |graph: &mut Graph, rows: usize, input: ValueId| {
+            let cols = graph.len_of(input);
+            let data = random(rows * cols, &mut seed);
+            let matrix = graph.add_matrix(WeightMatrix { name: "m".into(), rows, cols, data }).expect("a matrix");
+            graph.add(Linear { matrix, bias: random(rows, &mut seed) }, &[input]).expect("it fits")
+        };
+        let full = Attention { heads: 2, kv_heads: 1, dim: 2, factor: 0.7, causal: true, context: 0 };
+        let inputs = [12, 6, 6].map(|rows| linear(&mut graph, rows, 0));
+        let tokens = graph.add(full, &inputs).expect("it fits");
+        let inputs = [4, 2, 2].map(|rows| linear(&mut graph, rows, tokens));
+        let last = graph.add(Attention { causal: false, context: 2, ..full }, &inputs).expect("it fits");
+        linear(&mut graph, 2, last);
         graph
     }
 
@@ -349,6 +369,37 @@ pub(super) mod tests {
     #[test]
     fn gradients_agree_with_finite_differences() {
         derivatives_are_right(&graph());
+    }
+
+    #[test]
+    fn gradients_of_attention_agree_with_finite_differences() {
+        derivatives_are_right(&attentive());
+    }
+
+    #[test]
+    fn a_sequence_of_attention_equals_its_steps() {
+        let graph = attentive();
+        let (weights, network) = (Weights::of(&graph), Network::new(&graph));
+        let mut states = [zero_state(&graph, 2), zero_state(&graph, 2)];
+        let mut gradients = Vec::new();
+        for at_once in [false, true] {
+            let state = &mut states[usize::from(at_once)];
+            let all = observations();
+            let views: Vec<_> = all.iter().map(|obs| obs.view()).collect();
+            let parts = if at_once { vec![ndarray::concatenate(ndarray::Axis(0), &views).expect("rows")] } else { all };
+            let passes: Vec<Pass> = parts.into_iter().map(|obs| network.forward(&weights, obs, state)).collect();
+            let outputs: Vec<f32> = passes.iter().flat_map(|pass| pass.output().iter().copied()).collect();
+            let mut d_state = zero_state(&graph, 2);
+            let back = |pass: Pass| {
+                let d = pass.output().mapv(|y| y + 1.0);
+                network.backward(&weights, pass, d, &mut d_state)
+            };
+            let (matrices, _) = Derivatives::sum(&graph, passes.into_iter().rev().map(back).collect());
+            gradients.push((outputs, matrices.iter().flatten().copied().collect::<Vec<f32>>()));
+        }
+        let near = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4 * (1.0 + a.abs()));
+        assert!(near(&gradients[0].0, &gradients[1].0) && near(&gradients[0].1, &gradients[1].1), "{gradients:?}");
+        assert_eq!(states[0], states[1]);
     }
 
     #[test]

@@ -192,6 +192,11 @@ fn recurrent_cells_and_states() -> Result<()> {
 }
 
 #[test]
+fn attention() -> Result<()> {
+    check(include_str!("cases/attention.txt"))
+}
+
+#[test]
 fn inputs_and_outputs() -> Result<()> {
     check(include_str!("cases/ports.txt"))
 }

@@ -1,11 +1,13 @@
 use std::ops::Range;
 
+use actq_kernels::image::OpKind;
 use actq_kernels::math;
+use actq_kernels::ops::attention::{cache_words, work_words};
 use ndarray::Array2;
 
 use crate::error::{Result, bail, ensure};
 use crate::graph::arrays::{contiguous, contiguous_mut, rounded, sum_of_products};
-use crate::graph::lowering::{BufferId, Lowering};
+use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
 use crate::graph::operation::{Backward, Elements, Forward, NodeState, Operation, Saved};
 use crate::graph::syntax::{Keys, Syntax, required};
 use crate::graph::values::{ValueId, WeightMatrix};
@@ -70,6 +72,7 @@ impl Attention {
     }
 
     /// Computes the softmax of a query over the keys that it sees; `weights` receives a value for each.
+    #[inline(always)]
     fn softmax(&self, query: &[f32], keys: &[f32], kv_head: usize, weights: &mut Vec<f32>) {
         let width = self.kv_heads * self.dim;
         weights.clear();
@@ -82,6 +85,7 @@ impl Attention {
     }
 
     /// Computes the outputs `[query, head, element]`; `is_rounded` rounds as an image does.
+    #[inline(always)]
     fn outputs(&self, tokens: &Tokens, is_rounded: bool) -> Vec<f32> {
         let [width, kv_width] = self.widths();
         let integers = |x: &[f32]| rounded(x, self.dim, if is_rounded { TOKEN_MAX } else { 0 });
@@ -115,6 +119,7 @@ impl Attention {
     }
 
     /// Returns the derivatives of the outputs without rounding; `dy` is the derivative by them.
+    #[inline(always)]
     fn gradients(&self, tokens: &Tokens, dy: &[f32]) -> Gradients {
         let Tokens { queries, keys, values, .. } = tokens;
         let [width, kv_width] = self.widths();
@@ -141,6 +146,23 @@ impl Attention {
             }
         }
         d
+    }
+
+    /// Returns the cache of the keys and values, and its slots. Emits the operation that writes it, unless one has.
+    fn cache(&self, to: &mut Lowering, inputs: &[ValueId], lifetime: Lifetime) -> (BufferId, usize) {
+        let (keys, values) = (to.place(inputs[1]), to.place(inputs[2]));
+        let slots = if self.context > 0 { self.context } else { keys.len / (self.kv_heads * self.dim) };
+        let of = [inputs[1], inputs[2], self.kv_heads];
+        if let Some(cache) = to.cache(of) {
+            return (cache, slots);
+        }
+        let cache = to.buffer(cache_words(self.kv_heads, self.dim, slots), lifetime);
+        let data = vec![pair(self.kv_heads, self.dim), pair(slots, usize::from(self.context > 0))];
+        to.emit(OpKind::Keep, to.whole(cache), Some(keys), Some(values), StepData::Words(data));
+        if self.context == 0 {
+            to.add_cache(of, cache);
+        }
+        (cache, slots)
     }
 
     /// Returns the tokens of a row of each input.
@@ -341,9 +363,36 @@ impl Operation for Attention {
         }
     }
 
-    fn lower(&self, _: &mut Lowering, _: &[ValueId], _: usize) -> BufferId {
-        unimplemented!()
+    fn prepare(&self, to: &mut Lowering, inputs: &[ValueId], last: ValueId) -> Vec<ValueId> {
+        if self.context > 0 || inputs[1].max(inputs[2]) > last {
+            return inputs.to_vec();
+        }
+        let (cache, _) = self.cache(to, inputs, Lifetime::Output);
+        to.buffers[cache].lifetime = Lifetime::Output;
+        vec![inputs[0]]
     }
+
+    fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
+        let lifetime = if self.context > 0 { Lifetime::State } else { Lifetime::Step };
+        let (cache, slots) = self.cache(to, inputs, lifetime);
+        let dst = to.buffer(len, Lifetime::Step);
+        to.work_words = to.work_words.max(work_words(self.dim, slots));
+        let [heads, shared] = [pair(self.heads, self.kv_heads), pair(self.dim, slots)];
+        let data = vec![heads, shared, u32::from(self.causal), self.factor.to_bits()];
+        to.emit(
+            OpKind::Attend,
+            to.whole(dst),
+            Some(to.place(inputs[0])),
+            Some(to.whole(cache)),
+            StepData::Words(data),
+        );
+        dst
+    }
+}
+
+/// Returns two values of 16 bits as a word.
+fn pair(low: usize, high: usize) -> u32 {
+    (low | high << 16) as u32
 }
 
 /// Adds `factor x` to `sum`.
@@ -357,5 +406,114 @@ fn round_shares(weights: &mut [f32]) {
     let step = weights.iter().sum::<f32>() / f32::from(WEIGHT_MAX);
     if step > 0.0 {
         weights.iter_mut().for_each(|weight| *weight = (*weight / step).round_ties_even() * step);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use actq_kernels::Width;
+
+    use super::*;
+    use crate::budget::{Budget, Rate};
+    use crate::emit;
+    use crate::graph::ops::{Iterate, Linear};
+    use crate::graph::run::tests::attentive;
+    use crate::graph::weights::zero_state;
+    use crate::graph::{Denoising, Graph, Network, Weights};
+    use crate::methods::{Activations, Method, Options, quantize};
+    use crate::policy::Policy;
+    use crate::random::Random;
+    use crate::runtime::{ImageBuffer, with_head};
+
+    /// Returns the largest difference between the steps of an image and of its rounded network, and the largest output.
+    fn off_image(graph: &Graph, policy: impl Fn(Graph) -> Policy) -> (f32, f32) {
+        let options =
+            Options { activations: Activations::Int8, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
+        let (mut graph, outcomes) = quantize(graph, None, Rate::Width(Width::W8), &options).expect("outcomes");
+        let bytes = emit::image(&policy(graph.clone()), &outcomes).expect("an image");
+        for (matrix, outcome) in graph.matrices.iter_mut().zip(&outcomes) {
+            matrix.data = outcome.quantized.dequantized();
+        }
+        let x_max: Vec<u16> = outcomes.iter().map(|outcome| outcome.x_max).collect();
+        let (weights, mut state) = (Weights::of(&graph), zero_state(&graph, 1));
+        let network = Network::rounded(&graph, &x_max);
+        let buffer = ImageBuffer::new(&bytes);
+        let mut random = Random::new(6);
+        let (mut off, mut most) = (0f32, 0f32);
+        with_head::<_, crate::error::Error>(buffer.image(Path::new("memory")).expect("an image"), |head| {
+            for _ in 0..5 {
+                let obs: Vec<f32> = (0..graph.input_len()).map(|_| random.unit()).collect();
+                let expected = network.forward_one(&weights, &obs, &mut state);
+                for (a, b) in head.infer(&obs)?.iter().zip(&expected) {
+                    (off, most) = (off.max((a - b).abs()), most.max(b.abs()));
+                }
+            }
+            Ok(())
+        })
+        .expect("the executor");
+        (off, most)
+    }
+
+    #[test]
+    fn an_image_computes_what_the_rounded_network_does() {
+        let (off, most) = off_image(&attentive(), |graph| Policy::of("attention", graph));
+        assert!(off < 1e-5 * most, "{off} of {most}");
+    }
+
+    #[test]
+    fn keys_that_do_not_depend_on_the_iterate_are_kept_once() {
+        let mut random = Random::new(8);
+        let mut graph = Graph::new(3);
+        let mut linear = |graph: &mut Graph, rows: usize, input: ValueId| {
+            let cols = graph.len_of(input);
+            let data = (0..rows * cols).map(|_| random.unit()).collect();
+            let matrix = WeightMatrix { name: "m".into(), rows, cols, data };
+            let matrix = graph.add_matrix(matrix).expect("a matrix");
+            graph.add(Linear { matrix, bias: vec![0.1; rows] }, &[input]).expect("it fits")
+        };
+        let (keys, values) = (linear(&mut graph, 8, 0), linear(&mut graph, 8, 0));
+        let first = graph.nodes.len();
+        let x = graph.add(Iterate { len: 2 }, &[]).expect("it fits");
+        let queries = linear(&mut graph, 4, x);
+        let attention = Attention { heads: 2, kv_heads: 2, dim: 2, factor: 0.7, causal: false, context: 0 };
+        let y = graph.add(attention, &[queries, keys, values]).expect("it fits");
+        linear(&mut graph, 2, y);
+        let steps = vec![actq_kernels::ops::denoise::Coefficients::from_array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0]); 2];
+        graph.denoising = Some(Denoising { first, len: 2, limit: 10.0, steps });
+        let policy = |graph: Graph| {
+            let kind = actq_kernels::image::Kind::Flow;
+            Policy { kind, chunk: 1, execute: 1, act_len: 2, ..Policy::of("flow", graph) }
+        };
+        let program = emit::lower(&policy(graph.clone()), 32, None).expect("a program");
+        let keep = program.steps.iter().position(|step| step.kind == OpKind::Keep);
+        assert!(keep.is_some_and(|keep| keep < program.first_denoising_op), "{keep:?}");
+        let (off, most) = off_image(&graph, policy);
+        assert!(off < 1e-5 * most, "{off} of {most}");
+    }
+
+    #[test]
+    fn sizes_that_do_not_fit_are_refused() {
+        let plain = Attention { heads: 4, kv_heads: 2, dim: 8, factor: 0.5, causal: true, context: 0 };
+        let cases = [
+            (plain, vec![32, 16], "takes queries, keys and values, not 2 inputs"),
+            (Attention { kv_heads: 3, ..plain }, vec![32; 3], "has 3 heads of keys for 4 of queries; it must be a divisor"),
+            (Attention { heads: 17, ..plain }, vec![32; 3], "has 17 heads; 1 to 16 are supported"),
+            (plain, vec![30, 16, 16], "its 30 queries are not tokens of 4 heads of 8 values"),
+            (plain, vec![32, 16, 32], "its 16 keys and 32 values are not tokens of 2 heads of 8 values"),
+            (plain, vec![64, 16, 16], "has 2 queries for 1 causal keys"),
+            (Attention { context: 513, ..plain }, vec![32, 16, 16], "reads 513 tokens; at most 512 are supported"),
+            (Attention { factor: 0.0, ..plain }, vec![32, 16, 16], "has the factor 0; it must be above 0 and finite"),
+            (
+                Attention { context: 4, ..plain },
+                vec![64, 32, 32],
+                "keeps tokens from step to step, and reads 2 queries and 2 keys in a step; it must be one",
+            ),
+        ];
+        for (attention, inputs, expected) in cases {
+            assert_eq!(attention.output_len(&[], &inputs).expect_err(expected).to_string(), expected);
+        }
+        assert_eq!(plain.output_len(&[], &[32, 48, 48]).expect("it fits"), 32);
     }
 }
