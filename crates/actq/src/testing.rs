@@ -1,7 +1,7 @@
 //! Small networks and recordings of them, for the unit tests of this crate and, by path, of `actq-research`.
 
 use actq::data::Dataset;
-use actq::graph::ops::{Add, Concat, Gru, LayerNorm, Linear, Lstm, Pointwise, Span};
+use actq::graph::ops::{Add, Attention, Concat, Gru, LayerNorm, Linear, Lstm, Pointwise, Span};
 use actq::graph::{Evaluator, Graph, WeightMatrix};
 use actq::random::Random;
 use actq_kernels::math::Function;
@@ -105,6 +105,52 @@ pub(crate) fn branches([a, b]: [usize; 2]) -> Graph {
     let spans = [(0, a), (1, 2), (0, b)].map(|(from, len)| Span { from, len });
     let joined = graph.add(Concat(spans.to_vec()), &[first, 0, second]).expect("it fits");
     graph.add(Linear { matrix: 2, bias: vector(2, &mut random) }, &[joined]).expect("it fits");
+    graph
+}
+
+/// Makes a transformer of two layers of 16 values and four heads, after which the last token gives 2 values: causal over
+/// the four tokens of an observation of 12 values, or, with a `context`, over as many steps of 3 values.
+pub(crate) fn transformer(context: usize) -> Graph {
+    let mut random = Random::new(17);
+    let (tokens, width) = (if context > 0 { 1 } else { 4 }, 16);
+    let mut graph = Graph::new(3 * tokens);
+    let mut layer = |graph: &mut Graph, inputs: &[usize], rows: usize| -> Vec<usize> {
+        let cols = graph.len_of(inputs[0]);
+        let index = graph.add_matrix(matrix("m", rows, cols, &mut random)).expect("a matrix");
+        let mut of_token = |input: &usize| {
+            graph.add(Linear { matrix: index, bias: vector(rows, &mut random) }, &[*input]).expect("it fits")
+        };
+        inputs.iter().map(&mut of_token).collect()
+    };
+    let cut = |graph: &mut Graph, value: usize, len: usize| -> Vec<usize> {
+        let places = (0..graph.len_of(value)).step_by(len);
+        places.map(|from| graph.join(vec![(value, Span { from, len })]).expect("a part")).collect()
+    };
+    let joined = |graph: &mut Graph, parts: &[usize]| {
+        let parts = parts.iter().map(|part| (*part, Span { from: 0, len: graph.len_of(*part) })).collect();
+        graph.join(parts).expect("parts")
+    };
+    let added = |graph: &mut Graph, to: &[usize], values: &[usize]| -> Vec<usize> {
+        let norm = LayerNorm { weight: vec![1.0; width], bias: vec![0.0; width], eps: 1e-5 };
+        let sums: Vec<usize> = to.iter().zip(values).map(|(x, y)| graph.add(Add, &[*x, *y]).expect("a sum")).collect();
+        sums.into_iter().map(|sum| graph.add(norm.clone(), &[sum]).expect("a norm")).collect()
+    };
+    let observed = cut(&mut graph, 0, 3);
+    let mut x = layer(&mut graph, &observed, width);
+    for _ in 0..2 {
+        let inputs = [0, 1, 2].map(|_| layer(&mut graph, &x, width)).map(|parts| joined(&mut graph, &parts));
+        let attention = Attention { heads: 4, kv_heads: 4, dim: 4, factor: 0.5, causal: context == 0, context };
+        let y = graph.add(attention, &inputs).expect("it fits");
+        let y = cut(&mut graph, y, width);
+        let y = layer(&mut graph, &y, width);
+        x = added(&mut graph, &x, &y);
+        let hidden = layer(&mut graph, &x, 2 * width);
+        let active: Vec<usize> =
+            hidden.iter().map(|h| graph.add(Pointwise(Function::Gelu), &[*h]).expect("it fits")).collect();
+        let y = layer(&mut graph, &active, width);
+        x = added(&mut graph, &x, &y);
+    }
+    layer(&mut graph, &x[tokens - 1..], 2);
     graph
 }
 

@@ -134,6 +134,19 @@ pub(super) fn playback(image: &Image<'_>) -> Vec<String> {
     settings
 }
 
+/// Describes an operation of attention by its data.
+fn attention(op: &Op<'_>) -> String {
+    let halves = |i: usize| [op.constant(i).to_bits() & 0xffff, op.constant(i).to_bits() >> 16];
+    if op.kind == OpKind::Keep {
+        let ([heads, dim], [tokens, ring]) = (halves(0), halves(1));
+        let of_steps = if ring == 1 { "the last " } else { "" };
+        return format!("{heads} x {dim} of {of_steps}{}", count(tokens as usize, "token"));
+    }
+    let ([heads, shared], [dim, tokens], [causal, _]) = (halves(0), halves(1), halves(2));
+    let causal = if causal == 1 { " causal" } else { "" };
+    format!("{heads} x {dim} to {shared} of {}{causal}, factor {}", count(tokens as usize, "token"), op.constant(3))
+}
+
 /// Formats the cells of an operation: name, output, input, detail, and those of its matrix.
 pub(super) fn row(op: &Op<'_>) -> Vec<String> {
     let region = |r: Region| if r.len > 0 { format!("{}+{}", r.offset, r.len) } else { String::new() };
@@ -144,6 +157,7 @@ pub(super) fn row(op: &Op<'_>) -> Vec<String> {
         }
         (OpKind::RmsNorm, _) if op.constant(0) == Balance::FREE_EPS => "factors, by the quantizer".into(),
         (OpKind::History, _) => count(op.dst().len / op.src().len.max(1), "frame"),
+        (OpKind::Keep | OpKind::Attend, _) => attention(op),
         (kind, _) if kind.label().is_empty() => String::new(),
         (kind, _) => {
             let constants: String = op.constants().map(|constant| format!(" {constant}")).collect();

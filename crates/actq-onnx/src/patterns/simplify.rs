@@ -1,11 +1,13 @@
 //! Simplification: factors and offsets move into adjacent matrices, and rows without a reader are removed.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use actq_kernels::math::Function;
 
 use crate::patterns::slices::sums_of_slices;
+use crate::values::elements::value;
 use crate::values::expr::{Expr, Exprs, Id, Matrix, Run, Unary};
 
 /// Simplifies a value. `instead` maps expressions to their replacements.
@@ -17,6 +19,7 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
             readers.entry(instead.get(&operand).copied().unwrap_or(operand)).or_default().push(id);
         }
     }
+    let queries = read_queries(exprs, &order, &readers, instead);
     let mut new: HashMap<Id, Id> = HashMap::new();
     // Rows of ones by length, as sums of one length share a matrix.
     let mut rows_of_ones: HashMap<usize, Arc<Matrix>> = HashMap::new();
@@ -60,7 +63,11 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
             Expr::Pick(runs) => {
                 let runs = sums_of_slices(exprs, &runs, &of);
                 let same = runs.iter().all(|run| run.of == runs[0].of);
-                let runs: Vec<Run> = runs.iter().map(|run| Run { of: of(&run.of), ..*run }).collect();
+                let before = |run: &Run| {
+                    queries.get(instead.get(&run.of).unwrap_or(&run.of)).map_or(0, |read| read.start)
+                };
+                let moved = |run: &Run| Run { of: of(&run.of), from: run.from - before(run), ..*run };
+                let runs: Vec<Run> = runs.iter().map(moved).collect();
                 match exprs.get(runs[0].of) {
                     Expr::Linear(y, w, bias) if same && is_only_reader(&readers, id, exprs, instead) => {
                         let rows: Vec<usize> = runs.iter().flat_map(|run| run.from..run.from + run.len).collect();
@@ -93,12 +100,53 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
                 let norm = exprs.put(old.over(of), len);
                 reuse_norm(exprs, *norms.entry(of(&x)).or_insert(norm), norm)
             }
+            Expr::Attention(_) => {
+                let mut attention = old.over(of);
+                let read = queries.get(&id).cloned().unwrap_or(0..len);
+                if let Expr::Attention(all) = &mut attention
+                    && read.len() < len
+                {
+                    let elements: Vec<(Id, usize)> = exprs.elements(all.queries).iter().filter_map(value).collect();
+                    all.queries = exprs.vector(&elements[read.clone()]);
+                }
+                exprs.put(attention, read.len())
+            }
             other => exprs.put(other.over(of), len),
         };
         exprs.keep_origin(id, done);
         new.insert(id, done);
     }
     new.get(&root).copied().unwrap_or(root)
+}
+
+/// Returns the elements of each attention that are read, whole queries up to the last one if it is causal. There is none
+/// if all are.
+fn read_queries(
+    exprs: &Exprs,
+    order: &[Id],
+    readers: &HashMap<Id, Vec<Id>>,
+    instead: &HashMap<Id, Id>,
+) -> HashMap<Id, Range<usize>> {
+    let mut found = HashMap::new();
+    for &id in order {
+        let Expr::Attention(of) = exprs.get(id) else { continue };
+        let (len, width) = (exprs.len_of(id), of.heads * of.dim);
+        let runs = |reader: &Id| match exprs.get(*reader) {
+            Expr::Pick(runs) => Some(runs.iter().filter(|run| *instead.get(&run.of).unwrap_or(&run.of) == id)),
+            _ => None,
+        };
+        let Some(runs) = readers.get(&id).and_then(|all| all.iter().map(runs).collect::<Option<Vec<_>>>()) else {
+            continue;
+        };
+        let runs: Vec<&Run> = runs.into_iter().flatten().collect();
+        let start = runs.iter().map(|run| run.from / width * width).min().unwrap_or(0);
+        let end = runs.iter().map(|run| (run.from + run.len).next_multiple_of(width)).max().unwrap_or(len);
+        let end = if of.causal { len } else { end };
+        if start > 0 || end < len {
+            found.insert(id, start..end);
+        }
+    }
+    found
 }
 
 /// Returns `k x` as a separate operation, also of a norm with other readers: a factor inside would need the norm twice.

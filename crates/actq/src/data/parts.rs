@@ -56,7 +56,9 @@ impl Dataset {
         Part { learned: self.cut(graph, &learned), held_out: self.cut(graph, &held_out) }
     }
 
-    /// Returns pieces of episodes as episodes, each from the state in which the f32 network begins it.
+    /// Returns pieces of episodes as episodes, each from the state in which the f32 network begins it. Where attention keeps
+    /// tokens, they begin without any, and the actions are those of the f32 network from there: an image has its tokens
+    /// in another form.
     fn cut(&self, graph: &Graph, pieces: &[(usize, Range<usize>)]) -> Self {
         let longest = pieces.iter().map(|(_, steps)| steps.len()).max().unwrap_or(0);
         let part = |array: &Array3<f32>| {
@@ -66,7 +68,7 @@ impl Dataset {
             }
             part
         };
-        let state = (graph.state_len() > 0).then(|| {
+        let state = (graph.state_len() > 0 && !graph.keeps_tokens()).then(|| {
             let mut states = Array2::zeros((pieces.len(), graph.state_len()));
             let mut evaluator = Evaluator::new(graph);
             for (mut row, (episode, steps)) in states.rows_mut().into_iter().zip(pieces) {
@@ -78,13 +80,18 @@ impl Dataset {
             }
             states
         });
-        Self {
+        let mut cut = Self {
             path: self.path.clone(),
             obs: part(&self.obs),
             action: self.action.as_ref().map(part),
             length: pieces.iter().map(|(_, steps)| steps.len()).collect(),
             state,
+        };
+        if graph.keeps_tokens() {
+            cut.action = None;
+            cut.fill_actions(graph);
         }
+        cut
     }
 }
 

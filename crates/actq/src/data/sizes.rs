@@ -1,6 +1,7 @@
 //! Sizes of the arrays of a recording.
 
 use actq_kernels::Image;
+use actq_kernels::image::{Op, OpKind};
 
 #[cfg(doc)]
 use crate::graph::Graph;
@@ -15,7 +16,8 @@ pub struct Sizes {
     pub noise: usize,
     /// Values of the network's raw output.
     pub out: usize,
-    /// Values of the recurrent state ([`Graph::state_len`]).
+    /// Values of the recurrent state ([`Graph::state_len`]); 0 if attention keeps tokens in it, which an image has in
+    /// another form.
     pub state: usize,
 }
 
@@ -27,12 +29,14 @@ impl Sizes {
             obs: graph.obs_len,
             noise: graph.noise_len(),
             out: policy.chunk * policy.act_len,
-            state: graph.state_len(),
+            state: if graph.keeps_tokens() { 0 } else { graph.state_len() },
         }
     }
 
     /// Returns the sizes of an image.
     pub fn of_image(image: &Image<'_>) -> Self {
-        Self { obs: image.obs_len(), noise: image.noise_len(), out: image.output().len, state: image.state().len }
+        let is_kept = |op: Op<'_>| op.kind == OpKind::Keep && image.state().range().contains(&op.dst().offset);
+        let state = if image.ops().any(is_kept) { 0 } else { image.state().len };
+        Self { obs: image.obs_len(), noise: image.noise_len(), out: image.output().len, state }
     }
 }

@@ -78,6 +78,11 @@ impl Graph {
         self.nodes.iter().flat_map(|node| node.kind.state_lens()).sum()
     }
 
+    /// Returns `true` if attention keeps tokens of earlier steps.
+    pub fn keeps_tokens(&self) -> bool {
+        self.nodes.iter().any(|node| matches!(&node.kind, NodeKind::Attention(attention) if attention.context > 0))
+    }
+
     /// Returns the number of trained values, as the f32 policy stores them: weights, biases, norms. Statistics that
     /// normalize the observation are not trained and do not count.
     pub fn parameters(&self) -> usize {

@@ -114,3 +114,42 @@ impl QuantizedPolicy {
         ImageBuffer::new(&self.image)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::budget::Budget;
+    use crate::measure::eval::evaluate;
+    use crate::testing::{dataset, transformer};
+
+    /// Returns the NMSE of an image of this many bits, on other frames than those that it learned from.
+    fn error(policy: &Policy, method: Method, bits: u32) -> f64 {
+        let graph = &policy.graph;
+        let recordings = Recordings { calib: Some(dataset(graph, 20, 40)), heldout: None };
+        let steps = (method == Method::Distill).then_some(300);
+        // Scales, padding and biases of rows of 16 values are some bits beside.
+        let options = Options { steps, ..Options::new(method, Budget::BitsPerWeight(f64::from(bits) + 2.0)) };
+        let quantizer = Quantizer::new(policy, &recordings, options.method.clone(), None, |_| {}).expect("statistics");
+        let buffer = quantizer.quantize(&options, ()).expect("an image").buffer();
+        let fresh = dataset(graph, 7, 33);
+        evaluate(buffer.image(Path::new("memory")).expect("an image"), &fresh).expect("errors").nmse
+    }
+
+    #[test]
+    fn transformers_are_quantized_by_every_method() {
+        for context in [0, 3] {
+            let policy = Policy::of("transformer", transformer(context));
+            let mut at_two = Vec::new();
+            for method in [Method::Rtn, Method::Gptq, Method::Distill] {
+                let errors = [8, 4, 3, 2].map(|bits| error(&policy, method.clone(), bits));
+                println!("context {context}, {method}: {errors:?}");
+                assert!(errors[0] < 5e-3, "context {context}, {method}: {errors:?}");
+                assert!(errors.is_sorted(), "context {context}, {method}: {errors:?}");
+                at_two.push(errors[3]);
+            }
+            assert!(at_two[2] < 0.5 * at_two[0], "context {context}: {at_two:?}");
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! Policies from ONNX files: the actions of every exporter's form agree with another reader of ONNX, and no file does
 //! harm.
 
+mod attention;
 mod bounds;
 mod cases;
 mod command;

@@ -446,7 +446,9 @@ mod tests {
             for _ in 0..5 {
                 let obs: Vec<f32> = (0..graph.input_len()).map(|_| random.unit()).collect();
                 let expected = network.forward_one(&weights, &obs, &mut state);
-                for (a, b) in head.infer(&obs)?.iter().zip(&expected) {
+                let (obs, noise) = obs.split_at(graph.obs_len);
+                let output = if noise.is_empty() { head.infer(obs)? } else { head.infer_with_noise(obs, noise)? };
+                for (a, b) in output.iter().zip(&expected) {
                     (off, most) = (off.max((a - b).abs()), most.max(b.abs()));
                 }
             }
@@ -480,7 +482,7 @@ mod tests {
         let attention = Attention { heads: 2, kv_heads: 2, dim: 2, factor: 0.7, causal: false, context: 0 };
         let y = graph.add(attention, &[queries, keys, values]).expect("it fits");
         linear(&mut graph, 2, y);
-        let steps = vec![actq_kernels::ops::denoise::Coefficients::from_array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0]); 2];
+        let steps = vec![actq_kernels::ops::denoise::Coefficients::from_array([0.0, 0.0, 1.0, 0.5, 0.0, 0.0, 0.0]); 2];
         graph.denoising = Some(Denoising { first, len: 2, limit: 10.0, steps });
         let policy = |graph: Graph| {
             let kind = actq_kernels::image::Kind::Flow;

@@ -1,0 +1,88 @@
+//! ONNX's operator Attention, which tract does not have, against its parts.
+
+use actq::measure::actions::actions;
+use actq_onnx::ImportOptions;
+use anyhow::{Result, ensure};
+
+use super::file::File;
+use super::styles::ended;
+use super::{compare, drawn, imported, same};
+
+/// Begins a file of this many tokens of 6 values, with queries of 8 and keys and values of 4.
+fn begun(tokens: i64) -> File {
+    let mut file = File::default();
+    file.input("obs", &[1, tokens, 6]);
+    file
+}
+
+const LAYERS: &str = "
+q = MatMul(obs, drawn(6, 8))
+k = MatMul(obs, drawn(6, 4))
+v = MatMul(obs, drawn(6, 4))
+";
+
+/// Writes a file of these lines, whose last value has `len` elements.
+fn written(mut file: File, lines: &str, len: usize) -> Vec<u8> {
+    let last = file.write(&[], &format!("{LAYERS}{lines}"));
+    ended(file, &last, len)
+}
+
+/// Requires that the operator's file gives the actions of its parts' file, which are tract's.
+fn equal(operator: &[u8], parts: &[u8]) -> Result<()> {
+    let of_parts = same(parts)?;
+    let options = ImportOptions::default();
+    let ((found, ours), (_, theirs)) = (imported(operator, &options)?, imported(parts, &options)?);
+    ensure!(found.states == of_parts.states, "{:?}", found.states);
+    let observations = drawn(&ours);
+    compare(&actions(&theirs, &observations), &actions(&ours, &observations))
+}
+
+#[test]
+fn the_operator_equals_its_parts() -> Result<()> {
+    for (mask, attributes) in [("", ""), (" + Trilu(full(-inf, 4, 4), [1])", ", is_causal=1")] {
+        let operator =
+            format!("Flatten(Attention(q, k, v, q_num_heads=2, kv_num_heads=1, scale=0.3{attributes}))");
+        let parts = format!(
+            "a = Transpose(Reshape(q, [1, 4, 2, 4]), perm=[0, 2, 1, 3])
+             w = Softmax(MatMul(a, Reshape(Transpose(k, perm=[0, 2, 1]), [1, 1, 4, 4])) * 0.3{mask}, axis=-1)
+             Flatten(Transpose(MatMul(w, Reshape(v, [1, 1, 4, 4])), perm=[0, 2, 1, 3]))"
+        );
+        equal(&written(begun(4), &operator, 32), &written(begun(4), &parts, 32))?;
+    }
+    Ok(())
+}
+
+#[test]
+fn its_past_keys_are_a_state() -> Result<()> {
+    let with_states = || {
+        let mut file = begun(1);
+        for name in ["key", "value"] {
+            file.input(&format!("past_{name}"), &[1, 1, 3, 4]);
+            file.output(&format!("present_{name}"), &[1, 1, 3, 4]);
+        }
+        file.input("past_valid", &[1, 3]);
+        file.output("present_valid", &[1, 3]);
+        file
+    };
+    let valid = "valid = Concat(past_valid, full(1.0, 1, 1), axis=1)
+                 present_valid := Slice(valid, [1], [4], [1])
+                 mask = (valid - 1.0) * 1e9";
+    let window = "present_key := Slice(keys, [1], [4], [2])
+                  present_value := Slice(values, [1], [4], [2])";
+    let operator = format!(
+        "{valid}
+         y, keys, values := Attention(q, k, v, mask, past_key, past_value, q_num_heads=2, kv_num_heads=1)
+         {window}
+         Flatten(y)"
+    );
+    let parts = format!(
+        "{valid}
+         keys = Concat(past_key, Reshape(k, [1, 1, 1, 4]), axis=2)
+         values = Concat(past_value, Reshape(v, [1, 1, 1, 4]), axis=2)
+         {window}
+         a = Reshape(q, [1, 2, 1, 4])
+         w = Softmax(MatMul(a, Transpose(keys, perm=[0, 1, 3, 2])) * 0.5 + Reshape(mask, [1, 1, 1, 4]), axis=-1)
+         Flatten(MatMul(w, values))"
+    );
+    equal(&written(with_states(), &operator, 8), &written(with_states(), &parts, 8))
+}
