@@ -46,7 +46,7 @@ def test_every_listing_runs(cart_pole, tmp_path, monkeypatch):
 
 def test_a_recording_is_saved_as_documented(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (listing,) = listings("IMPORT")
+    (listing,) = (text for text in listings("IMPORT") if "numpy.save" in text)
     exec(compile(listing, "IMPORT", "exec"), {"numpy": numpy, "observations": [[1.0, 2.0, 3.0]] * 4, "length": 3})
     saved = numpy.load("obs.npy")
     assert saved.shape == (4, 3) and saved.dtype == numpy.float32
