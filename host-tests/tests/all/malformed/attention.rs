@@ -49,7 +49,7 @@ const BOTH: &[Case] = &[
     ("values outside", E::Unwritten, |d| d.set_high(d.op(KEEP) + THIRD, 0xffff)),
     ("keys outside", E::Unwritten, |d| d.set_high(d.op(KEEP) + 1, 0xffff)),
     ("sizes of keep outside", E::Section, |d| d.set(d.op(KEEP) + 3, d.0.len() as u32 - 1)),
-    ("sizes of keep in the header", E::Shape, |d| d.set(d.op(KEEP) + 3, 20)),
+    ("sizes of keep in the header", E::Section, |d| d.set(d.op(KEEP) + 3, 20)),
     ("heads that the cache's do not divide", E::Shape, |d| d.set_low(d.data(ATTEND), 3)),
     ("no heads", E::Shape, |d| d.set_low(d.data(ATTEND), 0)),
     ("fewer heads than the cache", E::Shape, |d| d.set_low(d.data(ATTEND), 1)),
@@ -82,7 +82,7 @@ fn impossible_attentions_are_refused() {
         &[
             ("a ring that no reset clears", E::Unwritten, |d| d.set_high(d.data(KEEP) + 1, 1)),
             ("more causal queries than slots", E::Shape, |d| d.set_high(d.data(ATTEND) + 1, 2)),
-            ("a longer cache than was written", E::Unwritten, |d| d.set_high(d.data(ATTEND) + 1, 8)),
+            ("a longer cache than was written", E::Overlap, |d| d.set_high(d.data(ATTEND) + 1, 8)),
         ],
     );
     refused_of(

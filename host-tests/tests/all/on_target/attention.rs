@@ -3,7 +3,7 @@
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::profile::Harness;
 use actq_bench::{Target, bits, firmware};
-use actq_kernels::cost::{Core, Rates};
+use actq_kernels::cost::Rates;
 use actq_kernels::image::Cache;
 use actq_testkit::Random;
 use anyhow::{Result, ensure};
@@ -57,5 +57,44 @@ fn every_core_has_the_hosts_bits() -> Result<()> {
             })?;
         }
     }
+    Ok(())
+}
+
+/// The width of a token, in heads and columns: 192.
+const HEADS: usize = 4;
+const COLUMNS: usize = 48;
+
+/// Returns a token's attention to a ring of this many slots.
+fn context(slots: usize) -> Attention {
+    let cache = Cache { heads: HEADS, dim: COLUMNS, slots };
+    Attention { heads: HEADS, cache, tokens: 1, is_ring: true, is_causal: false, factor: 0.15 }
+}
+
+/// A step with a full ring: it costs a constant, and a constant for each token of the context.
+#[test]
+fn the_cost_grows_with_the_context() -> Result<()> {
+    let harness = harness(Target::Fpu)?;
+    let mut counted = Vec::new();
+    for slots in [1, 2, 4, 8, 16, 32, 64] {
+        let attention = context(slots);
+        let mut random = Random::new(13);
+        let len: usize = attention.lengths().iter().sum();
+        let observations: Vec<Vec<f32>> = (0..slots + 2).map(|_| (0..len).map(|_| random.unit()).collect()).collect();
+        let image = Draft(attention.image());
+        let costs = harness.steps(image.bytes(), &observations)?;
+        let step = costs[slots + 1].instructions;
+        let buffer = ImageBuffer::new(image.bytes());
+        let predicted = Rates::M4F.of_step(&buffer.image("attention".as_ref())?).instructions;
+        let error = predicted as f64 / step as f64 - 1.0;
+        println!("{slots} tokens: {step} instructions, {predicted} predicted: {:+.2}%", 1e2 * error);
+        ensure!(error.abs() < ERROR, "{predicted} for {step} of {slots} tokens");
+        counted.push((slots, step));
+    }
+    // The products of a token are 2 * 192 MACs. Exponentials and scales take as much again.
+    let [.., (half, of_half), (all, of_all)] = counted[..] else { unreachable!("seven contexts") };
+    let macs = 2 * HEADS * COLUMNS * (all - half);
+    let each = (of_all - of_half) as f64 / macs as f64;
+    println!("{each:.2} instructions per MAC of a longer context");
+    ensure!(each < 2.0 * 1.1, "{each:.2} instructions per MAC");
     Ok(())
 }

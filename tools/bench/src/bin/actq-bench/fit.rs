@@ -65,14 +65,16 @@ fn of_core(core: Core, only: Option<&str>, all: &mut BTreeMap<CostItem, Row>) ->
             bail!("the rates of {} are those of {}", core.name(), core.measured().name())
         }
     };
-    let harness = Harness::build(target)?;
-    let with_attention = Harness::of(target, firmware::attention_harness(target)?)?;
+    let attention = Harness::of(target, firmware::attention_harness(target)?)?;
+    // Only images of attention are measured without the other.
+    let others = if only == Some("attention") { None } else { Some(Harness::build(target)?) };
+    let harness = others.as_ref().unwrap_or(&attention);
     let mut samples = Vec::new();
     let mut polls = Vec::new();
     for (name, bytes) in images()?.into_iter().filter(|(name, _)| only.is_none_or(|word| name.contains(word))) {
         println!("measuring {name}");
         let bytes = repack(&bytes, core).with_context(|| name.clone())?;
-        let harness = if name.contains("attention") { &with_attention } else { &harness };
+        let harness = if name.contains("attention") { &attention } else { harness };
         measure((&name, &bytes), harness, &mut samples, (core == Core::M4f).then_some(&mut polls))?;
     }
     if let Some(word) = only {
@@ -106,7 +108,7 @@ fn of_core(core: Core, only: Option<&str>, all: &mut BTreeMap<CostItem, Row>) ->
     } else if core == Core::M4f {
         let mut most = most(&samples, &polls, &instructions);
         println!("measuring polls");
-        let resumed = resumed(&harness, &most)?;
+        let resumed = resumed(harness, &most)?;
         most.insert(CostItem::RESUMED, resumed);
         Some(most)
     } else {

@@ -84,7 +84,7 @@ pub(super) fn images() -> Result<Vec<(String, Vec<u8>)>> {
 /// Attention of some shapes: of one query, and of two causal ones.
 fn attention((heads, kv_heads): (usize, usize), shapes: &[(usize, usize)]) -> Result<(String, Vec<u8>)> {
     let name = format!("attention of {heads} heads of {kv_heads}, {shapes:?}");
-    let mut builder = Builder::new(8);
+    let mut builder = Builder::new(512);
     // Its work area is large enough for the scores, too.
     builder.linear((8, 8), Activations::Int8, |_| Some(Width::W2), 0, true)?;
     builder.linear((8, 512), Activations::Int8, |_| Some(Width::W2), 0, true)?;
