@@ -168,12 +168,11 @@ fn softmax(value_scales: &[u32], scores: &mut [u32]) -> f32 {
         let score = f32::from_bits(*bits);
         if score > max { score } else { max }
     });
-    let mut sum = Native::of(0.0);
-    for (score, value_scale) in scores.iter_mut().zip(value_scales) {
+    let sum = scores.iter_mut().zip(value_scales).fold(Native::of(0.0), |sum, (score, value_scale)| {
         let power = exp(Native::of(f32::from_bits(*score)) - Native::of(max));
-        sum = sum + power;
         *score = (power * Native::of(f32::from_bits(*value_scale))).get().to_bits();
-    }
+        sum + power
+    });
     sum.get()
 }
 
