@@ -81,7 +81,9 @@ pub(crate) use floats::scale;
 pub(crate) use floats::{denoise, gru_elements, lstm_elements, normalize, sqrt, standardize, sum, sum_squares};
 #[cfg(actq_helium)]
 pub(crate) use helium::{elu, relu, scale};
-pub(crate) use integers::{copy, query_keys, weigh_values};
+pub(crate) use integers::copy;
+#[cfg(feature = "attention")]
+pub(crate) use integers::{query_keys, weigh_values};
 pub use product::{Mismatch, Product};
 #[cfg(actq_scaling)]
 pub(crate) use scaling::scale;

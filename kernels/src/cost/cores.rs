@@ -131,7 +131,8 @@ const fn columns(which: usize) -> [[u32; CostItem::COUNT]; CORES.len()] {
     let mut i = 0;
     while i < RATES.len() {
         let mut core = 0;
-        while core < CORES.len() {
+        // A build without attention has none of its items.
+        while core < CORES.len() && RATES[i].0.index() < CostItem::COUNT {
             columns[core][RATES[i].0.index()] = in_1024ths(RATES[i].2[core][which]);
             core += 1;
         }

@@ -24,8 +24,10 @@ mod scalar;
 
 #[cfg(all(feature = "writer", feature = "scalar", feature = "helium"))]
 pub use self::cores::{CORES, Core, rates_of};
+#[cfg(feature = "attention")]
+use self::item::Attention;
 pub use self::item::CostItem;
-use self::item::{Attention, Gemv, Prepare, Strips};
+use self::item::{Gemv, Prepare, Strips};
 use self::rates::RATES;
 use crate::activations::{Extent, Plan};
 use crate::image::op;
@@ -233,7 +235,8 @@ pub fn items(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
 
 /// Counts the items of `len` values of an operation. (It takes all denoising steps to be like the first.)
 fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(CostItem, usize)) {
-    if cfg!(feature = "attention") && op.kind.is_attention() {
+    #[cfg(feature = "attention")]
+    if op.kind.is_attention() {
         return heads(op, op.units(), true, add);
     }
     add(values(op).1, len);
@@ -251,6 +254,7 @@ fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(CostItem, usize)) {
 
 /// Counts the items of `units` heads of tokens. Of those that a query sees, `is_expected` takes all that a cache has room
 /// for, fewer if the queries are causal; otherwise, always all.
+#[cfg(feature = "attention")]
 fn heads(op: &Op<'_>, units: usize, is_expected: bool, add: &mut dyn FnMut(CostItem, usize)) {
     let mut add = |which, count| add(CostItem::attention(which), count);
     let cache = op.cache();
@@ -307,7 +311,8 @@ pub(super) fn piece(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
 
 /// Counts the items of one value of an operation, in the denoising step with the highest cost.
 pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
-    if cfg!(feature = "attention") && op.kind.is_attention() {
+    #[cfg(feature = "attention")]
+    if op.kind.is_attention() {
         return heads(op, 1, false, add);
     }
     add(values(op).1, 1);
@@ -324,7 +329,8 @@ pub(super) fn most_expensive_element(op: &Op<'_>, add: &mut dyn FnMut(CostItem, 
 /// Returns the item of an operation, the item of its values, and their number: 0 for a linear operation, whose
 /// parts are counted one by one.
 pub fn values(op: &Op<'_>) -> (CostItem, CostItem, usize) {
-    if cfg!(feature = "attention") && op.kind.is_attention() {
+    #[cfg(feature = "attention")]
+    if op.kind.is_attention() {
         return attention(op);
     }
     let values = match op.kind {
@@ -336,6 +342,7 @@ pub fn values(op: &Op<'_>) -> (CostItem, CostItem, usize) {
 }
 
 /// Returns the items of an operation of attention, and the number of the values that it writes.
+#[cfg(feature = "attention")]
 fn attention(op: &Op<'_>) -> (CostItem, CostItem, usize) {
     let (once, value, len) = match op.kind {
         OpKind::Keep => (Attention::Keep, Attention::KeptValue, 2 * op.src().len),

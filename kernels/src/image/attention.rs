@@ -108,13 +108,18 @@ impl Op<'_> {
         self.half(4) & 1 != 0
     }
 
-    /// Returns the lengths of `src` and of the third region.
-    pub(super) fn attention_lengths(&self) -> [usize; 2] {
-        let cache = self.cache();
-        if self.kind == OpKind::Attend {
-            return [self.dst().len, cache.words().min(MAX_SCRATCH + 1)];
+    /// Returns an operation of attention with the lengths of `src` and of the third region; any other as it is.
+    pub(super) fn with_lengths(mut self) -> Self {
+        let (cache, is_ring) = (self.cache(), self.is_ring());
+        let [dst, src, third] = &mut self.regions;
+        match self.kind {
+            OpKind::Attend => [src.len, third.len] = [dst.len, cache.words()],
+            OpKind::Keep => {
+                let tokens = if is_ring { 1 } else { cache.slots };
+                [src.len, third.len] = [product([tokens, cache.heads, cache.dim]); 2];
+            }
+            _ => {}
         }
-        let tokens = if self.is_ring() { 1 } else { cache.slots };
-        [product([tokens, cache.heads, cache.dim]); 2]
+        self
     }
 }

@@ -1,5 +1,6 @@
 //! The check of an image: everything in it, once. `docs/FORMAT.md` has the list.
 
+#[cfg(feature = "attention")]
 use super::attention::{MAX_DIM, MAX_SLOTS};
 use super::contract::{ARRAY_BINARISE, CONTRACT_ARRAYS};
 use super::front::Front;
@@ -265,7 +266,8 @@ impl<'a> Image<'a> {
             if i != 0 || self.first_denoising_op() == 0 {
                 return Err(ImageError::Denoising);
             }
-        } else if cfg!(feature = "attention") && op.kind.is_attention() {
+        } else if op.kind.is_attention() {
+            #[cfg(feature = "attention")]
             self.check_attention(op, front)?;
         } else if let Some(kind) = op.kind.around() {
             check_around(kind, op, front)?;
@@ -296,6 +298,7 @@ impl<'a> Image<'a> {
     }
 
     /// Checks an operation of attention: its sizes, and that the work area has room for a head.
+    #[cfg(feature = "attention")]
     #[inline(never)]
     fn check_attention(&self, op: &Op<'_>, front: &mut Front<'a>) -> Result<(), ImageError> {
         front.take(op.data(), usize::from(op.form.uses.constants))?;

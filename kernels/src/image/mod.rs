@@ -5,6 +5,7 @@
 //! flash has changed since the check, an offset may be any word, and each read refuses what the image does not have.
 //! The same files read and write: a record's `emit` is next to its `parse`.
 
+#[cfg(feature = "attention")]
 mod attention;
 mod check;
 mod contract;
@@ -24,6 +25,7 @@ mod text;
 mod view;
 mod words;
 
+#[cfg(feature = "attention")]
 pub use attention::{Cache, MAX_DIM, MAX_SLOTS};
 pub use contract::CONTRACT_ARRAYS;
 pub use crc::checksum;

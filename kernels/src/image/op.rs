@@ -4,6 +4,7 @@ use core::mem::discriminant;
 
 use super::header as h;
 use super::words::{high, low};
+use crate::error::ImageError;
 use crate::math::Function;
 
 /// The function of an operation.
@@ -46,6 +47,13 @@ pub enum OpKind {
     /// network's next input. Constants: the limit of the predicted sample, infinite for none; the arena offset of the
     /// first step's noise, or 0; the coefficients of each step.
     Denoise,
+    /// `dst`, a cache ([`crate::ops::attention`]), takes the keys in `src` and the values in `third`. Data: its sizes.
+    #[cfg(feature = "attention")]
+    Keep,
+    /// `dst` = the outputs of attention of the queries in `src` to the cache in `third`. Data: its sizes, the factor of the
+    /// scores.
+    #[cfg(feature = "attention")]
+    Attend,
     /// `dst[i] = src[index[i]]`. Data: the length of `src`, 1 if `src` is a quaternion whose length must be near 1, the
     /// indices.
     Select,
@@ -64,11 +72,6 @@ pub enum OpKind {
     /// `dst` = frames of several steps, of which `src` is the newest; `third` keeps the others in a ring. Data: its
     /// sizes.
     History,
-    /// `dst`, a cache ([`crate::ops::attention`]), takes the keys in `src` and the values in `third`. Data: its sizes.
-    Keep,
-    /// `dst` = the outputs of attention of the queries in `src` to the cache in `third`. Data: its sizes, the factor of the
-    /// scores.
-    Attend,
 }
 
 /// An operation around a network ([`crate::ops::around`]): see [`OpKind`].
@@ -89,10 +92,13 @@ impl OpKind {
         cfg!(feature = "flow") && matches!(self, Self::Table | Self::Denoise)
     }
 
-    /// Returns `true` for an operation of attention ([`crate::ops::attention`]).
+    /// Returns `true` for an operation of attention (`crate::ops::attention`).
     #[inline(always)]
     pub(crate) fn is_attention(self) -> bool {
-        matches!(self, Self::Keep | Self::Attend)
+        #[cfg(feature = "attention")]
+        return matches!(self, Self::Keep | Self::Attend);
+        #[cfg(not(feature = "attention"))]
+        false
     }
 
     /// Returns the operation around a network; `None` for all others, and in a build without these operations.
@@ -122,9 +128,9 @@ impl OpKind {
             | Self::Mul
             | Self::Noise
             | Self::Table
-            | Self::Denoise
-            | Self::Keep
-            | Self::Attend => return None,
+            | Self::Denoise => return None,
+            #[cfg(feature = "attention")]
+            Self::Keep | Self::Attend => return None,
         })
     }
 
@@ -211,6 +217,13 @@ impl Form {
     }
 }
 
+/// The kinds of attention. A build without it has no code for them, not even to refuse them: the others take their place
+/// in the table.
+#[cfg(feature = "attention")]
+const ATTENTION: [OpKind; 2] = [OpKind::Keep, OpKind::Attend];
+#[cfg(not(feature = "attention"))]
+const ATTENTION: [OpKind; 2] = [OpKind::Copy; 2];
+
 macro_rules! operations {
     ($($(#[$doc:meta])* $NAME:ident = $code:literal $text:literal $($label:literal)?: $kind:expr, $uses:expr $(, if $feature:literal)?;)*) => {
         $($(#[$doc])* pub const $NAME: u8 = $code;)*
@@ -245,8 +258,20 @@ macro_rules! operations {
             last
         };
 
-        /// `true` if the build leaves an operation out.
-        pub(super) const IS_PARTIAL: bool = !(true $($(&& cfg!(feature = $feature))?)*);
+        /// The error of a code that the build does not know. A build without the last operations takes it for one of
+        /// theirs.
+        pub(super) const UNKNOWN: ImageError =
+            if BUILT < NAMES.len() { ImageError::LeftOut } else { ImageError::Op };
+
+        /// `true` if the build leaves an operation before its last one out.
+        pub(super) const IS_PARTIAL: bool = {
+            let (built, mut all, mut i) = ([$(true $(&& cfg!(feature = $feature))?),*], true, 0);
+            while i < BUILT {
+                all &= built[i];
+                i += 1;
+            }
+            !all
+        };
 
         const _: () = {
             let codes = [$($NAME),*];
@@ -299,8 +324,8 @@ operations! {
     STANDSTILL = 19 "standstill": OpKind::Standstill, Uses { src: 1, third: 1, constants: 2, arrays: 1, reads_dst: true, ..Uses::NONE }, if "around";
     /// [`OpKind::History`], whose data has the lengths of `src` and of the third region.
     HISTORY = 20 "history": OpKind::History, Uses { src: 1, third: 1, constants: 3, ..Uses::NONE }, if "around";
-    /// [`OpKind::Keep`], whose data has the lengths of `src` and of the third region.
-    KEEP = 21 "keep" "values": OpKind::Keep, Uses { src: 1, third: 1, constants: 2, ..Uses::NONE }, if "attention";
-    /// [`OpKind::Attend`], whose data has the length of the third region.
-    ATTEND = 22 "attend" "cache": OpKind::Attend, Uses { src: 1, third: 1, constants: 4, ..Uses::NONE }, if "attention";
+    /// `OpKind::Keep`, whose data has the lengths of `src` and of the third region.
+    KEEP = 21 "keep" "values": ATTENTION[0], Uses { src: 1, third: 1, constants: 2, ..Uses::NONE }, if "attention";
+    /// `OpKind::Attend`, whose data has the length of the third region.
+    ATTEND = 22 "attend" "cache": ATTENTION[1], Uses { src: 1, third: 1, constants: 4, ..Uses::NONE }, if "attention";
 }

@@ -2,9 +2,11 @@
 
 use core::ops::Range;
 
-use super::header::{self as h, MATRIX_WORDS, OP_WORDS, Words};
+#[cfg(feature = "attention")]
+use super::header::Words;
+use super::header::{self as h, MATRIX_WORDS, OP_WORDS};
 use super::matrix::{Matrix, matrix};
-use super::op::{Around, FORMS, Form, IS_PARTIAL, NAMES, OpKind};
+use super::op::{Around, FORMS, Form, IS_PARTIAL, OpKind, UNKNOWN};
 use super::region::Region;
 use super::view::Image;
 use super::words::{TooLarge, halves};
@@ -127,7 +129,8 @@ impl<'a> Op<'a> {
     /// Returns the units that slices can cut the operation into: its elements, for each pass over them. A history also
     /// keeps those of the new frame. Attention is cut between the heads of tokens.
     pub(crate) fn units(&self) -> usize {
-        if cfg!(feature = "attention") && self.kind.is_attention() {
+        #[cfg(feature = "attention")]
+        if self.kind.is_attention() {
             // At least one, which a damaged image does not have: it fails.
             return self.src().len.checked_div(self.cache().dim).unwrap_or(0).max(1);
         }
@@ -148,12 +151,15 @@ impl<'a> Op<'a> {
 
     /// Returns `true` if the operation reads its destination.
     pub fn reads_dst(&self) -> bool {
-        self.form.uses.reads_dst
-            || self.kind == OpKind::Linear { accumulate: true }
-            || cfg!(feature = "attention") && self.kind == OpKind::Keep && self.is_ring()
+        #[cfg(feature = "attention")]
+        if self.kind == OpKind::Keep && self.is_ring() {
+            return true;
+        }
+        self.form.uses.reads_dst || self.kind == OpKind::Linear { accumulate: true }
     }
 
     /// Returns the arena region of the work area.
+    #[cfg(feature = "attention")]
     pub(crate) fn work(&self) -> Region {
         let header = self.image.first_chunk().map(Words);
         header.map_or(Region::default(), |header| Region { offset: header.work(), len: header.work_len() })
@@ -201,8 +207,7 @@ impl<'a> Image<'a> {
         let [head, places, lengths, data] = op.map(u32::from_le);
         let (code, detail, len) = (head as u8, (head >> 8) as u8, high(head));
         let index = usize::from(code).wrapping_sub(1);
-        let unknown = if index < NAMES.len() { ImageError::LeftOut } else { ImageError::Op };
-        let form = FORMS.get(index).ok_or(unknown)?;
+        let form = FORMS.get(index).ok_or(UNKNOWN)?;
         if IS_PARTIAL && !form.built {
             return Err(ImageError::LeftOut);
         }
@@ -215,7 +220,7 @@ impl<'a> Image<'a> {
             }
             OpKind::Normalize { .. } => OpKind::Normalize { added: detail == 1 },
             OpKind::Function(_) => {
-                let function = Function::from_code(detail).ok_or(ImageError::Op)?;
+                let function = Function::from_code(detail).ok_or(UNKNOWN)?;
                 if !function.is_built() {
                     return Err(ImageError::LeftOut);
                 }
@@ -235,13 +240,9 @@ impl<'a> Image<'a> {
         };
         let dst = Region { offset: low(places), len };
         let src = Region { offset: high(places), len: src };
-        let mut op = Op { kind, regions: [dst, src, third], record: op, form, image: self.words };
-        if cfg!(feature = "attention") && kind.is_attention() {
-            let lengths = op.attention_lengths();
-            for (region, len) in op.regions.iter_mut().skip(1).zip(lengths) {
-                region.len = len;
-            }
-        }
+        let op = Op { kind, regions: [dst, src, third], record: op, form, image: self.words };
+        #[cfg(feature = "attention")]
+        let op = op.with_lengths();
         Ok(op)
     }
 

@@ -1,6 +1,7 @@
 //! The operations of an image: each in its file, and here their list and the executor, which runs one of them.
 
 mod around;
+#[cfg(feature = "attention")]
 pub mod attention;
 pub mod cells;
 pub mod denoise;
@@ -65,7 +66,8 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         denoise(&by, op.constant(0), v, z, x, y);
         return Ok(units.end == len);
     }
-    if cfg!(feature = "attention") && op.kind.is_attention() {
+    #[cfg(feature = "attention")]
+    if op.kind.is_attention() {
         attention::run(op, arena, &units)?;
         return Ok(units.end == len);
     }
@@ -131,9 +133,9 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         | OpKind::Initial
         | OpKind::TableRow
         | OpKind::Standstill
-        | OpKind::History
-        | OpKind::Keep
-        | OpKind::Attend => return Err(Fault::Damaged),
+        | OpKind::History => return Err(Fault::Damaged),
+        #[cfg(feature = "attention")]
+        OpKind::Keep | OpKind::Attend => return Err(Fault::Damaged),
     }
     Ok(units.end == len)
 }

@@ -47,7 +47,7 @@ pub(crate) fn weigh_values(values: &[u32], row_words: usize, weights: &[u32], su
     if weights.is_empty() || !weights.len().is_multiple_of(4) || !fits {
         return;
     }
-    let (row, bytes) = (size_of::<u32>() * row_words, size_of::<u32>() * weights.len());
+    let (row, bytes) = (size_of::<u32>() * row_words, size_of_val(weights));
     let (fours, last) = sums.as_chunks_mut::<4>();
     // SAFETY: the values have two rows of `row_words` words for every four columns, also if these are not whole, and the
     // kernel reads as many words of a row as there are weights, a multiple of 4. It writes four sums for two rows.

@@ -14,8 +14,6 @@ mod table;
 #[cfg(feature = "attention")]
 pub(crate) use self::attention::{query_keys, weigh_values};
 use self::table::kernels;
-#[cfg(not(feature = "attention"))]
-pub(crate) use super::portable::{query_keys, weigh_values};
 use super::product::Product;
 use crate::layout::QUAD;
 

@@ -1,5 +1,6 @@
 //! All kernels in Rust, for any target: the arithmetic of the assembler backends, operation for operation.
 
+#[cfg(feature = "attention")]
 mod attention;
 #[cfg(feature = "scalar")]
 mod bytes;
@@ -15,6 +16,7 @@ mod vector;
 #[cfg(feature = "helium")]
 mod vectors;
 
+#[cfg(feature = "attention")]
 pub use attention::{query_keys, weigh_values};
 pub use cells::{gru_elements, lstm_elements};
 pub use elementwise::{denoise, normalize};
