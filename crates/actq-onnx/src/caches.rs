@@ -56,9 +56,7 @@ impl Caches {
         let tokens = exprs.len_of(of.keys) / width;
         let [keys, values] = [of.keys, of.values].map(|id| exprs.elements(id));
         let before = (tokens - 1) * width;
-        let (Some(of_keys), Some(of_values)) =
-            (past(exprs, &keys[..before]), past(exprs, &values[..before]))
-        else {
+        let (Some(of_keys), Some(of_values)) = (past(exprs, &keys[..before]), past(exprs, &values[..before])) else {
             return;
         };
         let mut note = |reason| [&of_keys, &of_values].map(|past| self.reasons.insert(past.input, reason));

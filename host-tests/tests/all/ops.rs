@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use actq::budget::{Budget, Rate};
 use actq::emit;
-use actq::graph::Evaluator;
+use actq::graph::{Evaluator, NodeKind};
 use actq::methods::{Activations, Method, Options, Outcome, quantize};
 use actq::policy::Policy;
 use actq::runtime::{ImageBuffer, with_head};
@@ -68,9 +68,11 @@ fn rtn(policy: &Policy, group: usize) -> Result<Vec<Outcome>> {
     Ok(quantize(&policy.graph, None, rate, &options)?.1)
 }
 
-/// The largest error that activation rounding explains.
-fn bound(outcomes: &[Outcome]) -> f64 {
-    let part = outcomes.iter().map(|o| 1.0 / f64::from(o.x_max)).fold(0.0, f64::max);
+/// The largest error that activation rounding explains. Attention rounds queries, keys and values to int8.
+fn bound(policy: &Policy, outcomes: &[Outcome]) -> f64 {
+    let has_attention = policy.graph.nodes.iter().any(|node| matches!(node.kind, NodeKind::Attention(_)));
+    let least = if has_attention { 1.0 / 127.0 } else { 0.0 };
+    let part = outcomes.iter().map(|o| 1.0 / f64::from(o.x_max)).fold(least, f64::max);
     if part > 0.0 { ROUNDING_UNITS * part } else { F32 }
 }
 
@@ -110,7 +112,7 @@ fn check(obs: usize, act: usize, ops: Value) -> Result<()> {
             };
             deviation(&observations, run, follow(case.dequantized(&policy, &outcomes)))
         })?;
-        let limit = bound(&outcomes);
+        let limit = bound(&policy, &outcomes);
         ensure!(off < limit, "group {group}: the error of the executor is {off:.2e}, limit {limit:.2e}");
     }
     Ok(())
@@ -208,6 +210,22 @@ checks! {
         {"op": "gelu", "input": "x"},
         {"op": "add", "with": "u"},
         {"op": "identity", "input": ["x", "y", "z", "u", "v", "obs"]},
+    ];
+
+    attention_is_full_or_causal_over_the_tokens_of_an_evaluation: 12, 36, [
+        {"op": "linear", "w": "q 24x12", "b": "qb 24", "save": "q"},
+        {"op": "linear", "w": "k 12x12", "input": "obs", "save": "k"},
+        {"op": "linear", "w": "v 12x12", "input": "obs", "save": "v"},
+        {"op": "attention", "heads": 4, "kv_heads": 2, "dim": 2, "input": "q", "keys": "k", "values": "v", "save": "y"},
+        {"op": "attention", "heads": 2, "dim": 3, "factor": 0.4, "causal": true, "input": "k", "keys": "v", "values": "k", "save": "c"},
+        {"op": "identity", "input": ["y", "c"]},
+    ];
+
+    attention_keeps_the_last_tokens: 9, 8, [
+        {"op": "linear", "w": "q 8x9", "save": "q"},
+        {"op": "linear", "w": "k 4x9", "input": "obs", "save": "k"},
+        {"op": "linear", "w": "v 4x9", "input": "obs", "save": "v"},
+        {"op": "attention", "heads": 2, "kv_heads": 1, "dim": 4, "context": 5, "input": "q", "keys": "k", "values": "v"},
     ];
 
     two_lstms_run_in_series: 9, 5, [recurrent("lstm", 28, 9, 7, "first"), recurrent("lstm", 20, 7, 5, "second")];

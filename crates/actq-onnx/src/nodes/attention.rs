@@ -14,13 +14,11 @@ use crate::values::expr::{Attention, Expr, Exprs, Id, Products};
 use crate::values::tensor::{Data, Element, Tensor, count};
 
 /// Refusal of a product of two values that is not attention's.
-pub(crate) const PRODUCT: &str =
-    "multiplies two values of the network, and only attention does with a kernel: queries with keys, then the softmax of \
+pub(crate) const PRODUCT: &str = "multiplies two values of the network, and only attention does with a kernel: queries with keys, then the softmax of \
      that over the keys with values; export the part after it";
 
 /// Refusal of a softmax elsewhere than in attention.
-pub(crate) const SOFTMAX: &str =
-    "has no kernel here; a softmax is supported in attention, over the products of queries and keys; if it only chooses \
+pub(crate) const SOFTMAX: &str = "has no kernel here; a softmax is supported in attention, over the products of queries and keys; if it only chooses \
      among actions, pass the value before it to actq import --output NAME";
 
 /// Returns the outputs, if the node is such an operator.
@@ -44,7 +42,12 @@ pub(crate) fn product(exprs: &mut Exprs, a: &Tensor, b: &Tensor, factor: f64, bu
     let of_both = broadcast(of_a, of_b)?;
     let batch = count(&of_both)?;
     let fits = [batch, rows, cols].into_iter().try_fold(inner, usize::checked_mul).is_some_and(|work| work <= budget);
-    ensure!(fits, "multiplies {:?} with {:?}, which takes more work than a policy of this size can have", a.shape, b.shape);
+    ensure!(
+        fits,
+        "multiplies {:?} with {:?}, which takes more work than a policy of this size can have",
+        a.shape,
+        b.shape
+    );
     let all = |x: &Tensor, last: [usize; 2]| expanded(x, &[&of_both[..], &last].concat(), budget);
     let (a, b) = (all(a, [rows, inner])?, all(b, [inner, cols])?);
     let shape = [&of_both[..], &[rows, cols]].concat();

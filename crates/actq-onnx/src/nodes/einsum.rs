@@ -31,7 +31,8 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     // Axes of both operands are summed over, or are a batch in the output; all others are in the output.
     let (batch, summed): (Vec<char>, Vec<char>) =
         a.iter().copied().filter(|c| b.contains(c)).partition(|c| output.contains(c));
-    let rest = |axes: &[char], other: &[char]| axes.iter().copied().filter(|c| !other.contains(c)).collect::<Vec<char>>();
+    let rest =
+        |axes: &[char], other: &[char]| axes.iter().copied().filter(|c| !other.contains(c)).collect::<Vec<char>>();
     let (of_a, of_b) = (rest(&a, &b), rest(&b, &a));
     let joined = [batch.clone(), of_a.clone(), of_b.clone()].concat();
     ensure!(

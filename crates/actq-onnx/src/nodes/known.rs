@@ -57,7 +57,8 @@ fn nonzero(x: &Tensor) -> Result<Tensor> {
 fn triangle(call: &Call<'_>) -> Result<Tensor> {
     let x = call.input(0)?;
     let &[.., rows, cols] = &x.shape[..] else { bail!("needs a matrix and reads the shape {:?}", x.shape) };
-    let k = if call.optional(1).is_some() { call.integers(1, "the diagonal")?.first().copied().unwrap_or(0) } else { 0 };
+    let k =
+        if call.optional(1).is_some() { call.integers(1, "the diagonal")?.first().copied().unwrap_or(0) } else { 0 };
     let is_upper = call.int("upper").unwrap_or(1) != 0;
     let stays = |i: usize| {
         let over = (i % cols) as i64 - (i / cols % rows) as i64;

@@ -169,8 +169,7 @@ impl Exprs {
         let all = self.elements(a);
         let of_queries: Vec<(Id, usize)> = all[..all.len() - 1].iter().filter_map(value).collect();
         let (a, b) = (self.vector(&of_queries), open_vector(self, &keys)?);
-        let products =
-            self.put(Expr::Products(Products { a, b, batch, rows, inner, cols }), batch * rows * cols);
+        let products = self.put(Expr::Products(Products { a, b, batch, rows, inner, cols }), batch * rows * cols);
         let mut turned = elements.to_vec();
         for (i, element) in turned.iter_mut().enumerate().filter(|(_, element)| value(element).is_some()) {
             let Some((factor, offset)) = value(element).and_then(|(id, at)| self.over_layer(id, at)) else {

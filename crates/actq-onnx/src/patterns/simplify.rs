@@ -63,9 +63,8 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
             Expr::Pick(runs) => {
                 let runs = sums_of_slices(exprs, &runs, &of);
                 let same = runs.iter().all(|run| run.of == runs[0].of);
-                let before = |run: &Run| {
-                    queries.get(instead.get(&run.of).unwrap_or(&run.of)).map_or(0, |read| read.start)
-                };
+                let before =
+                    |run: &Run| queries.get(instead.get(&run.of).unwrap_or(&run.of)).map_or(0, |read| read.start);
                 let moved = |run: &Run| Run { of: of(&run.of), from: run.from - before(run), ..*run };
                 let runs: Vec<Run> = runs.iter().map(moved).collect();
                 match exprs.get(runs[0].of) {

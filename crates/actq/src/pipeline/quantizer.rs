@@ -128,7 +128,7 @@ mod tests {
     fn error(policy: &Policy, method: Method, bits: u32) -> f64 {
         let graph = &policy.graph;
         let recordings = Recordings { calib: Some(dataset(graph, 20, 40)), heldout: None };
-        let steps = (method == Method::Distill).then_some(300);
+        let steps = (method == Method::Distill).then_some(40);
         // Scales, padding and biases of rows of 16 values are some bits beside.
         let options = Options { steps, ..Options::new(method, Budget::BitsPerWeight(f64::from(bits) + 2.0)) };
         let quantizer = Quantizer::new(policy, &recordings, options.method.clone(), None, |_| {}).expect("statistics");
@@ -141,15 +141,15 @@ mod tests {
     fn transformers_are_quantized_by_every_method() {
         for context in [0, 3] {
             let policy = Policy::of("transformer", transformer(context));
-            let mut at_two = Vec::new();
-            for method in [Method::Rtn, Method::Gptq, Method::Distill] {
-                let errors = [8, 4, 3, 2].map(|bits| error(&policy, method.clone(), bits));
-                println!("context {context}, {method}: {errors:?}");
-                assert!(errors[0] < 5e-3, "context {context}, {method}: {errors:?}");
+            let errors = |method: Method, bits: &[u32]| -> Vec<f64> {
+                let errors: Vec<f64> = bits.iter().map(|bits| error(&policy, method.clone(), *bits)).collect();
+                assert!(errors[0] < 5e-3 || bits[0] < 8, "context {context}, {method}: {errors:?}");
                 assert!(errors.is_sorted(), "context {context}, {method}: {errors:?}");
-                at_two.push(errors[3]);
-            }
-            assert!(at_two[2] < 0.5 * at_two[0], "context {context}: {at_two:?}");
+                errors
+            };
+            let (rtn, gptq) = (errors(Method::Rtn, &[8, 4, 3, 2]), errors(Method::Gptq, &[8, 4, 3, 2]));
+            let distill = errors(Method::Distill, &[3, 2]);
+            assert!(gptq[3] < rtn[3] && distill[1] < 0.5 * rtn[3], "context {context}: {rtn:?} {gptq:?} {distill:?}");
         }
     }
 }

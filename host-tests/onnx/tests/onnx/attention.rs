@@ -40,8 +40,7 @@ fn equal(operator: &[u8], parts: &[u8]) -> Result<()> {
 #[test]
 fn the_operator_equals_its_parts() -> Result<()> {
     for (mask, attributes) in [("", ""), (" + Trilu(full(-inf, 4, 4), [1])", ", is_causal=1")] {
-        let operator =
-            format!("Flatten(Attention(q, k, v, q_num_heads=2, kv_num_heads=1, scale=0.3{attributes}))");
+        let operator = format!("Flatten(Attention(q, k, v, q_num_heads=2, kv_num_heads=1, scale=0.3{attributes}))");
         let parts = format!(
             "a = Transpose(Reshape(q, [1, 4, 2, 4]), perm=[0, 2, 1, 3])
              w = Softmax(MatMul(a, Reshape(Transpose(k, perm=[0, 2, 1]), [1, 1, 4, 4])) * 0.3{mask}, axis=-1)

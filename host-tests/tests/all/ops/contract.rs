@@ -79,7 +79,7 @@ fn check_actions(mut json: Value, action: &Value) -> Result<[usize; 3]> {
         };
         deviation(&case.observations(), run, expected)
     })?;
-    let limit = bound(&outcomes);
+    let limit = bound(&policy, &outcomes);
     ensure!(off < limit, "the error of the actions is {off:.2e}, limit {limit:.2e}");
     Ok(met)
 }

@@ -145,6 +145,22 @@ impl Reference<'_> {
                     }
                     h.clone()
                 }
+                "attention" => {
+                    let [keys, values] = ["keys", "values"].map(|key| &slots[op[key].as_str().unwrap_or("")]);
+                    let context = number("context", 0.0) as usize;
+                    let before = if context > 0 { [h.clone(), c.clone()] } else { Default::default() };
+                    let [keys, values] = [[&before[0], &keys[..]].concat(), [&before[1], &values[..]].concat()];
+                    let heads = number("heads", 1.0);
+                    let sizes = [heads, number("kv_heads", heads), number("dim", 1.0)].map(|size| size as usize);
+                    let width = sizes[1] * sizes[2];
+                    let first = if context > 0 { keys.len().saturating_sub(context * width) } else { 0 };
+                    let factor = number("factor", number("dim", 1.0).powf(-0.5));
+                    let y = attention(&x, [&keys[first..], &values[first..]], sizes, factor, op["causal"] == true);
+                    if context > 0 {
+                        (*h, *c) = (keys[first..].to_vec(), values[first..].to_vec());
+                    }
+                    y
+                }
                 name => x.iter().map(|&v| function(name, op["approximate"] == "tanh", v)).collect(),
             };
             if let Some(name) = op["save"].as_str() {
@@ -181,6 +197,29 @@ fn scale(x: &[f64], factors: &[f64]) -> Vec<f64> {
 fn unit(x: &[f64], eps: f64) -> Vec<f64> {
     let size = (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64 + eps).sqrt();
     x.iter().map(|v| v / size).collect()
+}
+
+/// Computes each head of each query, `[token, head, element]`.
+fn attention(
+    queries: &[f64],
+    [keys, values]: [&[f64]; 2],
+    [heads, shared, dim]: [usize; 3],
+    factor: f64,
+    causal: bool,
+) -> Vec<f64> {
+    let (count, all) = (queries.len() / (heads * dim), keys.len() / (shared * dim));
+    let mut output = Vec::new();
+    for (place, query) in queries.chunks_exact(dim).enumerate() {
+        let (token, head) = (place / heads, place % heads / (heads / shared));
+        let seen = if causal { all - (count - 1 - token) } else { all };
+        let of = |x: &'_ [f64], i: usize| x[(i * shared + head) * dim..][..dim].to_vec();
+        let powers: Vec<f64> = (0..seen)
+            .map(|i| (factor * of(keys, i).iter().zip(query).map(|(k, q)| k * q).sum::<f64>()).exp())
+            .collect();
+        let total: f64 = powers.iter().sum();
+        output.extend((0..dim).map(|e| (0..seen).map(|i| powers[i] / total * of(values, i)[e]).sum::<f64>()));
+    }
+    output
 }
 
 fn sigmoid(x: f64) -> f64 {

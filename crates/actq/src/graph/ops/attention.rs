@@ -99,8 +99,7 @@ impl Attention {
         let (count, all) = (queries.len() / width, keys.len() / kv_width);
         let mut outputs = vec![0.0; queries.len()];
         let mut weights = Vec::with_capacity(all);
-        for (at, (query, output)) in
-            queries.chunks_exact(self.dim).zip(outputs.chunks_exact_mut(self.dim)).enumerate()
+        for (at, (query, output)) in queries.chunks_exact(self.dim).zip(outputs.chunks_exact_mut(self.dim)).enumerate()
         {
             let (i, head) = (at / self.heads, at % self.heads);
             let (seen, kv_head) = (self.seen(i, count, all), head * self.kv_heads / self.heads);
@@ -379,13 +378,7 @@ impl Operation for Attention {
         to.work_words = to.work_words.max(work_words(self.dim, slots));
         let [heads, shared] = [pair(self.heads, self.kv_heads), pair(self.dim, slots)];
         let data = vec![heads, shared, u32::from(self.causal), self.factor.to_bits()];
-        to.emit(
-            OpKind::Attend,
-            to.whole(dst),
-            Some(to.place(inputs[0])),
-            Some(to.whole(cache)),
-            StepData::Words(data),
-        );
+        to.emit(OpKind::Attend, to.whole(dst), Some(to.place(inputs[0])), Some(to.whole(cache)), StepData::Words(data));
         dst
     }
 }
@@ -429,8 +422,7 @@ mod tests {
 
     /// Returns the largest difference between the steps of an image and of its rounded network, and the largest output.
     fn off_image(graph: &Graph, policy: impl Fn(Graph) -> Policy) -> (f32, f32) {
-        let options =
-            Options { activations: Activations::Int8, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
+        let options = Options { activations: Activations::Int8, ..Options::new(Method::Rtn, Budget::Width(Width::W8)) };
         let (mut graph, outcomes) = quantize(graph, None, Rate::Width(Width::W8), &options).expect("outcomes");
         let bytes = emit::image(&policy(graph.clone()), &outcomes).expect("an image");
         for (matrix, outcome) in graph.matrices.iter_mut().zip(&outcomes) {
@@ -500,7 +492,11 @@ mod tests {
         let plain = Attention { heads: 4, kv_heads: 2, dim: 8, factor: 0.5, causal: true, context: 0 };
         let cases = [
             (plain, vec![32, 16], "takes queries, keys and values, not 2 inputs"),
-            (Attention { kv_heads: 3, ..plain }, vec![32; 3], "has 3 heads of keys for 4 of queries; it must be a divisor"),
+            (
+                Attention { kv_heads: 3, ..plain },
+                vec![32; 3],
+                "has 3 heads of keys for 4 of queries; it must be a divisor",
+            ),
             (Attention { heads: 17, ..plain }, vec![32; 3], "has 17 heads; 1 to 16 are supported"),
             (plain, vec![30, 16, 16], "its 30 queries are not tokens of 4 heads of 8 values"),
             (plain, vec![32, 16, 32], "its 16 keys and 32 values are not tokens of 2 heads of 8 values"),

@@ -197,7 +197,7 @@ fn around() -> Result<(String, Vec<u8>)> {
 
 /// Ops of policy.json with shapes of their own. All others are measured with [`LENGTHS`], so that a new one needs no
 /// line here.
-const WITH_MATRICES: [&str; 3] = ["linear", "lstm", "gru"];
+const WITH_SHAPES: [&str; 4] = ["attention", "linear", "lstm", "gru"];
 
 /// An op of policy.json with the same values for every key.
 struct Filled<'b> {
@@ -300,7 +300,7 @@ fn policies() -> Result<Vec<(Policy, Vec<Outcome>)>> {
     for (name, contract) in [("functions", false), ("functions with contract", true)] {
         let mut builder = Builder::new(if contract { OBSERVATION } else { 256 });
         for len in LENGTHS {
-            for (op, _) in NodeKind::syntax().into_iter().filter(|(op, _)| !WITH_MATRICES.contains(op)) {
+            for (op, _) in NodeKind::syntax().into_iter().filter(|(op, _)| !WITH_SHAPES.contains(op)) {
                 filled(&mut builder, op, len)?;
             }
             let [mean, scale] = [builder.values(len), vec![1.5; len]];
