@@ -19,10 +19,11 @@ pub(crate) struct Caches {
 }
 
 const SEVERAL: &str = "an evaluation reads several tokens after them; export a step of one token";
-const UNMASKED: &str = "attention sees all of them after a reset, when they are zeros and no tokens; export a mask of the \
-                        window as an input, too, with its next value as an output: zeros at first, and 1 for every token";
-const LOST: &str = "no output is its next value: the same tokens without the first, then the new one; export it as an \
-                    output of the same shape";
+const UNMASKED: &str = "attention sees all of them after a reset, when they are zeros and no tokens; export a mask \
+                        of the window as an input, too, with its next value as an output: zeros at first, and 1 for \
+                        every token";
+const LOST: &str = "no output is its next value: the same tokens without the first, then the new one; export it as \
+                    an output of the same shape";
 
 /// The first elements of a vector that are those of a graph input.
 struct Past {

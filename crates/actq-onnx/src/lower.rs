@@ -187,6 +187,11 @@ impl Lowered {
     }
 
     fn attention(&mut self, of: &Attention, len: usize) -> Result<Vec<Part>> {
+        ensure!(
+            of.valid.is_empty(),
+            "has a mask that depends on an input, and only that of a window of tokens in the state is supported; export \
+             a causal or a full one"
+        );
         let (keys, values) = (self.whole(of.keys)?, self.whole(of.values)?);
         let op = JsonOp::new("attention").key("heads", Some(of.heads)).key("kv_heads", Some(of.kv_heads));
         let op = op.key("dim", Some(of.dim)).key("factor", Some(of.factor)).key("causal", Some(of.causal));

@@ -14,12 +14,12 @@ use crate::values::expr::{Attention, Expr, Exprs, Id, Products};
 use crate::values::tensor::{Data, Element, Tensor, count};
 
 /// Refusal of a product of two values that is not attention's.
-pub(crate) const PRODUCT: &str = "multiplies two values of the network, and only attention does with a kernel: queries with keys, then the softmax of \
-     that over the keys with values; export the part after it";
+pub(crate) const PRODUCT: &str = "multiplies two values of the network, and only attention does with a kernel: queries with keys, then the \
+     softmax of that over the keys with values; export the part after it";
 
 /// Refusal of a softmax elsewhere than in attention.
-pub(crate) const SOFTMAX: &str = "has no kernel here; a softmax is supported in attention, over the products of queries and keys; if it only chooses \
-     among actions, pass the value before it to actq import --output NAME";
+pub(crate) const SOFTMAX: &str = "has no kernel here; a softmax is supported in attention, over the products of queries and keys; if it only \
+     chooses among actions, pass the value before it to actq import --output NAME";
 
 /// Returns the outputs, if the node is such an operator.
 pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Result<Option<Vec<Tensor>>> {

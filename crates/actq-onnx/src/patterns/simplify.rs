@@ -130,8 +130,14 @@ fn read_queries(
     for &id in order {
         let Expr::Attention(of) = exprs.get(id) else { continue };
         let (len, width) = (exprs.len_of(id), of.heads * of.dim);
+        // Sums look through what they read.
+        let is_summed = |reader: &Id| {
+            readers.get(reader).is_some_and(|all| all.iter().any(|id| matches!(exprs.get(*id), Expr::Sum(_))))
+        };
         let runs = |reader: &Id| match exprs.get(*reader) {
-            Expr::Pick(runs) => Some(runs.iter().filter(|run| *instead.get(&run.of).unwrap_or(&run.of) == id)),
+            Expr::Pick(runs) if !is_summed(reader) => {
+                Some(runs.iter().filter(|run| *instead.get(&run.of).unwrap_or(&run.of) == id))
+            }
             _ => None,
         };
         let Some(runs) = readers.get(&id).and_then(|all| all.iter().map(runs).collect::<Option<Vec<_>>>()) else {

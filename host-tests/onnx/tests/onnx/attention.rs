@@ -5,7 +5,6 @@ use actq_onnx::ImportOptions;
 use anyhow::{Result, ensure};
 
 use super::file::File;
-use super::styles::ended;
 use super::{compare, drawn, imported, same};
 
 /// Begins a file of this many tokens of 6 values, with queries of 8 and keys and values of 4.
@@ -21,10 +20,13 @@ k = MatMul(obs, drawn(6, 4))
 v = MatMul(obs, drawn(6, 4))
 ";
 
-/// Writes a file of these lines, whose last value has `len` elements.
+/// Writes a file of these lines, whose last one gives the `len` elements before the last layer. All weights are drawn
+/// before, so that they are the same in all files.
 fn written(mut file: File, lines: &str, len: usize) -> Vec<u8> {
-    let last = file.write(&[], &format!("{LAYERS}{lines}"));
-    ended(file, &last, len)
+    let (before, last) = lines.rsplit_once('\n').unwrap_or(("", lines));
+    file.write(&[], &format!("{LAYERS}o = drawn({len}, 3)\n{before}\nactions := MatMul({}, o)", last.trim()));
+    file.output("actions", &[1, 3]);
+    file.bytes()
 }
 
 /// Requires that the operator's file gives the actions of its parts' file, which are tract's.
@@ -39,7 +41,7 @@ fn equal(operator: &[u8], parts: &[u8]) -> Result<()> {
 
 #[test]
 fn the_operator_equals_its_parts() -> Result<()> {
-    for (mask, attributes) in [("", ""), (" + Trilu(full(-inf, 4, 4), [1])", ", is_causal=1")] {
+    for (mask, attributes) in [("", ""), (" + Trilu(full(-inf, 4, 4), Squeeze([1]))", ", is_causal=1")] {
         let operator = format!("Flatten(Attention(q, k, v, q_num_heads=2, kv_num_heads=1, scale=0.3{attributes}))");
         let parts = format!(
             "a = Transpose(Reshape(q, [1, 4, 2, 4]), perm=[0, 2, 1, 3])
