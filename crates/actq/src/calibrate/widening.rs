@@ -5,7 +5,7 @@ use std::fmt;
 /// Noise on a window of observations. Its standard deviation is drawn for every window, between 0 and `noise`, in units
 /// of each value's own deviation over the recording. From step to step it keeps [`MEMORY`]. It imitates a rollout, in
 /// which the policy's own errors leave the recorded path slowly and for a while. Noise that is independent in every
-/// step averages out and teaches a recurrent policy to ignore it (docs/QUANTIZER.md has the figures).
+/// step averages out and teaches a recurrent policy to ignore it (figures: docs/records/2026-11-22-learning.md).
 ///
 /// Half of the windows can also move as a whole, by up to `mix` times the difference of two recorded observations. This
 /// preserves correlations between values.
