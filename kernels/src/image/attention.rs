@@ -110,6 +110,9 @@ impl Op<'_> {
 
     /// Returns an operation of attention with the lengths of `src` and of the third region; any other as it is.
     pub(super) fn with_lengths(mut self) -> Self {
+        if !self.kind.is_attention() {
+            return self;
+        }
         let (cache, is_ring) = (self.cache(), self.is_ring());
         let [dst, src, third] = &mut self.regions;
         match self.kind {
