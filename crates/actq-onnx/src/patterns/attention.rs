@@ -36,6 +36,14 @@ struct Score {
     valid: Option<(Id, usize)>,
 }
 
+/// Layers over keys, whose rows are constant queries.
+struct Layers {
+    /// Operand and matrix for every key of every head.
+    of_keys: Vec<(Id, Arc<Matrix>)>,
+    /// Rows of each.
+    rows: usize,
+}
+
 impl Exprs {
     /// Finds the scores that are the elements of a softmax over rows of `cols`; `None` if they are no products of two
     /// values.
@@ -154,7 +162,7 @@ impl Exprs {
 
     /// Turns products of constant queries, which are layers over the keys, back to products of two values.
     fn of_layers(&mut self, elements: &[Element], cols: usize) -> Result<Option<Vec<Element>>> {
-        let Some((layers, rows)) = self.layers(elements, cols) else { return Ok(None) };
+        let Some(Layers { of_keys: layers, rows }) = self.layers(elements, cols) else { return Ok(None) };
         let (batch, inner) = (layers.len() / cols, layers[0].1.cols);
         let mut keys = Vec::with_capacity(layers.len() * inner);
         let mut queries = Vec::with_capacity(batch * rows * inner);
@@ -183,7 +191,7 @@ impl Exprs {
     }
 
     /// Returns the layer of every key of every head, and the queries, if all elements are rows of such layers.
-    fn layers(&self, elements: &[Element], cols: usize) -> Option<(Vec<(Id, Arc<Matrix>)>, usize)> {
+    fn layers(&self, elements: &[Element], cols: usize) -> Option<Layers> {
         let layer = |element: &Element| {
             let (id, i) = value(element)?;
             let run = self.parts_of(Run { of: id, from: i, len: 1 }).first()?.source?.run(1)?;
@@ -216,7 +224,7 @@ impl Exprs {
         }
         let of_one_head = |head: &[(Id, Arc<Matrix>)]| head.iter().all(|(_, w)| w.data == head[0].1.data);
         (layers.chunks(cols).all(of_one_head) && layers.iter().all(|(_, w)| w.cols == first.cols))
-            .then_some((layers, rows))
+            .then_some(Layers { of_keys: layers, rows })
     }
 
     /// Returns the factor and the offset of an element over the row of a layer.
