@@ -1,11 +1,12 @@
 //! ONNX's operator Attention, which tract does not have, against its parts.
 
 use actq::measure::actions::actions;
-use actq_onnx::ImportOptions;
+use actq_onnx::{ImportOptions, proto};
 use anyhow::{Result, ensure};
+use prost::Message as _;
 
-use super::file::File;
-use super::{compare, drawn, imported, same};
+use super::file::{File, encoded};
+use super::{compare, drawn, imported, refused, same};
 
 /// Begins a file of this many tokens of 6 values, with queries of 8 and keys and values of 4.
 fn begun(tokens: i64) -> File {
@@ -86,4 +87,15 @@ fn its_past_keys_are_a_state() -> Result<()> {
          Flatten(MatMul(w, values))"
     );
     equal(&written(with_states(), &operator, 8), &written(with_states(), &parts, 8))
+}
+
+/// Its axis is the last from operator set 13 on.
+#[test]
+fn an_old_softmax_without_an_axis_is_refused() {
+    let mut file = begun(4);
+    file.write(&[], "s = Softmax(MatMul(obs, Transpose(obs, perm=[0, 2, 1])))\nactions := Flatten(MatMul(s, obs))");
+    file.output("actions", &[1, 24]);
+    let set = encoded(&proto::OperatorSet { domain: None, version: Some(12) });
+    let bytes = proto::Model { opset_import: vec![set], ..file.model() }.encode_to_vec();
+    refused(&bytes, "names no axis, and in operator set 12 goes over all but the first");
 }
