@@ -1,5 +1,7 @@
 //! The network of an image with activations in f32: the error that remains if only the weights are quantized.
 
+use std::collections::BTreeMap;
+
 use actq_kernels::Image;
 use actq_kernels::image::{Matrix, Op, OpKind};
 use actq_kernels::ops::run_whole;
@@ -7,14 +9,19 @@ use ndarray::{Array2, ArrayView1};
 
 use crate::error::{Context as _, Result};
 use crate::graph::Graph;
+use crate::graph::ops::Attention;
 
-/// Executor of an image with linear operations in f32.
+/// Keys and values in f32 of the tokens in each cache, by its arena offset.
+type Caches = BTreeMap<usize, [Vec<f32>; 2]>;
+
+/// Executor of an image with linear operations and attention in f32.
 pub struct Unrounded<'a> {
     image: Image<'a>,
     ops: Vec<Op<'a>>,
     /// Weights of each operation; empty if it has none.
     weights: Vec<Array2<f32>>,
     arena: Vec<u32>,
+    caches: Caches,
 }
 
 impl<'a> Unrounded<'a> {
@@ -22,7 +29,8 @@ impl<'a> Unrounded<'a> {
     pub fn new(image: Image<'a>) -> Self {
         let ops: Vec<Op<'a>> = image.ops().collect();
         let weights = ops.iter().map(|op| op.matrix().map_or(Array2::default((0, 0)), |matrix| dequantized(&matrix)));
-        Self { image, weights: weights.collect(), ops, arena: vec![0; image.scratch_words()] }
+        let (weights, arena) = (weights.collect(), vec![0; image.scratch_words()]);
+        Self { image, weights, ops, arena, caches: Caches::new() }
     }
 
     /// Takes the weights of the graph that the image was made of, as they were before they were quantized.
@@ -63,6 +71,8 @@ impl<'a> Unrounded<'a> {
             for (op, weights) in self.ops[first..].iter().zip(&self.weights[first..]) {
                 match (op.kind, op.matrix()) {
                     (OpKind::Linear { accumulate }, Some(matrix)) => multiply(op, &matrix, weights, accumulate, arena),
+                    (OpKind::Keep, _) => keep(op, arena, &mut self.caches)?,
+                    (OpKind::Attend, _) => attend(op, arena, &self.caches),
                     _ => run_whole(op, step, arena)?,
                 }
             }
@@ -91,6 +101,37 @@ fn multiply(op: &Op<'_>, matrix: &Matrix<'_>, weights: &Array2<f32>, accumulate:
     for (row, (y, sum)) in y.iter_mut().zip(weights.dot(&ArrayView1::from(&x))).enumerate() {
         *y = if accumulate { *y } else { 0.0 } + matrix.bias(row) + sum;
     }
+}
+
+/// Keeps keys and values as the image does, and in f32.
+fn keep(op: &Op<'_>, arena: &mut [u32], caches: &mut Caches) -> Result<()> {
+    let ([kv_heads, dim], [slots, is_ring]) = (sizes(op, 0), sizes(op, 1));
+    let before = arena[op.dst().offset];
+    run_whole(op, 0, arena)?;
+    let kept = caches.entry(op.dst().offset).or_default();
+    for (kept, new) in kept.iter_mut().zip([op.src(), op.third()]) {
+        if is_ring == 0 || before == 0 {
+            kept.clear();
+        }
+        kept.extend(floats(&arena[new.range()]));
+        kept.drain(..kept.len().saturating_sub(slots * kv_heads * dim));
+    }
+    Ok(())
+}
+
+/// Computes the outputs of queries in f32.
+fn attend(op: &Op<'_>, arena: &mut [u32], caches: &Caches) {
+    let ([heads, kv_heads], [dim, _], [causal, _]) = (sizes(op, 0), sizes(op, 1), sizes(op, 2));
+    let of = Attention { heads, kv_heads, dim, factor: op.constant(3), causal: causal != 0, context: 0 };
+    let Some([keys, values]) = caches.get(&op.third().offset) else { return };
+    let outputs = of.unrounded(floats(&arena[op.src().range()]), keys, values);
+    arena[op.dst().range()].copy_from_slice(bytemuck::cast_slice(&outputs));
+}
+
+/// Returns the sizes in word `i` of an operation's data.
+fn sizes(op: &Op<'_>, i: usize) -> [usize; 2] {
+    let word = op.constant(i).to_bits();
+    [word & 0xffff, word >> 16].map(|size| size as usize)
 }
 
 fn floats(words: &[u32]) -> &[f32] {
@@ -191,6 +232,40 @@ mod tests {
         })
         .expect("the executor");
         assert!(rounded > 1e-4, "int8 activations make no difference: {rounded}");
+    }
+
+    #[test]
+    fn unrounded_attention_is_that_of_the_network() {
+        for (tokens, causal, context) in [(2, false, 0), (2, true, 0), (1, true, 3)] {
+            let mut random = Random::new(6);
+            let mut graph = Graph::new(OBS);
+            let mut linear = |graph: &mut Graph, rows: usize, input: usize| {
+                let (matrix, cols) = (graph.matrices.len(), graph.len_of(input));
+                let data = (0..rows * cols).map(|_| random.unit()).collect();
+                graph.matrices.push(WeightMatrix { name: String::new(), rows, cols, data });
+                graph.add(Linear { matrix, bias: vec![0.1; rows] }, &[input]).expect("it fits")
+            };
+            let [queries, keys, values] = [12, 6, 6].map(|rows| linear(&mut graph, rows * tokens, 0));
+            let attention = Attention { heads: 4, kv_heads: 2, dim: 3, factor: 0.7, causal, context };
+            let outputs = graph.add(attention, &[queries, keys, values]).expect("it fits");
+            linear(&mut graph, ACT, outputs);
+            let (mut dequantized, outcomes, buffer) = image(&graph, Width::W8, Activations::Int8);
+            for (matrix, outcome) in dequantized.matrices.iter_mut().zip(&outcomes) {
+                matrix.data = outcome.quantized.dequantized();
+            }
+            let mut evaluator = Evaluator::new(&dequantized);
+            let mut unrounded = Unrounded::new(buffer.image(Path::new("memory")).expect("an image"));
+            for _ in 0..3 {
+                evaluator.start(None);
+                unrounded.state_mut().fill(0.0);
+                for _ in 0..8 {
+                    let obs: Vec<f32> = (0..OBS).map(|_| 2.0 * random.unit()).collect();
+                    let expected = evaluator.step(&obs, &mut |_, _| {});
+                    let off = distance(unrounded.infer(&obs).expect("it runs"), &expected);
+                    assert!(off < 1e-5, "{tokens} tokens, causal {causal}, context {context}: {off}");
+                }
+            }
+        }
     }
 
     /// Checks that the recorded state means the same to the f32 network, to the executor and to [`Unrounded`].

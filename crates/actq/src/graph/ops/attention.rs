@@ -117,6 +117,12 @@ impl Attention {
         outputs
     }
 
+    /// Computes the outputs of queries over all these keys and values, without rounding.
+    pub(crate) fn unrounded(&self, queries: &[f32], keys: &[f32], values: &[f32]) -> Vec<f32> {
+        let [queries, keys, values] = [queries, keys, values].map(<[f32]>::to_vec);
+        self.outputs(&Tokens { queries, keys, values, before: 0 }, false)
+    }
+
     /// Returns the derivatives of the outputs without rounding; `dy` is the derivative by them.
     #[inline(always)]
     fn gradients(&self, tokens: &Tokens, dy: &[f32]) -> Gradients {
