@@ -18,7 +18,7 @@ def gravity(q):
     return np.stack([2 * (w * y - x * z), -2 * (y * z + w * x), -1 + 2 * (x * x + y * y)], 1)
 
 
-def observations(data):
+def observations(data, history=HISTORY):
     """Returns what bundle/deploy.toml makes of the recorded raw values."""
     raw, first = data["raw"], data["first"][:, 0] > 0
     last = np.roll(data["applied"][:, ::-1] / TORQUE, 1, axis=0)
@@ -26,7 +26,7 @@ def observations(data):
     # Raw values: gyro, orientation, wheel velocities (right, left), command.
     frame = np.concatenate([0.25 * raw[:, :3], gravity(raw[:, 3:7]), raw[:, 9:], 0.05 * raw[:, 8:6:-1], last], 1)
     begin = np.maximum.accumulate(np.where(first, np.arange(len(frame)), 0))
-    frames = [frame[np.maximum(np.arange(len(frame)) - age, begin)] for age in reversed(range(HISTORY))]
+    frames = [frame[np.maximum(np.arange(len(frame)) - age, begin)] for age in reversed(range(history))]
     return torch.from_numpy(np.concatenate(frames, 1).astype(np.float32))
 
 

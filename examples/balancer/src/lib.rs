@@ -29,3 +29,8 @@ pub use task::{EPISODE_STEPS, Outcome, RATE_HZ, RAW_LEN, Task, run_episode};
 pub fn bundle() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/bundle"))
 }
+
+/// Returns the folder of a policy with attention: a causal transformer over the last 16 frames.
+pub fn transformer() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/transformer"))
+}

@@ -1,14 +1,15 @@
-//! The balancing robot of `cargo demo`: a deploy bundle in closed loop, from raw sensor values to torques.
+//! The balancing robot of `cargo demo`: a deploy bundle in closed loop, from raw sensor values to torques; of `cargo demo
+//! --transformer`, one with attention.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use actq::budget::Budget;
 use actq::data::{Dataset, Recordings};
 use actq::methods::{Effort, Method, Options};
 use actq::pipeline;
 use actq::runtime::{ImageBuffer, with_head};
-use actq_balancer::{EPISODE_STEPS, Outcome, RAW_LEN, bundle, run_episode};
+use actq_balancer::{EPISODE_STEPS, Outcome, RAW_LEN, run_episode};
 use actq_bench::qemu::Counter;
 use actq_bench::{Target, evaluation, firmware};
 use actq_cli::outputs::files;
@@ -27,41 +28,48 @@ const BITS: [f64; 2] = [3.0, 2.0];
 const RECORDED_EPISODES: usize = 40;
 
 /// Reads the bundle and writes its images; returns the raw values of the episodes that they learned from.
-pub(crate) fn quantize() -> Result<Dataset> {
+pub(crate) fn quantize(bundle: &Path) -> Result<Dataset> {
     fs::create_dir_all(folder())?;
-    let policy = Deployment::load(bundle())?.policy;
+    let policy = Deployment::load(bundle)?.policy;
     let bytes = 4 * policy.parameters;
-    println!("\nReading the balancer's bundle ({} parameters, {bytes} bytes in f32)", policy.parameters);
+    println!("\nReading the bundle {} ({} parameters, {bytes} bytes in f32)", policy.name, policy.parameters);
     println!("Recording {RECORDED_EPISODES} episodes of the f32 policy to learn from");
-    let (raw, recordings) = recordings()?;
+    let (raw, recordings) = recordings(bundle)?;
     for bits in BITS {
         println!("Quantizing to {} with distill", name(bits));
         let options = Options { effort: Effort::Quick, ..Options::new(Method::Distill, Budget::BitsPerWeight(bits)) };
         let image = pipeline::quantize(&policy, &recordings, &options, ())?.whole_image()?;
-        files::write(&path(bits), &image)?;
+        files::write(&path(&policy.name, bits), &image)?;
     }
     Ok(raw)
 }
 
 /// Records episodes of the f32 policy: raw values, and the networks' observations in them.
-pub(crate) fn recordings() -> Result<(Dataset, Recordings)> {
-    let raw = F32::open()?.record()?;
-    let calib = Some(observed(bundle(), &raw)?);
+pub(crate) fn recordings(bundle: &Path) -> Result<(Dataset, Recordings)> {
+    let raw = F32::open(bundle)?.record()?;
+    let calib = Some(observed(bundle, &raw)?);
     Ok((raw, Recordings { calib, heldout: None }))
 }
 
 /// Drives the robot with the bundle in f32 and with the images of [`quantize`], on the host and in QEMU; returns a
 /// report.
-pub(crate) fn drive(counter: &Counter, raw: &Dataset, episodes: u64, qemu_episodes: u64) -> Result<String> {
-    let f32_bytes = 4 * Deployment::load(bundle())?.policy.parameters;
-    println!("\nBalancer: closed loop in f32, {episodes} episodes");
-    let mut f32_policy = F32::open()?;
+pub(crate) fn drive(
+    bundle: &Path,
+    counter: &Counter,
+    raw: &Dataset,
+    episodes: u64,
+    qemu_episodes: u64,
+) -> Result<String> {
+    let policy = Deployment::load(bundle)?.policy;
+    let f32_bytes = 4 * policy.parameters;
+    println!("\n{}: closed loop in f32, {episodes} episodes", policy.name);
+    let mut f32_policy = F32::open(bundle)?;
     let outcomes = closed_loop(episodes, |seed| f32_policy.episode(seed, |_| ()))?;
     let mut columns = vec![Column::of_f32(f32_bytes, &[success(&outcomes), error(&outcomes)])];
 
     let mut report = Vec::new();
     for bits in BITS {
-        let (name, path) = (name(bits), path(bits));
+        let (name, path) = (name(bits), path(&policy.name, bits));
         let buffer = ImageBuffer::read(&path)?;
         let image = buffer.image(&path)?;
         println!("Closed loop at {name}, {episodes} episodes on the host");
@@ -80,7 +88,7 @@ pub(crate) fn drive(counter: &Counter, raw: &Dataset, episodes: u64, qemu_episod
         columns.push(Column::new(&name, &image, f32_bytes, &figures));
         report.push(firmware.report(&name, &success(&firmware.outcomes), &elf, image)?);
     }
-    Ok(format!("{}\n\n{}\n", summary("Balancer", &ROWS, &columns), report.join("\n")))
+    Ok(format!("{}\n\n{}\n", summary(&policy.name, &ROWS, &columns), report.join("\n")))
 }
 
 /// Returns the name of an image, and its file.
@@ -88,16 +96,16 @@ fn name(bits: f64) -> String {
     format!("{bits:.1} bits")
 }
 
-fn path(bits: f64) -> PathBuf {
-    folder().join(format!("balancer-{bits:.1}-bits.actq"))
+fn path(policy: &str, bits: f64) -> PathBuf {
+    folder().join(format!("{policy}-{bits:.1}-bits.actq"))
 }
 
 /// The policy as its bundle describes it, in f32.
 struct F32(Runner);
 
 impl F32 {
-    fn open() -> Result<Self> {
-        let opened = Bundle::open(bundle())?;
+    fn open(bundle: &Path) -> Result<Self> {
+        let opened = Bundle::open(bundle)?;
         let description = Description::parse(&opened.text(DESCRIPTION)?)?;
         Ok(Self(Runner::new(Plan::new(&description, &opened)?)))
     }

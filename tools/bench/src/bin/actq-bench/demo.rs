@@ -105,11 +105,11 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
     };
     reach.quantize()?;
     flow.quantize()?;
-    let recording = balancer::quantize()?;
+    let recording = balancer::quantize(actq_balancer::bundle())?;
     let reports = [
         reach.drive(&counter)?,
         flow.drive(&counter)?,
-        balancer::drive(&counter, &recording, episodes, some(qemu_episodes))?,
+        balancer::drive(actq_balancer::bundle(), &counter, &recording, episodes, some(qemu_episodes))?,
     ];
     println!("\n{}", reports.join("\n"));
     faults::some(&reach.path(CONTROLLER_IMAGE))?;
@@ -119,6 +119,15 @@ pub(crate) fn run(episodes: u64, qemu_episodes: u64) -> Result<()> {
         "Whole calls on the Cortex-M4, instructions counted, cycles modelled:\n\n{}",
         kernels::report(&records, Some((256, 256)))
     );
+    Ok(())
+}
+
+/// Drives the balancer by its transformer alone.
+pub(crate) fn transformer(episodes: u64, qemu_episodes: u64) -> Result<()> {
+    let bundle = actq_balancer::transformer();
+    let counter = Counter::build()?;
+    let recording = balancer::quantize(bundle)?;
+    println!("\n{}", balancer::drive(bundle, &counter, &recording, episodes, qemu_episodes)?);
     Ok(())
 }
 

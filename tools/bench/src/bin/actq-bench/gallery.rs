@@ -59,7 +59,7 @@ struct ShownImage {
 pub(crate) fn build(folder: &Path, robots: &Path, quick: bool) -> Result<()> {
     let module = fs::read(robots).with_context(|| format!("{}: cannot read the file", robots.display()))?;
     let bundle = Deployment::load(actq_balancer::bundle())?.policy;
-    let (_, recordings) = balancer::recordings()?;
+    let (_, recordings) = balancer::recordings(actq_balancer::bundle())?;
     let mut all = vec![shown(0, &bundle, &recordings, quick)?];
     if !quick {
         let policy = Policy::load(&ur3())?;

@@ -44,6 +44,9 @@ enum Command {
         /// Closed-loop episodes with the firmware in QEMU as the policy
         #[arg(long, default_value_t = 20)]
         qemu_episodes: u64,
+        /// Only the balancing robot, with its transformer: attention to a window of its last 16 tokens
+        #[arg(long)]
+        transformer: bool,
     },
     /// Count the instructions of kernels and whole heads on a Cortex-M4 in QEMU and model their cycles
     ///
@@ -170,7 +173,8 @@ fn capi(core: &str, out: &Path, image: Option<&Path>, compact: bool) -> Result<(
 
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
-        Command::Demo { episodes, qemu_episodes } => demo::run(episodes, qemu_episodes),
+        Command::Demo { episodes, qemu_episodes, transformer: true } => demo::transformer(episodes, qemu_episodes),
+        Command::Demo { episodes, qemu_episodes, .. } => demo::run(episodes, qemu_episodes),
         Command::Descriptions { count, first, qemu } => descriptions::run(first, count, qemu),
         Command::Faults => faults::all(),
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
