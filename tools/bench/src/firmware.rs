@@ -8,6 +8,7 @@ use std::sync::{LazyLock, Mutex};
 
 use actq::methods::Activations;
 use actq::policy::Policy;
+use actq::runtime::ImageBuffer;
 use actq_boards::{Target, root, target_dir};
 use actq_cli::outputs::files;
 use actq_kernels::Width;
@@ -38,6 +39,8 @@ const CONTROLLER: &str = "controller";
 const BENCH: &str = "actq-firmware-bench";
 /// Its binary that runs an image.
 const HARNESS: &str = "harness";
+/// Its feature for images with attention, and that of the kernels.
+const ATTENTION: &str = "attention";
 const STYLES: &str = "actq-firmware-styles";
 /// Its binaries: a head in a user's own firmware, each in another style.
 pub const STYLE_NAMES: [&str; 3] = ["bare", "rtic", "embassy"];
@@ -69,14 +72,15 @@ pub fn harness(target: Target) -> Result<PathBuf> {
 
 /// Does the same as [`harness`] with attention, which the other harness does not have: so it takes no instruction there.
 pub fn attention_harness(target: Target) -> Result<PathBuf> {
-    let feature = "attention";
-    let build = || harness_in_folder(target, feature, built_in()?);
-    Ok(build_once((BENCH, HARNESS, feature, target), build)?.join(HARNESS))
+    let build = || harness_in_folder(target, ATTENTION, built_in()?);
+    Ok(build_once((BENCH, HARNESS, ATTENTION, target), build)?.join(HARNESS))
 }
 
-/// Builds the harness with `image` built in.
+/// Builds the harness with `image` built in, and with attention if the image needs it.
 pub fn harness_with(target: Target, image: &Path) -> Result<PathBuf> {
-    Ok(harness_in_folder(target, "", image)?.join(HARNESS))
+    let buffer = ImageBuffer::read(image)?;
+    let feature = buffer.image(image)?.features().find(|feature| *feature == ATTENTION).unwrap_or_default();
+    Ok(harness_in_folder(target, feature, image)?.join(HARNESS))
 }
 
 fn harness_in_folder(target: Target, feature: &str, image: &Path) -> Result<PathBuf> {
