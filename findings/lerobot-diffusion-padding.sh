@@ -1,5 +1,5 @@
 #!/bin/sh
-# lerobot 0.6.1 (read from its wheel): the diffusion policy's configuration drops 7 frames at the end of each episode of its training data, by the formula that stands beside the number and is
+# lerobot 0.6.1 (read from its wheel): the diffusion policy's configuration drops 7 frames at the end of each episode of its training data, by the formula written beside the number and is
 # MultiTaskDiT's: horizon - n_action_steps - n_obs_steps + 1. The defaults of these three have changed, and the formula gives 31. So the last frames that it learns from have up to 24 of the
 # 32 actions that a robot carries out filled with copies of the episode's last action, without a mask (do_mask_loss_for_padding is off). With the formula's 31, none of them.
 # Seen on 2026-11-29:  horizon 64, n_action_steps 32, n_obs_steps 2: formula 31, default 7   last frame learned from: 24 of 32 actions are copies, with 31: 0

@@ -20,7 +20,7 @@ const CASES: usize = if cfg!(miri) { 4 } else { 600 };
 /// A key and a value of a head.
 type Pair = (Vec<f32>, Vec<f32>);
 
-/// What a query sees: for each token, the keys and values of the heads.
+/// Returns the tokens that a query sees: for each, the keys and values of the heads.
 fn tokens(attention: &Attention, observation: &[f32]) -> Vec<Vec<Pair>> {
     let (dim, [queries, keys, _]) = (attention.cache.dim, attention.lengths());
     let (keys, values) = observation[queries..].split_at(keys);

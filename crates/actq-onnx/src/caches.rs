@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::states::Output;
-use crate::values::elements::value;
+use crate::values::elements::{needed, value};
 use crate::values::expr::{Attention, Expr, Exprs, Id};
 use crate::values::tensor::Element;
 
@@ -38,11 +38,7 @@ impl Caches {
     /// Finds the attentions that the outputs need.
     pub(crate) fn find(exprs: &mut Exprs, outputs: &[Output]) -> Self {
         let mut found = Self::default();
-        let mut ids: Vec<Id> =
-            outputs.iter().flat_map(|o| o.value.elements()).filter_map(|e| value(&e)).map(|(id, _)| id).collect();
-        ids.sort_unstable();
-        ids.dedup();
-        for id in exprs.needed(&ids) {
+        for id in needed(exprs, outputs.iter().flat_map(|output| output.value.elements())) {
             if let Expr::Attention(of) = exprs.get(id) {
                 let of = Attention::clone(of);
                 found.keep(exprs, outputs, id, of);

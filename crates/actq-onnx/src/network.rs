@@ -27,7 +27,7 @@ use crate::nodes::follow::Follower;
 use crate::patterns::simplify::simplify;
 use crate::signature::Signature;
 use crate::states::{Cells, Chosen, Output};
-use crate::values::elements::value;
+use crate::values::elements::{needed, value};
 use crate::values::expr::{Expr, Exprs, Id};
 use crate::values::tensor::{Element, Tensor};
 
@@ -321,10 +321,7 @@ fn follow_outputs(model: &Model, options: &ImportOptions) -> Result<Followed> {
 
 /// Refuses a value that needs a product of values or a softmax, except within attention.
 fn refuse_parts_of_attention(model: &Model, exprs: &Exprs, value: &Tensor) -> Result<()> {
-    let mut ids: Vec<Id> = value.elements().iter().filter_map(self::value).map(|(id, _)| id).collect();
-    ids.sort_unstable();
-    ids.dedup();
-    for id in exprs.needed(&ids) {
+    for id in needed(exprs, value.elements()) {
         let why = match exprs.get(id) {
             Expr::Products(_) => PRODUCT,
             Expr::Softmax(..) => SOFTMAX,

@@ -82,29 +82,29 @@ pub(super) const fn product(sizes: [usize; 3]) -> usize {
 
 impl Op<'_> {
     /// Returns the cache of an operation of attention.
-    pub(crate) fn cache(&self) -> Cache {
+    pub fn cache(&self) -> Cache {
         let first = usize::from(self.kind == OpKind::Attend);
         let [heads, dim, slots] = [0, 1, 2].map(|i| self.half(first + i));
         Cache { heads, dim, slots }
     }
 
-    /// Returns the heads of the queries.
-    pub(crate) fn query_heads(&self) -> usize {
+    /// Returns the heads of [`OpKind::Attend`]'s queries.
+    pub fn query_heads(&self) -> usize {
         self.half(0)
     }
 
-    /// Returns the factor of the scores.
-    pub(crate) fn score_factor(&self) -> f32 {
+    /// Returns the factor of [`OpKind::Attend`]'s scores.
+    pub fn score_factor(&self) -> f32 {
         self.constant(3)
     }
 
-    /// Returns `true` if a step keeps one token, after those of earlier steps.
-    pub(crate) fn is_ring(&self) -> bool {
+    /// Returns `true` if [`OpKind::Keep`] keeps one token in a step, after those of earlier steps.
+    pub fn is_ring(&self) -> bool {
         self.half(3) & 1 != 0
     }
 
-    /// Returns `true` if a query does not see the tokens after its own.
-    pub(crate) fn is_causal(&self) -> bool {
+    /// Returns `true` if a query of [`OpKind::Attend`] does not see the tokens after its own.
+    pub fn is_causal(&self) -> bool {
         self.half(4) & 1 != 0
     }
 

@@ -314,7 +314,7 @@ impl<'a> Image<'a> {
             if op.half(3) > 1 {
                 return Err(ImageError::Reserved);
             }
-            // What a ring has kept is zeroed by a reset.
+            // A reset zeroes the tokens of a ring.
             let is_kept = !op.is_ring() || dst.end() <= self.state().end();
             return match dst.len == cache.words() {
                 false => Err(ImageError::Shape),

@@ -24,17 +24,6 @@ const MAX: u16 = 127;
 /// Sum of a query's weights.
 const TOTAL: u16 = 32767;
 
-/// Returns the words of a cache of `slots` tokens with `kv_heads` heads of dimension `dim`; more than an arena has if
-/// a size is too large.
-pub const fn cache_words(kv_heads: usize, dim: usize, slots: usize) -> usize {
-    Cache { heads: kv_heads, dim, slots }.words()
-}
-
-/// Returns the words of the work area that attending to such a cache needs.
-pub const fn work_words(dim: usize, slots: usize) -> usize {
-    Cache { heads: 1, dim, slots }.work_words()
-}
-
 /// Runs a range of an operation's units: a token's head each.
 ///
 /// # Errors

@@ -7,7 +7,7 @@ use actq::measure::size::{Beside, bits_per_weight, file_bits_per_weight, hex};
 use actq::policy::DEFAULT_RATE_HZ;
 use actq::text::{count, printable};
 use actq_kernels::image::Matrix;
-use actq_kernels::image::{Kind, Op, OpKind, Region};
+use actq_kernels::image::{Cache, Kind, Op, OpKind, Region};
 use actq_kernels::{Image, PortKind};
 
 use super::memory::{Peak, peak};
@@ -134,17 +134,15 @@ pub(super) fn playback(image: &Image<'_>) -> Vec<String> {
     settings
 }
 
-/// Describes an operation of attention by its data.
+/// Describes an operation of attention by its sizes.
 fn attention(op: &Op<'_>) -> String {
-    let halves = |i: usize| [op.constant(i).to_bits() & 0xffff, op.constant(i).to_bits() >> 16];
+    let Cache { heads, dim, slots } = op.cache();
     if op.kind == OpKind::Keep {
-        let ([heads, dim], [tokens, ring]) = (halves(0), halves(1));
-        let of_steps = if ring == 1 { "the last " } else { "" };
-        return format!("{heads} x {dim} of {of_steps}{}", count(tokens as usize, "token"));
+        let of_steps = if op.is_ring() { "the last " } else { "" };
+        return format!("{heads} x {dim} of {of_steps}{}", count(slots, "token"));
     }
-    let ([heads, shared], [dim, tokens], [causal, _]) = (halves(0), halves(1), halves(2));
-    let causal = if causal == 1 { " causal" } else { "" };
-    format!("{heads} x {dim} to {shared} of {}{causal}, factor {}", count(tokens as usize, "token"), op.constant(3))
+    let (queries, causal) = (op.query_heads(), if op.is_causal() { " causal" } else { "" });
+    format!("{queries} x {dim} to {heads} of {}{causal}, factor {}", count(slots, "token"), op.score_factor())
 }
 
 /// Formats the cells of an operation: name, output, input, detail, and those of its matrix.

@@ -1,7 +1,8 @@
 //! Attention: products of two values, softmax, and ONNX's Attention operator, which consists of these.
 
 use actq::error::{Context as _, Result, bail, ensure};
-use actq::graph::ops::{MAX_ATTENTION, MAX_HEADS};
+use actq::graph::ops::MAX_HEADS;
+use actq_kernels::image::MAX_SLOTS;
 
 use crate::nodes::arithmetic::two;
 use crate::nodes::call::Call;
@@ -26,6 +27,11 @@ pub(crate) fn run(call: &Call<'_>, exprs: &mut Exprs, budget: &mut usize) -> Res
     match call.op() {
         "Softmax" => {
             let x = call.input(0)?;
+            ensure!(
+                call.opset >= 13 || call.int("axis").is_some() || x.shape.len() <= 2,
+                "names no axis, and in operator set {} goes over all but the first; export it with set 13 or above",
+                call.opset
+            );
             softmax(exprs, x, axis(call.int("axis").unwrap_or(-1), x.shape.len())?).map(|y| Some(vec![y]))
         }
         "Attention" if call.node.domain != "com.microsoft" => operator(call, exprs, budget).map(Some),
@@ -104,7 +110,7 @@ fn attention(exprs: &mut Exprs, weights: Id, values: &Tensor, shape: Vec<usize>)
         "has heads of {dim} elements in its keys and of {of_values} in its values; only equal ones are supported"
     );
     ensure!(heads <= MAX_HEADS, "has {heads} heads; at most {MAX_HEADS} are supported, and a batch of 1");
-    ensure!(cols <= MAX_ATTENTION, "reads {cols} tokens; attention to at most {MAX_ATTENTION} is supported");
+    ensure!(cols <= MAX_SLOTS, "reads {cols} tokens; attention to at most {MAX_SLOTS} is supported");
     let (queries, keys, values) = (exprs.elements(a), exprs.elements(b), values.elements());
     let kv_heads = heads / shared_heads(&keys, &values, heads);
     // [head, token, element] to [token, head, element]

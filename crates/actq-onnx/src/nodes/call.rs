@@ -19,6 +19,8 @@ pub(crate) struct Call<'a> {
     pub(crate) node: &'a Node,
     /// The inputs; `None` for an omitted one.
     pub(crate) inputs: &'a [Option<&'a Tensor>],
+    /// Version of ONNX's own operators that the file declares.
+    pub(crate) opset: i64,
 }
 
 impl<'a> Call<'a> {

@@ -172,7 +172,7 @@ impl<'m> Follower<'m> {
             names.iter().map(|name| inner.get(name).cloned()).collect()
         } else {
             let inputs: Vec<Option<&Tensor>> = inputs.iter().map(Option::as_deref).collect();
-            let call = Call { node, inputs: &inputs };
+            let call = Call { node, inputs: &inputs, opset: self.model.opset };
             self.operator(&call)?.into_iter().map(|tensor| Some(Rc::new(tensor))).collect::<Vec<_>>()
         };
         for (name, tensor) in node.outputs.iter().zip(outputs) {
@@ -195,13 +195,6 @@ impl<'m> Follower<'m> {
         let own =
             ["", "ai.onnx", "com.microsoft", "pkg.onnxscript.torch_lib.common"].contains(&call.node.domain.as_str());
         ensure!(own, "operators of this domain are not supported; {}", crate::nodes::call::HELP);
-        // Below operator set 13, a softmax without an axis goes over all axes but the first.
-        let is_over_all = call.op() == "Softmax" && self.model.opset < 13 && call.int("axis").is_none();
-        ensure!(
-            !is_over_all || call.input(0)?.shape.len() <= 2,
-            "names no axis, and in operator set {} goes over all but the first; export it with set 13 or above",
-            self.model.opset
-        );
         let most = self.budget;
         if let Some(constant) = call.constant()? {
             return Ok(vec![self.model.tensor(&constant)?]);

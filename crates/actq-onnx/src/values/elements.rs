@@ -1,5 +1,6 @@
 //! Functions of the elements of a tensor, some of which may be constant.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use actq::error::{Context as _, Result};
@@ -51,6 +52,12 @@ pub(crate) fn apply(exprs: &mut Exprs, values: &[(Id, usize)], f: &dyn Fn(&mut E
 /// Returns the value and the place of an element; `None` for a known one.
 pub(crate) fn value(element: &Element) -> Option<(Id, usize)> {
     if let Element::Of(id, i) = element { Some((*id, *i)) } else { None }
+}
+
+/// Lists the expressions that elements need, each after its operands.
+pub(crate) fn needed(exprs: &Exprs, elements: impl IntoIterator<Item = Element>) -> Vec<Id> {
+    let ids: BTreeSet<Id> = elements.into_iter().filter_map(|element| value(&element)).map(|(id, _)| id).collect();
+    exprs.needed(&Vec::from_iter(ids))
 }
 
 /// Makes a vector of these elements, at least one of which is not known. Known elements become the biases of a layer

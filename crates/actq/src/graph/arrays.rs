@@ -44,19 +44,23 @@ pub fn rounded(x: &[f32], len: usize, x_max: u16) -> (Vec<f32>, Vec<f32>) {
     let (mut integers, mut scales) = (x.to_vec(), vec![1.0; x.len() / len]);
     let top = f32::from(x_max);
     for (run, scale) in integers.chunks_exact_mut(len).zip(&mut scales).filter(|_| x_max > 0) {
-        let amax = run.iter().fold(0f32, |m, v| m.max(v.abs()));
-        let inverse = if amax > TINY { top / amax } else { 0.0 };
-        *scale = if amax > TINY { amax / top } else { 0.0 };
+        let [inverse, of_run] = factors(run, top).unwrap_or_default();
+        *scale = of_run;
         run.iter_mut().for_each(|v| *v = (*v * inverse + ROUND) - ROUND);
     }
     (integers, scales)
 }
 
+/// Returns the factors to integers up to `top` and back; `None` for values that the kernels take for zeros.
+#[inline(always)]
+fn factors(run: &[f32], top: f32) -> Option<[f32; 2]> {
+    let amax = run.iter().fold(0f32, |m, v| m.max(v.abs()));
+    (amax > TINY).then(|| [top / amax, amax / top])
+}
+
 #[inline(always)]
 fn round(row: &mut [f32], top: f32) {
-    let amax = row.iter().fold(0f32, |m, v| m.max(v.abs()));
-    if amax > TINY {
-        let (inverse, scale) = (top / amax, amax / top);
+    if let Some([inverse, scale]) = factors(row, top) {
         row.iter_mut().for_each(|v| *v = ((*v * inverse + ROUND) - ROUND) * scale);
     }
 }

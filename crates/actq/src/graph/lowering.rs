@@ -113,15 +113,7 @@ impl Lowering {
     /// Starts with the observation alone; `readers` holds how many nodes read each value.
     pub fn new(obs_len: usize, readers: Vec<usize>) -> Self {
         let observation = Buffer { len: obs_len, lifetime: Lifetime::Observation };
-        Self {
-            steps: Vec::new(),
-            buffers: vec![observation],
-            places: vec![0],
-            readers,
-            iterate: 0,
-            caches: Vec::new(),
-            work_words: 0,
-        }
+        Self::inside(Vec::new(), vec![observation], 0, readers)
     }
 
     /// Starts with buffers and operations around a network, whose observation is in `observation`.

@@ -30,7 +30,7 @@ mod table;
 use std::ops::{Deref, DerefMut};
 
 pub use add::Add;
-pub use attention::{Attention, MAX_ATTENTION, MAX_HEADS};
+pub use attention::{Attention, MAX_HEADS};
 pub use concat::{Concat, Span};
 pub use function::Pointwise;
 pub use gru::Gru;

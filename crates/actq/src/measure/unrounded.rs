@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use actq_kernels::Image;
-use actq_kernels::image::{Matrix, Op, OpKind};
+use actq_kernels::image::{Cache, Matrix, Op, OpKind};
 use actq_kernels::ops::run_whole;
 use ndarray::{Array2, ArrayView1};
 
@@ -105,33 +105,28 @@ fn multiply(op: &Op<'_>, matrix: &Matrix<'_>, weights: &Array2<f32>, accumulate:
 
 /// Keeps keys and values as the image does, and in f32.
 fn keep(op: &Op<'_>, arena: &mut [u32], caches: &mut Caches) -> Result<()> {
-    let ([kv_heads, dim], [slots, is_ring]) = (sizes(op, 0), sizes(op, 1));
+    let sizes = op.cache();
     let before = arena[op.dst().offset];
     run_whole(op, 0, arena)?;
     let kept = caches.entry(op.dst().offset).or_default();
     for (kept, new) in kept.iter_mut().zip([op.src(), op.third()]) {
-        if is_ring == 0 || before == 0 {
+        if !op.is_ring() || before == 0 {
             kept.clear();
         }
         kept.extend(floats(&arena[new.range()]));
-        kept.drain(..kept.len().saturating_sub(slots * kv_heads * dim));
+        kept.drain(..kept.len().saturating_sub(sizes.slots * sizes.heads * sizes.dim));
     }
     Ok(())
 }
 
 /// Computes the outputs of queries in f32.
 fn attend(op: &Op<'_>, arena: &mut [u32], caches: &Caches) {
-    let ([heads, kv_heads], [dim, _], [causal, _]) = (sizes(op, 0), sizes(op, 1), sizes(op, 2));
-    let of = Attention { heads, kv_heads, dim, factor: op.constant(3), causal: causal != 0, context: 0 };
+    let Cache { heads: kv_heads, dim, .. } = op.cache();
+    let (heads, factor, causal) = (op.query_heads(), op.score_factor(), op.is_causal());
+    let of = Attention { heads, kv_heads, dim, factor, causal, context: 0 };
     let Some([keys, values]) = caches.get(&op.third().offset) else { return };
     let outputs = of.unrounded(floats(&arena[op.src().range()]), keys, values);
     arena[op.dst().range()].copy_from_slice(bytemuck::cast_slice(&outputs));
-}
-
-/// Returns the sizes in word `i` of an operation's data.
-fn sizes(op: &Op<'_>, i: usize) -> [usize; 2] {
-    let word = op.constant(i).to_bits();
-    [word & 0xffff, word >> 16].map(|size| size as usize)
 }
 
 fn floats(words: &[u32]) -> &[f32] {

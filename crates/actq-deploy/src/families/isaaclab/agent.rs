@@ -46,8 +46,8 @@ const WIDTHS: [&str; 5] = [
     "models.policy.network.0.layers",
     "policy_kwargs.net_arch",
 ];
-/// Keys of rl_games, skrl and Stable-Baselines3 that say whether the action is limited.
-const LIMITED: [&str; 3] = [RESCALED, "models.policy.clip_actions", "policy_kwargs.squash_output"];
+/// Keys of skrl and Stable-Baselines3 that say whether the action is limited.
+const LIMITED: [&str; 2] = ["models.policy.clip_actions", "policy_kwargs.squash_output"];
 /// With this key, or without it, rl_games limits the action to ±1 and multiplies it by the limit in [`SCALE`].
 const RESCALED: &str = "params.config.clip_actions";
 const SCALE: &str = "params.env.clip_actions";

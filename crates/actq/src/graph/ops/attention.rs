@@ -1,8 +1,7 @@
 use std::ops::Range;
 
-use actq_kernels::image::OpKind;
+use actq_kernels::image::{Cache, MAX_DIM, MAX_SLOTS, OpKind};
 use actq_kernels::math;
-use actq_kernels::ops::attention::{cache_words, work_words};
 use ndarray::Array2;
 
 use crate::error::{Result, bail, ensure};
@@ -13,8 +12,6 @@ use crate::graph::syntax::{Keys, Syntax, required};
 use crate::graph::values::{ValueId, WeightMatrix};
 use crate::simd::wide;
 
-/// The most tokens that a query reads, and the largest head dimension: sums of an image's products stay in 32 bits.
-pub const MAX_ATTENTION: usize = 512;
 /// The most heads of queries.
 pub const MAX_HEADS: usize = 16;
 
@@ -153,21 +150,23 @@ impl Attention {
         d
     }
 
-    /// Returns the cache of the keys and values, and its slots. Emits the operation that writes it, unless one has.
-    fn cache(&self, to: &mut Lowering, inputs: &[ValueId], lifetime: Lifetime) -> (BufferId, usize) {
+    /// Returns the buffer of the cache of the keys and values, and its sizes. Emits the operation that writes it, unless one
+    /// has.
+    fn cache(&self, to: &mut Lowering, inputs: &[ValueId], lifetime: Lifetime) -> (BufferId, Cache) {
         let (keys, values) = (to.place(inputs[1]), to.place(inputs[2]));
         let slots = if self.context > 0 { self.context } else { keys.len / (self.kv_heads * self.dim) };
+        let sizes = Cache { heads: self.kv_heads, dim: self.dim, slots };
         let of = [inputs[1], inputs[2], self.kv_heads];
         if let Some(cache) = to.cache(of) {
-            return (cache, slots);
+            return (cache, sizes);
         }
-        let cache = to.buffer(cache_words(self.kv_heads, self.dim, slots), lifetime);
+        let cache = to.buffer(sizes.words(), lifetime);
         let data = vec![pair(self.kv_heads, self.dim), pair(slots, usize::from(self.context > 0))];
         to.emit(OpKind::Keep, to.whole(cache), Some(keys), Some(values), StepData::Words(data));
         if self.context == 0 {
             to.add_cache(of, cache);
         }
-        (cache, slots)
+        (cache, sizes)
     }
 
     /// Returns the tokens of a row of each input.
@@ -248,7 +247,7 @@ impl Operation for Attention {
             kv_heads > 0 && heads.is_multiple_of(kv_heads),
             "has {kv_heads} heads of keys for {heads} of queries; it must be a divisor"
         );
-        ensure!((1..=MAX_ATTENTION).contains(&dim), "has heads of {dim} values; 1 to {MAX_ATTENTION} are supported");
+        ensure!((1..=MAX_DIM).contains(&dim), "has heads of {dim} values; 1 to {MAX_DIM} are supported");
         ensure!(factor > 0.0 && factor.is_finite(), "has the factor {factor}; it must be above 0 and finite");
         let [width, kv_width] = self.widths();
         ensure!(
@@ -262,7 +261,7 @@ impl Operation for Attention {
         let (of_queries, tokens) = (queries / width, keys / kv_width);
         ensure!(!causal || of_queries <= tokens, "has {of_queries} queries for {tokens} causal keys");
         let most = tokens.max(context);
-        ensure!(most <= MAX_ATTENTION, "reads {most} tokens; at most {MAX_ATTENTION} are supported");
+        ensure!(most <= MAX_SLOTS, "reads {most} tokens; at most {MAX_SLOTS} are supported");
         ensure!(
             context == 0 || (of_queries, tokens) == (1, 1),
             "keeps tokens from step to step, and reads {of_queries} queries and {tokens} keys in a step; it must be one"
@@ -379,10 +378,10 @@ impl Operation for Attention {
 
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
         let lifetime = if self.context > 0 { Lifetime::State } else { Lifetime::Step };
-        let (cache, slots) = self.cache(to, inputs, lifetime);
+        let (cache, sizes) = self.cache(to, inputs, lifetime);
         let dst = to.buffer(len, Lifetime::Step);
-        to.work_words = to.work_words.max(work_words(self.dim, slots));
-        let [heads, shared] = [pair(self.heads, self.kv_heads), pair(self.dim, slots)];
+        to.work_words = to.work_words.max(sizes.work_words());
+        let [heads, shared] = [pair(self.heads, self.kv_heads), pair(self.dim, sizes.slots)];
         let data = vec![heads, shared, u32::from(self.causal), self.factor.to_bits()];
         to.emit(OpKind::Attend, to.whole(dst), Some(to.place(inputs[0])), Some(to.whole(cache)), StepData::Words(data));
         dst

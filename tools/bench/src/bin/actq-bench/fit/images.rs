@@ -12,8 +12,7 @@ use actq::methods::{Activations, Outcome};
 use actq::policy::Policy;
 use actq_bench::networks::Builder;
 use actq_kernels::Width;
-use actq_kernels::image::{Kind, OpKind};
-use actq_kernels::ops::attention::cache_words;
+use actq_kernels::image::{Cache, Kind, OpKind};
 use actq_kernels::ops::denoise::Coefficients;
 use anyhow::{Context as _, Result};
 
@@ -107,7 +106,7 @@ fn attention((heads, kv_heads): (usize, usize), shapes: &[(usize, usize)]) -> Re
             }
             all
         });
-        let cache = value(cache_words(kv_heads, dim, slots));
+        let cache = value(Cache { heads: kv_heads, dim, slots }.words());
         let sizes = StepData::Words(vec![pair(kv_heads, dim), pair(slots, 0)]);
         add(OpKind::Keep, cache, Some(keys), Some(values), sizes);
         for queries in 1..=slots.min(2) {
