@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use actq::import::contract::StatedLimits;
 use actq::import::json::PolicyJson;
-use actq::import::{FILES, Importer as _, PolicySource};
+use actq::import::{FILES, Importer as _, PolicySource, Sampler};
 use actq::measure::actions::actions;
 use actq::measure::size::hex;
 use actq_cli::commands::bundle::{Gathered, refuse_open_questions};
@@ -201,7 +201,7 @@ pub(crate) fn policy_of_files(json: Vec<u8>, weights: Vec<u8>, guards: Vec<Strin
 
 /// Reads a policy folder, an ONNX file, or a deploy bundle.
 #[pyfunction]
-#[pyo3(signature = (path, *, output, states, observe, limits, rate_hz, accept_profile, answers, profile))]
+#[pyo3(signature = (path, *, output, states, observe, limits, rate_hz, accept_profile, answers, profile, sampler))]
 #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub(crate) fn import_path(
     py: Python<'_>,
@@ -214,16 +214,22 @@ pub(crate) fn import_path(
     #[pyo3(from_py_with = given)] accept_profile: bool,
     #[pyo3(from_py_with = given)] answers: String,
     #[pyo3(from_py_with = given)] profile: Option<String>,
+    #[pyo3(from_py_with = given)] sampler: Option<String>,
 ) -> PyResult<Policy> {
     let import = move || {
         let limits = stated(limits);
-        let options = ImportOptions { output, states, observed: observe, limits, rate_hz, ..ImportOptions::default() };
+        let sampler = sampler.map(|text| Sampler::parse(text.as_bytes())).transpose().or_raise()?;
+        let observed = observe;
+        let options = ImportOptions { output, states, observed, limits, rate_hz, sampler, ..ImportOptions::default() };
         let is_answered = accept_profile || !answers.is_empty() || profile.is_some();
         let is_onnx = Onnx.accepts(&path);
         if is_onnx && !is_answered {
             let imported = import(&path, &options).map_err(raise_of_import)?;
             let policy = imported.policy(&path, &path).or_raise()?;
             return Ok(Policy::new(policy, Some(imported.source.files().or_raise()?)));
+        }
+        if options.sampler.is_some() {
+            return Err(error!("{}: only an ONNX file takes sampler, without answers of a bundle", path.display()));
         }
         let names_values = options.output.is_some() || !options.states.is_empty() || !options.observed.is_empty();
         if is_onnx && (names_values || options.rate_hz.is_some()) {

@@ -165,3 +165,20 @@ def test_a_flow_module_has_the_chunk_of_the_file(flow, tmp_path):
     with torch.no_grad():
         found = module(torch.from_numpy(row), noise=torch.from_numpy(noise)).numpy()
     assert found.shape == chunk.shape and np.abs(found - chunk).max() < 1e-4 * np.abs(chunk).max()
+
+
+def test_a_network_with_a_sampler_is_a_flow(tmp_path):
+    onnx = pytest.importorskip("onnx", reason="onnx is not installed")
+    helper = onnx.helper
+    weights = onnx.numpy_helper.from_array(np.linspace(-1, 1, 16, dtype="f4").reshape(8, 2), "w")
+    nodes = [helper.make_node("Concat", ["x", "t", "obs"], ["all"], axis=1), helper.make_node("MatMul", ["all", "w"], ["v"])]
+    ports = [helper.make_tensor_value_info(name, 1, [1, n]) for name, n in [("x", 2), ("t", 1), ("obs", 5), ("v", 2)]]
+    graph = helper.make_graph(nodes, "flow", ports[:3], ports[3:], [weights])
+    path = tmp_path / "flow.onnx"
+    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), path)
+    policy = actq.import_policy(path, sampler={"kind": "flow", "steps": 4})
+    assert (policy.obs_len, policy.act_len) == (5, 2)
+    assert actq.import_policy(path).obs_len == 8
+    for sampler, why in [({"kind": "flow", "steps": 4, "time_input": "time"}, "which is none of them"), ({"kind": 1}, "kind"), ({"steps": {1}}, "sampler")]:
+        with pytest.raises(actq.Error, match=why):
+            actq.import_policy(path, sampler=sampler)

@@ -1,5 +1,7 @@
 """Runs an ONNX file over observations: float32 rows on standard input, float64 rows of actions on standard output.
 
+Noise follows an observation if the file is the network of a flow or a diffusion policy.
+
 check.py FILE PLAN onnxruntime: run by onnxruntime without its optimizer, which may change roundings when it fuses.
 check.py FILE PLAN float64: run by the evaluator of the package onnx, with every float32 of the file widened to float64.
 Ends with status 3 if it cannot run this file.
@@ -79,17 +81,45 @@ def zeros(shape, kind):
     return numpy.zeros([n if isinstance(n, int) and n > 0 else 1 for n in shape], kind)
 
 
+def sampled(run, fed, noise, steps):
+    """Return the actions that the steps make of noise (docs/POLICY.md, Flow and diffusion policies)."""
+    n = steps["values"]
+    x = y = noise[:n]
+    for i, (time, by) in enumerate(zip(steps["times"], steps["steps"])):
+        sample_x, sample_v, keep, direct, sample, sigma, ahead = by
+        at, to = fed[steps["iterate"]], fed[steps["time"]]
+        fed[steps["iterate"]] = clipped(y, steps["clip_iterate"]).reshape(at.shape).astype(at.dtype)
+        fed[steps["time"]] = numpy.full(to.shape, time, to.dtype)
+        v = run([plan["output"]], fed)[0].astype("f8").reshape(-1)
+        x = keep * x + direct * v + sample * clipped(sample_x * x + sample_v * v, steps["limit"])
+        y = x + ahead * v
+        if sigma:
+            x = y = x + sigma * noise[(1 + i) * n:(2 + i) * n]
+    return x
+
+
+def clipped(values, limit):
+    return values if limit is None else values.clip(-limit, limit)
+
+
 def main():
     run, fed, given = in_float64() if way == "float64" else by_onnxruntime()
     outputs = [plan["output"]] + [output for _, output in plan["states"]]
     if not set(outputs) <= set(given):
         raise ValueError(f"{plan['output']} is a value inside the file, not an output; leave out --check")
-    width = sum(length for _, length in plan["inputs"])
-    for row in numpy.frombuffer(sys.stdin.buffer.read(), "<f4").reshape(-1, width):
+    width, sampler = sum(length for _, length in plan["inputs"]), plan["sampler"]
+    noise = 0
+    if sampler:
+        draws = 1 + len(sampler["steps"]) if any(by[5] for by in sampler["steps"]) else 1
+        noise = draws * sampler["values"]
+    for row in numpy.frombuffer(sys.stdin.buffer.read(), "<f4").reshape(-1, width + noise):
         at = 0
         for name, length in plan["inputs"]:
             fed[name] = row[at:at + length].reshape(fed[name].shape).astype(fed[name].dtype)
             at += length
+        if sampler:
+            sys.stdout.buffer.write(sampled(run, fed, row[at:].astype("f8"), sampler).astype("<f8").tobytes())
+            continue
         action, *states = run(outputs, fed)
         for (name, _), state in zip(plan["states"], states):
             fed[name] = state.reshape(fed[name].shape)

@@ -52,7 +52,7 @@ pub(crate) fn check(model: &Path, imported: &Imported, policy: &Policy, calib: O
 fn compare(model: &Path, imported: &Imported, policy: &Policy, observations: &[Vec<f32>]) -> Result<String> {
     let ours = observed(policy, observations);
     let of_file = |runner| {
-        let run = run(runner, model, imported, observations)?;
+        let run = run(runner, model, imported, policy, observations)?;
         if let Ok(values) = &run {
             ensure!(
                 values.len() == ours.len(),
@@ -108,10 +108,21 @@ fn run(
     runner: Runner,
     model: &Path,
     imported: &Imported,
+    policy: &Policy,
     observations: &[Vec<f32>],
 ) -> Result<std::result::Result<Vec<f64>, String>> {
     let states: Vec<[&str; 2]> = imported.states.iter().map(|(from, to, _)| [from.as_str(), to]).collect();
-    let plan = serde_json::json!({ "inputs": imported.inputs, "states": states, "output": imported.output.0 });
+    let sampler = imported.denoiser.as_ref().zip(policy.graph.denoising.as_ref()).map(|(inputs, denoising)| {
+        let steps: Vec<_> = denoising.steps.iter().map(|by| by.to_array()).collect();
+        let limit = |limit: f64| limit.is_finite().then_some(limit);
+        serde_json::json!({
+            "iterate": inputs.iterate, "time": inputs.time, "times": inputs.times, "steps": steps, "values": denoising.len,
+            "limit": limit(denoising.limit.into()), "clip_iterate": inputs.clip_iterate,
+        })
+    });
+    let plan = serde_json::json!({
+        "inputs": imported.inputs, "states": states, "output": imported.output.0, "sampler": sampler,
+    });
     let python = env::var_os("ACTQ_PYTHON").unwrap_or_else(|| "python3".into());
     let failed =
         "cannot run the file with onnxruntime for --check; set ACTQ_PYTHON to a Python (default python3) that has it";

@@ -8,7 +8,7 @@ use actq_onnx::Imported;
 
 /// Draws `frames` observations for each magnitude: around 0, and in a second round around the means of the policy's own
 /// normalizers, if it has one. Of 8 successive ones, one has no negative value, one no positive value, and one is the
-/// middle. Inputs that the file takes as integers are rounded.
+/// middle. Inputs that the file takes as integers are rounded. Noise follows if the policy makes its actions of it.
 pub fn probes(imported: &Imported, policy: &Policy, magnitudes: &[f32], frames: usize) -> Vec<Vec<f32>> {
     let mut random = Random::new(1);
     let whole = |(name, len): &(String, usize)| vec![imported.integers.contains(name); *len];
@@ -31,7 +31,9 @@ pub fn probes(imported: &Imported, policy: &Policy, magnitudes: &[f32], frames: 
                 let value = mean + deviation * unit;
                 if *is_whole { (100.0 * value).round() } else { value }
             };
-            drawn.push(units.iter().zip(&whole).map(&mut value).collect());
+            let mut one: Vec<f32> = units.iter().zip(&whole).map(&mut value).collect();
+            one.extend((0..policy.graph.noise_len()).map(|_| random.normal()));
+            drawn.push(one);
         }
     }
     drawn

@@ -19,5 +19,5 @@ mod states;
 mod values;
 
 pub use file::proto;
-pub use network::{ImportOptions, Imported, Onnx, OnnxFile, data_files, import, import_bytes};
+pub use network::{Denoiser, ImportOptions, Imported, Onnx, OnnxFile, data_files, import, import_bytes};
 pub use signature::Signature;

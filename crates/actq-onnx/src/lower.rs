@@ -10,7 +10,7 @@ use actq::import::values::{Tensor, Values};
 use crate::nodes::attention::{PRODUCT, SOFTMAX};
 use crate::values::expr::{Attention, Cell, Expr, Exprs, Id, Matrix, Run, Unary};
 
-/// A run of elements of a slot. Slot 0 is the observation, slot `i + 1` the output of op `i`.
+/// A run of elements of a slot. Slot 0 has the network's inputs, slot `i + 1` the output of op `i`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Part {
     slot: usize,
@@ -28,7 +28,9 @@ pub(crate) struct Lowered {
     pub(crate) tensors: BTreeMap<String, Tensor>,
     /// Input parts of each op, and the slots of its other operands.
     reads: Vec<(Vec<Part>, Vec<usize>)>,
-    /// Length of the observation, then of each op's output.
+    /// Names and lengths of the inputs in slot 0.
+    inputs: Vec<(&'static str, usize)>,
+    /// Length of slot 0, then of each op's output.
     lens: Vec<usize>,
     /// The last number that was appended to a name in use.
     numbers: HashMap<String, usize>,
@@ -40,19 +42,20 @@ pub(crate) struct Lowered {
     included: HashSet<Id>,
 }
 
-/// Lowers a value. `offsets` gives the place of each graph input in the observation of `obs_len` values. An error holds
-/// the expression without an op.
+/// Lowers a value. `inputs` are the names and lengths of the policy's inputs, and `offsets` the place of each graph input
+/// in them. An error holds the expression without an op.
 pub(crate) fn lower(
     exprs: &Exprs,
     root: Id,
     offsets: &HashMap<usize, usize>,
-    obs_len: usize,
+    inputs: Vec<(&'static str, usize)>,
 ) -> Result<Lowered, (Id, actq::error::Error)> {
     let mut lowered = Lowered {
         ops: Vec::new(),
         tensors: BTreeMap::new(),
         reads: Vec::new(),
-        lens: vec![obs_len],
+        lens: vec![inputs.iter().map(|(_, len)| len).sum()],
+        inputs,
         numbers: HashMap::new(),
         matrices: HashMap::new(),
         places: HashMap::new(),
@@ -250,7 +253,7 @@ impl Lowered {
     fn whole(&mut self, id: Id) -> Result<usize> {
         let place = self.place(id);
         match place[..] {
-            [Part { slot, from: 0, len }] if self.lens.get(slot) == Some(&len) => Ok(slot),
+            [part] if self.is_whole(part) => Ok(part.slot),
             _ => {
                 let n = place.iter().map(|part| part.len).sum();
                 let moved = self.push(JsonOp::new("identity"), place, &[], n);
@@ -277,30 +280,46 @@ impl Lowered {
     /// Names the slots that are read by an op other than the next one.
     fn slots(&mut self) {
         let mut named = HashSet::new();
-        for (i, (input, others)) in self.reads.iter().enumerate() {
-            let op = &mut self.ops[i];
+        let mut ops = std::mem::take(&mut self.ops);
+        for (i, ((input, others), op)) in self.reads.iter().zip(&mut ops).enumerate() {
             named.extend(others.iter().copied());
-            let whole = |part: &Part| part.from == 0 && part.len == self.lens[part.slot];
             op.input = match &input[..] {
-                [part] if whole(part) && part.slot == i => None,
-                [part] if whole(part) => Some(Input::One(slot_name(part.slot))),
-                parts => Some(Input::Many(
-                    parts
-                        .iter()
-                        .map(|part| match whole(part) {
-                            true => slot_name(part.slot),
-                            false => format!("{}[{}:{}]", slot_name(part.slot), part.from, part.from + part.len),
-                        })
-                        .collect(),
-                )),
+                [part] if self.is_whole(*part) && part.slot == i => None,
+                [part] if self.is_whole(*part) => Some(Input::One(slot_name(part.slot))),
+                parts => Some(Input::Many(parts.iter().flat_map(|part| self.names(*part)).collect())),
             };
             if op.input.is_some() {
                 named.extend(input.iter().map(|part| part.slot));
             }
         }
         for slot in named.into_iter().filter(|slot| *slot > 0) {
-            self.ops[slot - 1].save = Some(slot_name(slot));
+            ops[slot - 1].save = Some(slot_name(slot));
         }
+        self.ops = ops;
+    }
+
+    /// Returns `true` if a part is all of a slot with a name.
+    fn is_whole(&self, part: Part) -> bool {
+        let has_name = part.slot > 0 || self.inputs.len() == 1;
+        has_name && part.from == 0 && self.lens.get(part.slot) == Some(&part.len)
+    }
+
+    /// Returns the names of a part; of slot 0, one for each input in it.
+    fn names(&self, part: Part) -> Vec<String> {
+        let slot = [(slot_name(part.slot), self.lens[part.slot])];
+        let inputs = self.inputs.iter().map(|(name, len)| ((*name).to_owned(), *len));
+        let slots = if part.slot == 0 { inputs.collect() } else { slot.to_vec() };
+        let (mut at, mut names) = (0, Vec::new());
+        for (name, len) in slots {
+            let [from, to] = [part.from, part.from + part.len].map(|end| end.clamp(at, at + len) - at);
+            at += len;
+            match (from, to) {
+                _ if from == to => {}
+                (0, to) if to == len => names.push(name),
+                _ => names.push(format!("{name}[{from}:{to}]")),
+            }
+        }
+        names
     }
 
     fn matrix(&mut self, w: &Arc<Matrix>) -> Result<String> {

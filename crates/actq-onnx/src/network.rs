@@ -1,6 +1,7 @@
 //! Conversion of a file to a policy folder in memory: chooses the action output and the observed inputs, and
 //! converts the network between them.
 
+mod denoiser;
 mod observation;
 mod options;
 mod output;
@@ -16,7 +17,9 @@ use actq::policy::Policy;
 use actq::text::{count, printable};
 use prost::bytes::Bytes;
 
-use self::observation::{Observation, named_states, observed_inputs, refuse_integers};
+pub use self::denoiser::Denoiser;
+use self::denoiser::Places;
+use self::observation::{Observation, named_states, observed_inputs, read_inputs, refuse_integers};
 pub use self::options::ImportOptions;
 use self::output::{actions, choose, refuse_batch, refused_actions};
 use crate::action;
@@ -42,6 +45,8 @@ pub struct Imported {
     pub inputs: Vec<(String, usize)>,
     /// Observed inputs that the file takes as integers. The observation holds them as integers in float32.
     pub integers: Vec<String>,
+    /// Inputs of a denoiser that are not observed.
+    pub denoiser: Option<Denoiser>,
     /// Inputs that hold recurrent state, the outputs of their next values, and their lengths.
     pub states: Vec<(String, String, usize)>,
     /// The action output, and its number of values.
@@ -189,6 +194,9 @@ impl Imported {
             text += &format!("{head:9} obs[{at}:{}] = {name}{integers}\n", at + len);
             at += len;
         }
+        if let Some(Denoiser { time, iterate, times, .. }) = &self.denoiser {
+            text += &format!("sampler   {iterate} from noise in {}, at {time}\n", count(times.len(), "evaluation"));
+        }
         for (from, to, len) in &self.states {
             text += &format!("state     {from} -> {to}, {}; kept by the policy, zero at reset\n", count(*len, "value"));
         }
@@ -222,38 +230,56 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
     refuse_integers(model, &exprs, &live)?;
     let pairs = cells.pairs(model, &exprs, &live, &outputs)?;
     let graph = Chosen { model, exprs: &exprs, cells: &cells, outputs: &outputs, action: &output.name };
-    let observed = observed_inputs(&graph, &live, &pairs, options)?;
-    let observation = Observation::of(model, &exprs, &live, &observed);
+    let values = exprs.len_of(root);
+    let read = read_inputs(&exprs, &live);
+    let places = match &options.sampler {
+        Some(sampler) => Some(Places::find(model, &read, values, sampler)?),
+        None => None,
+    };
+    // Its name may be the output's, as that of a state.
+    let iterate = places.map(|places| model.graph.inputs[places.iterate].name.clone());
+    let known = [&options.observed[..], iterate.as_slice()].concat();
+    let observed = observed_inputs(&graph, &live, &pairs, &ImportOptions { observed: known, ..options.clone() })?;
+    let observed = places.map_or(observed.clone(), |places| places.order(&observed));
+    let mut observation = Observation::of(model, &exprs, &live, &observed);
+    let slots = match places {
+        Some(_) => observation.of_denoiser()?,
+        None => vec![("obs", observation.len)],
+    };
     let states = named_states(model, &pairs, &outputs);
 
-    let values = exprs.len_of(root);
     let (chunk, act_len) = if options.is_fed {
         (1, values)
     } else {
         refuse_batch(model, &observed, &output.value.shape)?;
         actions(&output.value.shape, values)?
     };
-    let (root, contract) = if options.is_inner { (root, None) } else { action::contract(&exprs, root, act_len) };
+    // The last nodes of a denoiser are not those of its actions.
+    let is_inner = options.is_inner || places.is_some();
+    let (root, contract) = if is_inner { (root, None) } else { action::contract(&exprs, root, act_len) };
     let last = contract.iter().flat_map(keys).collect();
-    let (contract, bounded) =
-        if options.is_inner { (None, 0) } else { action::bounded(&exprs, root, contract, act_len) };
+    let (contract, bounded) = if is_inner { (None, 0) } else { action::bounded(&exprs, root, contract, act_len) };
     let contract = match options.limits.is_empty() {
         true => contract,
         false => Some(contract.unwrap_or_default().limited(&options.limits, act_len)?),
     };
     let root = simplify(&mut exprs, root, &cells.instead);
-    let lowered = lower(&exprs, root, &observation.offsets, observation.len)
-        .map_err(|(id, error)| at_node(model, &exprs, id, error))?;
+    let lowered =
+        lower(&exprs, root, &observation.offsets, slots).map_err(|(id, error)| at_node(model, &exprs, id, error))?;
 
+    let is_chunk = chunk > 1 || places.is_some();
+    let sampler = options.sampler.as_ref();
     let json = PolicyJson {
         name: printable(name).chars().take(50).collect(),
-        kind: (chunk > 1).then(|| "chunk".to_owned()),
-        chunk: (chunk > 1).then_some(chunk),
+        kind: is_chunk.then(|| sampler.map_or("chunk", |sampler| &sampler.kind).to_owned()),
+        chunk: is_chunk.then_some(chunk),
+        execute: sampler.and_then(|sampler| sampler.execute),
         obs_dim: observation.len,
         act_dim: act_len,
         control_hz: options.rate_hz,
         // Without a contract, the actions of a chunk would be limited to -1 .. 1.
-        action: contract.or_else(|| (chunk > 1).then(JsonContract::default)),
+        action: contract.or_else(|| is_chunk.then(JsonContract::default)),
+        denoising: sampler.map(|sampler| sampler.steps.clone()).unwrap_or_default(),
         ops: lowered.ops,
         ..PolicyJson::default()
     };
@@ -271,8 +297,9 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         ops: json.ops.iter().map(|op| op.op.clone()).collect(),
         source: PolicySource { json, about, tensors: lowered.tensors },
         producer: model.producer.clone(),
-        cut_inputs: cut_inputs(model, &observation, &states),
+        cut_inputs: cut_inputs(model, &read, &states),
         cut_outputs: cut_outputs(model, &action, &states),
+        denoiser: places.zip(sampler).map(|(places, sampler)| places.named(model, sampler)).transpose()?,
         inputs: observation.inputs,
         integers: observation.integers,
         states,
@@ -345,13 +372,12 @@ fn action_root(exprs: &mut Exprs, cells: &Cells, output: &Output) -> Result<Id> 
     Ok(exprs.affine(root, scale, offset))
 }
 
-/// Names the inputs without a default that are neither observed nor states.
-fn cut_inputs(model: &Model, observation: &Observation, states: &[(String, String, usize)]) -> Vec<String> {
-    let given = model.graph.inputs.iter().filter(|port| !model.graph.initializers.contains_key(&port.name));
-    let is_used = |name: &String| {
-        observation.inputs.iter().any(|(input, _)| input == name) || states.iter().any(|(state, ..)| state == name)
-    };
-    given.map(|port| printable(&port.name).into_owned()).filter(|name| !is_used(name)).collect()
+/// Names the inputs without a default that are neither read nor states.
+fn cut_inputs(model: &Model, read: &[usize], states: &[(String, String, usize)]) -> Vec<String> {
+    let ports = model.graph.inputs.iter().enumerate();
+    let given = ports.filter(|(i, port)| !read.contains(i) && !model.graph.initializers.contains_key(&port.name));
+    let names = given.map(|(_, port)| printable(&port.name).into_owned());
+    names.filter(|name| !states.iter().any(|(state, ..)| state == name)).collect()
 }
 
 /// Names the outputs that are neither the action nor the next values of states.

@@ -158,11 +158,7 @@ fn candidates(
 ) -> Vec<(usize, Run)> {
     let mut found: Vec<(usize, Run)> = Vec::new();
     for (i, port) in model.graph.inputs.iter().enumerate() {
-        let len: Option<usize> = port
-            .shape
-            .as_ref()
-            .and_then(|shape| shape.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.unwrap_or(1))));
-        if len != Some(output.value.len()) {
+        if port.len() != Some(output.value.len()) {
             continue;
         }
         let of = exprs.put(Expr::Input(i), output.value.len());

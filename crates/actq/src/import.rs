@@ -12,5 +12,6 @@ mod ops;
 pub mod tensors;
 pub mod values;
 
+pub use denoising::{JsonDenoising, Sampler};
 pub use folder::{FILES, PolicyFolder, PolicySource};
 pub use importer::{Importer, folder_of};

@@ -292,6 +292,7 @@ def import_path(
     accept_profile: bool,
     answers: str,
     profile: Optional[str],
+    sampler: Optional[str],
 ) -> Policy: ...
 def import_onnx(
     bytes: bytes,

@@ -47,6 +47,7 @@ def import_policy(
     high: Optional[npt.ArrayLike] = None,
     max_step: Optional[npt.ArrayLike] = None,
     rate_hz: Optional[float] = None,
+    sampler: Optional[Mapping[str, Any]] = None,
 ) -> Policy:
     """Reads a policy.
 
@@ -72,6 +73,8 @@ def import_policy(
         without limits.
     max_step: largest change from one action to the next, a number, or one for each. A bundle takes none.
     rate_hz: actions in a second. A policy folder and a bundle state theirs.
+    sampler: of an ONNX file with the network of a flow or a diffusion policy, its steps, as {"kind": "flow", "steps": 10}
+        (docs/POLICY.md, Flow and diffusion policies). The observation is the inputs but the time and the iterate.
 
     Of ONNX and modules, the log `actq` has the inputs in order, the output, and what is left out (level INFO).
 
@@ -103,7 +106,7 @@ def import_policy(
                     raise _actq.Error(f"{path}: only a module or a TorchScript file takes {key}")
             policy = _actq.import_path(
                 path, output=output, states=pairs, observe=observe, limits=limits, rate_hz=rate_hz,
-                accept_profile=accept_profile, answers=_toml(answers), profile=_text("profile", profile),
+                accept_profile=accept_profile, answers=_toml(answers), profile=_text("profile", profile), sampler=_json(sampler),
             )  # fmt: skip
             return _logged(policy)
         if not path.is_file():
@@ -118,6 +121,8 @@ def import_policy(
         raise _actq.Error(f"the policy is of type {type(source).__name__}; pass a path, a torch.nn.Module or a trained model")
     if accept_profile or answers is not None or profile is not None:
         raise _actq.Error("only a deploy bundle takes accept_profile, answers and profile")
+    if sampler is not None:
+        raise _actq.Error("only an ONNX file takes sampler; export the module, with the iterate and the time as inputs")
     torch_module(NEEDS_TORCH)
     from . import _models
     from ._torch import import_module
@@ -168,6 +173,13 @@ def torch_module(needed: str) -> Any:
     except ImportError as error:
         raise _actq.Error(f"{needed} torch ({error}); install it by `pip install torch`") from error
     return torch
+
+
+def _json(sampler: Optional[Mapping[str, Any]]) -> Optional[str]:
+    try:
+        return None if sampler is None else json.dumps(sampler, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise _actq.Error(f"sampler: {error}; pass a mapping of texts and numbers") from error
 
 
 def _toml(answers: Union[None, PathLike, Mapping[str, Any]]) -> str:

@@ -29,6 +29,11 @@ pub(crate) struct ImportArgs {
     /// An input that is measured anew in each step, although its name is that of a state or a constant; may be repeated
     #[arg(long, value_name = "NAME")]
     pub(crate) observe: Vec<String>,
+    /// The file has the network of a flow or a diffusion policy, which makes actions from noise: a JSON file of its steps,
+    /// as {"kind": "flow", "steps": 10} (docs/POLICY.md). The time and the iterate are the inputs of one value and of the
+    /// output's shape, or those that the keys time_input and iterate_input name
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) sampler: Option<PathBuf>,
     /// Actions in a second
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub(crate) rate_hz: Option<f64>,

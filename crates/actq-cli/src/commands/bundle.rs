@@ -32,9 +32,11 @@ pub(crate) fn is_bundle(args: &ImportArgs) -> bool {
 
 /// Reads a bundle, checks it, and writes its description with copies of the networks.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
-    let of_files =
-        args.output.is_some() || !args.state.is_empty() || !args.observe.is_empty() || args.rate_hz.is_some();
-    ensure!(!of_files, "a bundle takes no --output, --state, --observe and --rate-hz: its description has them");
+    let names = args.output.is_some() || !args.state.is_empty() || !args.observe.is_empty();
+    ensure!(
+        !names && args.rate_hz.is_none() && args.sampler.is_none(),
+        "a bundle takes no --output, --state, --observe, --rate-hz and --sampler: its description has them"
+    );
     ensure!(
         !args.check || args.reading.reference.is_some(),
         "--check of a bundle needs --reference RAW.npz:EXPECT.npz"

@@ -1,13 +1,14 @@
 //! `actq import`
 
+use std::fs;
 use std::path::Path;
 
 use actq::data::{Dataset, Recording, Sizes};
 use actq::import::contract::StatedLimits;
-use actq::import::{FILES, Importer as _};
+use actq::import::{FILES, Importer as _, Sampler};
 use actq_deploy::DESCRIPTION;
 use actq_onnx::{ImportOptions, Onnx, import};
-use anyhow::{Result, ensure};
+use anyhow::{Context as _, Result, ensure};
 
 use crate::args::ImportArgs;
 use crate::check::check;
@@ -24,6 +25,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         output: args.output.clone(),
         states: args.state.clone(),
         observed: args.observe.clone(),
+        sampler: args.sampler.as_deref().map(sampler).transpose()?,
         ..ImportOptions::default()
     };
     let imported = import(&args.model, &options)?;
@@ -74,6 +76,12 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         "written   {}\n",
         names.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
     ))
+}
+
+/// Reads the steps of a flow or a diffusion policy.
+fn sampler(path: &Path) -> Result<Sampler> {
+    let bytes = fs::read(path).with_context(|| format!("{}: cannot read the file", path.display()))?;
+    Sampler::parse(&bytes).with_context(|| path.display().to_string())
 }
 
 /// Refuses to replace files without --force, and a folder with a policy in the other form, which would be read instead.

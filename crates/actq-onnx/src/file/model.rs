@@ -48,6 +48,13 @@ pub(crate) struct Port {
     pub(crate) shape: Option<Vec<Option<usize>>>,
 }
 
+impl Port {
+    /// Returns the number of values, with dynamic axes of length 1; `None` without a shape.
+    pub(crate) fn len(&self) -> Option<usize> {
+        self.shape.as_ref()?.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.unwrap_or(1)))
+    }
+}
+
 /// Nodes, with the initializers, inputs and outputs of their graph.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Graph {

@@ -37,6 +37,24 @@ impl Observation {
         }
         observation
     }
+
+    /// Takes the time and the iterate, which are last, from the observation. Returns the slots of all three.
+    pub(super) fn of_denoiser(&mut self) -> Result<Vec<(&'static str, usize)>> {
+        let [.., (_, time), (_, iterate)] = self.inputs[..] else { bail!("a denoiser reads a time and an iterate") };
+        self.inputs.truncate(self.inputs.len() - 2);
+        self.integers.retain(|name| self.inputs.iter().any(|(input, _)| input == name));
+        self.len -= time + iterate;
+        ensure!(self.len > 0, "the network reads the time and the iterate alone, and no observation");
+        Ok(vec![("obs", self.len), ("tfeat", time), ("x", iterate)])
+    }
+}
+
+/// Returns the indices of the inputs among these expressions.
+pub(super) fn read_inputs(exprs: &Exprs, live: &[Id]) -> Vec<usize> {
+    let input = |&id: &Id| if let Expr::Input(i) = exprs.get(id) { Some(*i) } else { None };
+    let mut read: Vec<usize> = live.iter().filter_map(input).collect();
+    read.sort_unstable();
+    read
 }
 
 /// Returns the indices of the inputs that the action depends on, except states. Refuses an action without any.
@@ -46,9 +64,7 @@ pub(super) fn observed_inputs(
     pairs: &Pairs,
     options: &ImportOptions,
 ) -> Result<Vec<usize>> {
-    let input = |&id: &Id| if let Expr::Input(i) = graph.exprs.get(id) { Some(*i) } else { None };
-    let mut read: Vec<usize> = live.iter().filter_map(input).collect();
-    read.sort_unstable();
+    let mut read = read_inputs(graph.exprs, live);
     if !options.is_fed {
         graph.refuse_lost_states(&read, pairs, &options.states, &options.observed)?;
     }

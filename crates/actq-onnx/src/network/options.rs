@@ -1,6 +1,7 @@
 //! Options of the import.
 
 use actq::error::{Result, ensure};
+use actq::import::Sampler;
 use actq::import::contract::StatedLimits;
 use actq::text::printable;
 
@@ -27,6 +28,8 @@ pub struct ImportOptions {
     pub limits: StatedLimits,
     /// Actions in a second; `None` if the caller does not know.
     pub rate_hz: Option<f64>,
+    /// The steps of a flow or a diffusion policy, whose network the file has; `None` for any other policy.
+    pub sampler: Option<Sampler>,
 }
 
 impl ImportOptions {
@@ -70,7 +73,7 @@ impl ImportOptions {
 }
 
 /// Lists names for a message.
-fn listed(ports: &[Port]) -> String {
+pub(super) fn listed(ports: &[Port]) -> String {
     let names: Vec<_> = ports.iter().take(MAX_LISTED).map(|port| printable(&port.name)).collect();
     let more = ports.len() - names.len();
     names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }

@@ -1,12 +1,15 @@
 //! Denoising steps of a flow or a diffusion policy in `policy.json`.
 
+use actq_kernels::image::Kind;
 use actq_kernels::ops::denoise::Coefficients;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::Denoising;
 use crate::numbers::positive;
 use crate::numbers::square;
+use crate::strict_json;
 
 /// Most steps of a policy; an image has room for 65535.
 const MAX_STEPS: usize = 1000;
@@ -39,6 +42,9 @@ pub struct JsonDenoising {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) obs_norm: Option<JsonNorm>,
 }
+
+/// Value of `time.order` of a network that reads the time itself.
+const PLAIN: &str = "time";
 
 /// Keys of [`JsonDenoising`].
 pub(super) const KEYS: [&str; 12] = [
@@ -88,7 +94,12 @@ impl JsonTime {
         self.freq.as_deref().unwrap_or("time.freq")
     }
 
-    /// Returns cosine and sine of a time at each frequency.
+    /// Returns `true` if the network reads the time itself.
+    pub(super) fn is_plain(&self) -> bool {
+        self.order.as_deref() == Some(PLAIN)
+    }
+
+    /// Returns the network's input at a time: cosine and sine of it at each frequency, or the time itself.
     pub(super) fn features(&self, time: f64, freq: &[f32]) -> Result<Vec<f32>> {
         let unit = if self.turns.unwrap_or(true) { std::f64::consts::TAU } else { 1.0 };
         let of =
@@ -96,7 +107,14 @@ impl JsonTime {
         Ok(match self.order.as_deref() {
             None | Some("cos,sin") => [of(&libm::cos), of(&libm::sin)].concat(),
             Some("sin,cos") => [of(&libm::sin), of(&libm::cos)].concat(),
-            Some(other) => bail!("time.order is {other:?}; it must be cos,sin or sin,cos"),
+            Some(PLAIN) => {
+                ensure!(
+                    self.freq.is_none() && self.turns.is_none(),
+                    "time.order is {PLAIN:?}, the time itself, which takes no freq and no turns"
+                );
+                vec![time as f32]
+            }
+            Some(other) => bail!("time.order is {other:?}; it must be cos,sin or sin,cos or {PLAIN}"),
         })
     }
 }
@@ -107,10 +125,87 @@ pub(super) struct Schedule {
     pub(super) times: Vec<f64>,
 }
 
+/// How the network of another file is run: its denoising steps, in the keys of `policy.json`, and the names of its inputs.
+#[derive(Clone, Debug)]
+pub struct Sampler {
+    /// `flow` or `diffusion`.
+    pub kind: String,
+    /// Actions of a chunk that are executed; `None` for all.
+    pub execute: Option<usize>,
+    /// Input that is the iterate; `None` for the only one with the output's shape.
+    pub iterate: Option<String>,
+    /// Input that is the time; `None` for the only one of a single value.
+    pub time: Option<String>,
+    /// The steps, for a network that reads the time itself.
+    pub steps: JsonDenoising,
+}
+
+impl Sampler {
+    /// Reads a JSON object.
+    ///
+    /// # Errors
+    ///
+    /// For another kind, an unknown key, or one of the wrong type.
+    pub fn parse(bytes: &[u8]) -> Result<Self> {
+        /// Keys beside those of denoising steps. The network itself has the time's features and the normalization.
+        const OWN: [&str; 4] = ["kind", "execute", "iterate_input", "time_input"];
+        let Value::Object(mut object) = strict_json::parse(bytes).context("not a JSON object")? else {
+            bail!("not a JSON object");
+        };
+        object.retain(|_, value| !value.is_null());
+        let known = || OWN.iter().chain(&KEYS).copied().filter(|key| *key != "obs_norm");
+        if let Some(key) = object.keys().find(|key| !known().any(|known| known == *key)) {
+            bail!("the key {key:?} is not known; the keys are {}", known().collect::<Vec<_>>().join(", "));
+        }
+        let [of_kind, execute, iterate, time] = OWN.map(|key| object.remove(key));
+        let text = |key: &str, value: Option<Value>| match value {
+            None => Ok(None),
+            Some(Value::String(text)) => Ok(Some(text)),
+            Some(other) => bail!("{key} is {other}; it must be a text"),
+        };
+        let of_kind = text(OWN[0], of_kind)?.unwrap_or_default();
+        ensure!(["flow", "diffusion"].contains(&&*of_kind), "kind is {of_kind:?}; it must be flow or diffusion");
+        let mut steps: JsonDenoising = serde_json::from_value(Value::Object(object))?;
+        let of_time = steps.time.take().unwrap_or_default();
+        ensure!(
+            of_time.freq.is_none() && of_time.order.is_none() && of_time.turns.is_none(),
+            "time takes from and to alone: the network computes its features of the time"
+        );
+        steps.time = Some(JsonTime { order: Some(PLAIN.to_owned()), ..of_time });
+        Ok(Self {
+            kind: of_kind,
+            execute: execute.map(serde_json::from_value).transpose().context("execute")?,
+            iterate: text(OWN[2], iterate)?,
+            time: text(OWN[3], time)?,
+            steps,
+        })
+    }
+
+    /// Returns the times at which the network runs.
+    ///
+    /// # Errors
+    ///
+    /// If keys are missing, contradict each other or have wrong values.
+    pub fn times(&self) -> Result<Vec<f64>> {
+        let kind = if self.kind == "flow" { Kind::Flow } else { Kind::Diffusion };
+        Ok(self.steps.schedule(kind, 0)?.times)
+    }
+
+    /// Returns the limit of the network's iterate, if it has one.
+    pub fn clip_iterate(&self) -> Option<f64> {
+        self.steps.clip_iterate
+    }
+}
+
 impl JsonDenoising {
+    /// Returns the schedule of an iterative kind over `len` values.
+    pub(super) fn schedule(&self, kind: Kind, len: usize) -> Result<Schedule> {
+        if kind == Kind::Flow { self.flow(len) } else { self.diffusion(len) }
+    }
+
     /// Returns the schedule of a flow over `len` values: Euler's or the midpoint method from the first time to the
     /// last.
-    pub(super) fn flow(&self, len: usize) -> Result<Schedule> {
+    fn flow(&self, len: usize) -> Result<Schedule> {
         for (key, given) in [
             ("schedule", self.schedule.is_some()),
             ("train_steps", self.train_steps.is_some()),
@@ -153,7 +248,7 @@ impl JsonDenoising {
 
     /// Returns the schedule of a diffusion process: Ho et al., arXiv 2006.11239, or Song et al., arXiv 2010.02502, with
     /// eta 0. The cosine schedule is that of Nichol and Dhariwal, arXiv 2102.09672, equation 17.
-    pub(super) fn diffusion(&self, len: usize) -> Result<Schedule> {
+    fn diffusion(&self, len: usize) -> Result<Schedule> {
         let train = self.train_steps.context("kind diffusion needs the key train_steps")?;
         ensure!((1..=MAX_STEPS).contains(&train), "train_steps is {train}; it must be 1 to {MAX_STEPS}");
         let steps = if self.steps.or(self.euler_steps).is_some() { self.step_count()? } else { train };

@@ -161,7 +161,7 @@ fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) 
     let (graph, (weights, parameters)) = if kind.is_iterative() {
         let len = chunk * json.act_dim;
         let by = &json.denoising;
-        let schedule = if kind == Kind::Flow { by.flow(len)? } else { by.diffusion(len)? };
+        let schedule = by.schedule(kind, len)?;
         let (mut builder, times) = Builder::iterative(json.obs_dim, by, &schedule, weights)?;
         add(&mut builder)?;
         let trained = (builder.graph.weights(), builder.graph.parameters());

@@ -87,9 +87,9 @@ impl<'a> Builder<'a> {
         let time = by.time.as_ref();
         let default = JsonTime::default();
         let time = time.unwrap_or(&default);
-        let (_, freq) = weights.read(time.freq())?;
+        let freq = if time.is_plain() { Vec::new() } else { weights.read(time.freq())?.1 };
         let times = schedule.times.iter().map(|t| time.features(*t, &freq)).collect::<Result<Vec<_>>>()?;
-        let lens = [obs_len, 2 * freq.len(), schedule.denoising.len];
+        let lens = [obs_len, times.first().map_or(0, Vec::len), schedule.denoising.len];
         let mut graph = Graph::new(lens.iter().sum());
         let mut slots = HashMap::new();
         let mut from = 0;

@@ -359,3 +359,19 @@ fn modules_of_pytorch_become_policies() -> Result<()> {
     ensure!(printed.contains("5 modules"), "{printed}");
     Ok(())
 }
+
+#[test]
+fn check_runs_the_steps_of_a_sampler() -> Result<()> {
+    let Some(python) = python_with("numpy, onnx, onnxruntime") else { return Ok(()) };
+    let dir = TempDir::new()?;
+    let [model, out, sampler] = ["model.onnx", "policy", "sampler.json"].map(|name| dir.path().join(name));
+    fs::write(&model, super::denoiser::network())?;
+    let diffusion = r#"{"kind": "diffusion", "train_steps": 20, "steps": 4, "schedule": "cosine", "clip_sample": 1}"#;
+    for steps in [r#"{"kind": "flow", "steps": 5, "solver": "midpoint"}"#, diffusion] {
+        fs::write(&sampler, steps)?;
+        let import = ["import", text(&model), "--out", text(&out), "--force", "--check", "--sampler", text(&sampler)];
+        let printed = succeeded(&actq(&import).env("ACTQ_PYTHON", &python).output()?)?;
+        ensure!(printed.contains("checked   256 observations against onnxruntime: off by"), "{printed}");
+    }
+    Ok(())
+}

@@ -7,6 +7,7 @@ mod cases;
 mod command;
 mod constants;
 mod damaged;
+mod denoiser;
 mod exporters;
 mod file;
 mod integers;
@@ -49,7 +50,7 @@ fn imported(bytes: &[u8], options: &ImportOptions) -> Result<(Imported, Policy)>
 
 fn drawn(policy: &Policy) -> Vec<Vec<f32>> {
     let mut random = Random::new(3);
-    (0..STEPS).map(|_| (0..policy.graph.obs_len).map(|_| 2.0 * random.unit()).collect()).collect()
+    (0..STEPS).map(|_| (0..policy.graph.input_len()).map(|_| 2.0 * random.unit()).collect()).collect()
 }
 
 /// Requires that the policy's actions agree with tract's.

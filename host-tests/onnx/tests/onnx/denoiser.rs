@@ -1,0 +1,141 @@
+//! Networks of flow and diffusion policies, with the steps of a sampler.
+
+use actq::import::Sampler;
+use actq::measure::actions::actions;
+use actq::policy::Policy;
+use actq_onnx::{ImportOptions, Imported};
+use anyhow::{Context as _, Result, ensure};
+
+use super::file::File;
+use super::{compare, drawn, imported};
+
+const OBS: usize = 3;
+const VALUES: usize = 8;
+
+/// Writes a network that gives four actions of two values: attention over their tokens, after a layer norm that the time
+/// and the observation shift, and a layer that reads both.
+pub(super) fn network() -> Vec<u8> {
+    let mut file = File::default();
+    file.input("noisy", &[1, 4, 2]);
+    file.input("timestep", &[1]);
+    file.input("state", &[1, OBS as i64]);
+    file.write(
+        &[],
+        "t = Reshape(timestep, [1, 1]) * [3.0, 7.0]
+         features = Concat(Sin(t), Cos(t), state, axis=1)
+         shift = Reshape(Sigmoid(gemm(features, 6, 7)), [1, 1, 6])
+         h = LayerNormalization(MatMul(noisy, drawn(2, 6)) + drawn(4, 6), full(1.0, 6), full(0.0, 6), axis=-1) * shift
+         q = MatMul(h, drawn(6, 6))
+         k = MatMul(h, drawn(6, 6))
+         v = MatMul(h, drawn(6, 6))
+         a = MatMul(Softmax(MatMul(q, Transpose(k, perm=[0, 2, 1])) * 0.4, axis=-1), v)
+         velocity := MatMul(Tanh(a + h + shift), drawn(6, 2))",
+    );
+    file.output("velocity", &[1, 4, 2]);
+    file.bytes()
+}
+
+fn with(sampler: &str) -> Result<ImportOptions> {
+    Ok(ImportOptions { sampler: Some(Sampler::parse(sampler.as_bytes())?), ..ImportOptions::default() })
+}
+
+/// Imports the network alone.
+fn alone() -> Result<Policy> {
+    let options = ImportOptions { observed: vec!["noisy".to_owned()], ..ImportOptions::default() };
+    let (found, policy) = imported(&network(), &options)?;
+    let inputs = [("noisy", VALUES), ("timestep", 1), ("state", OBS)].map(|(name, len)| (name.to_owned(), len));
+    ensure!(found.inputs == inputs, "{:?}", found.inputs);
+    Ok(policy)
+}
+
+/// Returns its output for an iterate, a time and an observation.
+fn velocity(alone: &Policy, iterate: &[f32], time: f64, observation: &[f32]) -> Vec<f64> {
+    let row = [iterate, &[time as f32], observation].concat();
+    actions(alone, &[row])[0].iter().map(|v| f64::from(*v)).collect()
+}
+
+#[test]
+fn a_flow_adds_the_networks_outputs() -> Result<()> {
+    let alone = alone()?;
+    for (solver, from, to) in [("euler", 0.0, 1.0), ("midpoint", 1.0, 0.0)] {
+        let sampler = format!(
+            r#"{{"kind": "flow", "steps": 5, "solver": "{solver}", "execute": 2, "time": {{"from": {from}, "to": {to}}}}}"#
+        );
+        let (found, policy) = imported(&network(), &with(&sampler)?)?;
+        ensure!(found.inputs == [("state".to_owned(), OBS)] && found.cut_inputs.is_empty(), "{found:?}");
+        ensure!((policy.chunk, policy.execute, policy.act_len) == (4, 2, 2), "{policy:?}");
+        let rows = drawn(&policy);
+        let expected = rows.iter().map(|row| {
+            let (observation, noise) = row.split_at(OBS);
+            let h = (to - from) / 5.0;
+            let mut x: Vec<f64> = noise.iter().map(|v| f64::from(*v)).collect();
+            let at = |x: &[f64], time: f64| {
+                velocity(&alone, &x.iter().map(|v| *v as f32).collect::<Vec<_>>(), time, observation)
+            };
+            let moved = |x: &[f64], v: &[f64], by: f64| x.iter().zip(v).map(|(x, v)| x + by * v).collect::<Vec<_>>();
+            for step in 0..5 {
+                let time = from + h * f64::from(step);
+                let mut v = at(&x, time);
+                if solver == "midpoint" {
+                    v = at(&moved(&x, &v, h / 2.0), time + h / 2.0);
+                }
+                x = moved(&x, &v, h);
+            }
+            x.into_iter().map(|v| v as f32).collect()
+        });
+        compare(&expected.collect::<Vec<Vec<f32>>>(), &actions(&policy, &rows))?;
+    }
+    Ok(())
+}
+
+#[test]
+fn a_diffusion_policy_reads_the_training_step() -> Result<()> {
+    let sampler = r#"{"kind": "diffusion", "train_steps": 10, "steps": 2, "schedule": "cosine", "solver": "ddim", "time_input": "timestep"}"#;
+    let (found, policy) = imported(&network(), &with(sampler)?)?;
+    ensure!(found.denoiser.as_ref().is_some_and(|denoiser| denoiser.times == [5.0, 0.0]), "{:?}", found.denoiser);
+    let steps = policy.graph.denoising.as_ref().context("no steps")?.steps.clone();
+    let alone = alone()?;
+    let rows = drawn(&policy);
+    let expected = rows.iter().map(|row| {
+        let (observation, noise) = row.split_at(OBS);
+        let mut x = noise.to_vec();
+        for (time, by) in [5.0, 0.0].into_iter().zip(&steps) {
+            let v = velocity(&alone, &x, time, observation);
+            let next = |(x, v): (&f32, &f64)| f64::from(by.keep) * f64::from(*x) + f64::from(by.direct) * v;
+            x = x.iter().zip(&v).map(next).map(|v| v as f32).collect();
+        }
+        x
+    });
+    compare(&expected.collect::<Vec<_>>(), &actions(&policy, &rows))
+}
+
+#[test]
+fn what_a_sampler_does_not_fit_is_refused_by_name() -> Result<()> {
+    let import = |sampler: &str| -> Result<Imported> { Ok(imported(&network(), &with(sampler)?)?.0) };
+    for (sampler, expected) in [
+        (r#"{"kind": "step"}"#, r#"kind is "step"; it must be flow or diffusion"#),
+        (r#"{"kind": "flow", "steps": 5, "step": 5}"#, r#"the key "step" is not known; the keys are kind, execute"#),
+        (r#"{"kind": "flow"}"#, "kind flow needs the key steps"),
+        (r#"{"kind": "flow", "steps": 5, "time": {"freq": "f"}}"#, "time takes from and to alone"),
+        (
+            r#"{"kind": "flow", "steps": 5, "time_input": "t"}"#,
+            r#"the sampler's time_input names "t", which is none of them"#,
+        ),
+        (r#"{"kind": "flow", "steps": 5, "time_input": "state"}"#, r#"time_input "state" has the shape"#),
+    ] {
+        let error = format!("{:#}", import(sampler).expect_err(expected));
+        ensure!(error.contains(expected), "{error} instead of {expected}");
+    }
+    let mut file = File::default();
+    file.input("a", &[1, 2]);
+    file.input("b", &[1, 2]);
+    file.input("time", &[1, 1]);
+    file.write(&[], "velocity := MatMul(Tanh(Concat(a, b, time, axis=1)), drawn(5, 2))");
+    file.output("velocity", &[1, 2]);
+    let error = format!("{:#}", imported(&file.bytes(), &with(r#"{"kind": "flow", "steps": 5}"#)?).expect_err("two"));
+    ensure!(error.contains("the sampler's iterate_input is missing, and may be a, b"), "{error}");
+    let named = with(r#"{"kind": "flow", "steps": 5, "iterate_input": "b"}"#)?;
+    let (found, _) = imported(&file.bytes(), &named)?;
+    ensure!(found.inputs == [("a".to_owned(), 2)], "{:?}", found.inputs);
+    Ok(())
+}
