@@ -157,21 +157,19 @@ impl Rig {
     /// a tick.
     pub(crate) fn begin(&mut self, seed: u64, exact: bool) -> Result<()> {
         self.client.disarm()?;
+        let mut begun = Instant::now();
         while self.status.state != State::Disarmed {
             self.listen()?;
+            self.require_recent(begun, "did not report that it is disarmed")?;
         }
         // A report in each tick gives exact times, and keeps QEMU busy.
         self.client.set(Parameter::StatusPeriod, 0, if exact { 1.0 } else { REPORT_PERIOD })?;
         self.arm.begin(seed);
-        let begun = Instant::now();
+        begun = Instant::now();
         while self.status.state != State::Armed {
             self.exchange()?;
             self.supervise()?;
-            ensure!(
-                begun.elapsed() < HANG_TIMEOUT,
-                "the controller did not arm in {HANG_TIMEOUT:?}: {:?}",
-                self.status
-            );
+            self.require_recent(begun, "did not arm")?;
         }
         self.reaction = None;
         self.disturbed = false;
@@ -200,12 +198,14 @@ impl Rig {
                 break;
             }
             self.listen()?;
-            ensure!(
-                begun.elapsed() < HANG_TIMEOUT,
-                "the controller was silent for {HANG_TIMEOUT:?}: {:?}",
-                self.status
-            );
+            self.require_recent(begun, "was silent")?;
         }
+        Ok(())
+    }
+
+    /// Fails if the controller has not done in time what it should have done since `begun`.
+    fn require_recent(&self, begun: Instant, why: &str) -> Result<()> {
+        ensure!(begun.elapsed() < HANG_TIMEOUT, "the controller {why} for {HANG_TIMEOUT:?}: {:?}", self.status);
         Ok(())
     }
 
