@@ -17,6 +17,8 @@ import sys
 import tempfile
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 
@@ -927,6 +929,78 @@ def lerobot():
         row(kind, "pretrained model and ONNX", make, act)
         answers = {"graph.complete": True, "rate_hz": 30}
         row(kind, "with answers", make, act, accept_profile=True, answers=answers)
+    transformers_of_lerobot()
+
+
+def transformers_of_lerobot():
+    """Its transformers without cameras: the chunk that ACT decodes, and the steps of a diffusion transformer from noise."""
+    import torch
+    from lerobot.configs.types import FeatureType, PolicyFeature
+    from lerobot.policies.act.configuration_act import ACTConfig
+    from lerobot.policies.act.modeling_act import ACT as Act
+    from lerobot.policies.multi_task_dit.modeling_multi_task_dit import DiffusionTransformer, FlowMatchingObjective
+
+    def exported(module, example, inputs, output, dynamo):
+        path = folder("lerobot") / "policy.onnx"
+        names = {"input_names": inputs, "output_names": [output]}
+        torch.onnx.export(module.eval(), example, str(path), dynamo=dynamo, **names)
+        return str(path)
+
+    class Chunk(torch.nn.Module):
+        def __init__(self, model):
+            super().__init__()
+            self.model = model
+
+        def forward(self, obs):
+            return self.model({"observation.state": obs[:, :OBS], "observation.environment_state": obs[:, OBS:]})[0]
+
+    features = {"observation.state": (FeatureType.STATE, OBS), "observation.environment_state": (FeatureType.ENV, 5)}
+    config = ACTConfig(
+        input_features={name: PolicyFeature(kind, (n,)) for name, (kind, n) in features.items()},
+        output_features={"action": PolicyFeature(FeatureType.ACTION, (ACT,))},
+        chunk_size=8, n_action_steps=8, dim_model=32, n_heads=4, dim_feedforward=64, n_encoder_layers=2, n_vae_encoder_layers=1,
+        latent_dim=8, device="cpu", push_to_hub=False,
+    )  # fmt: skip
+    torch.manual_seed(0)
+    model = Chunk(Act(config)).eval()
+    for dynamo in (False, True):
+
+        def make(dynamo=dynamo):
+            return exported(model, (torch.zeros(1, OBS + 5),), ["obs"], "action", dynamo)
+
+        row("ACT, encoder and decoder", "dynamo" if dynamo else "traced", make, lambda rows: model(torch.from_numpy(rows)).detach().numpy(), width=OBS + 5)
+
+    for rope in (True, False):
+        config = SimpleNamespace(
+            action_feature=SimpleNamespace(shape=(ACT,)), horizon=8, hidden_dim=32, num_layers=2, num_heads=4, dropout=0.1, use_rope=rope,
+            rope_base=10000.0, use_positional_encoding=not rope, timestep_embed_dim=16, num_integration_steps=10, integration_method="euler",
+        )  # fmt: skip
+        torch.manual_seed(0)
+        network = DiffusionTransformer(config, OBS).eval()
+        for block in network.transformer_blocks:
+            # Untrained, these are zero, and the blocks do nothing.
+            torch.nn.init.normal_(block.adaLN_modulation[-1].weight, std=0.1)
+
+        def episode(network=network, config=config):
+            rows = observations(OBS + config.horizon * ACT)
+            objective = FlowMatchingObjective(config, ACT, config.horizon)
+
+            def act(obs):
+                noise = obs[:, OBS:].reshape(1, config.horizon, ACT)
+                with mock.patch("torch.randn", lambda *_, **__: noise):
+                    return objective.conditional_sample(network, 1, obs[:, :OBS]).detach().numpy()
+
+            return rows, [act(torch.from_numpy(one[None])) for one in rows]
+
+        for dynamo in (False, True):
+
+            def make(network=network, config=config, dynamo=dynamo):
+                example = (torch.zeros(1, config.horizon, ACT), torch.zeros(1), torch.zeros(1, OBS))
+                return exported(network, example, ["x", "timestep", "conditioning"], "velocity", dynamo)
+
+            kind = f"multi_task_dit, flow matching, {'rotary' if rope else 'learned'} positions"
+            sampler = {"kind": "flow", "steps": config.num_integration_steps}
+            row(kind, "dynamo" if dynamo else "traced", make, episode=episode, sampler=sampler)
 
 
 @package
