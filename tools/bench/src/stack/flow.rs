@@ -182,6 +182,7 @@ impl Walk<'_> {
                 .into_iter()
                 .map(|to| (to, after))
                 .collect(),
+            Step::Steps => self.steps(at, next.next_multiple_of(4))?.map(|to| (to, after)).collect(),
             Step::Call(_) | Step::CallRegister => {
                 let callee = if let Step::Call(to) = step { Callee::Function(to) } else { Callee::Pointer };
                 self.call(callee, state);
@@ -296,6 +297,23 @@ impl Walk<'_> {
         let entries: Vec<u32> = (begin..).step_by(4).take_while(is_branch).collect();
         ensure!(!entries.is_empty(), "{at:#x} chooses from branches that are not there");
         Ok(entries)
+    }
+
+    /// Returns the eight steps of equal size from `begin` on. A kernel of Helium (`row_eight` in
+    /// `kernels/src/arch/helium/gemv.s`) enters its loop at one of them: AND of r4 with 7, ADR of `begin`, ADDS of the
+    /// Thumb bit, MOV of the size, MLA, and STR of the address.
+    fn steps(&self, at: u32, begin: u32) -> Result<impl Iterator<Item = u32> + use<>> {
+        let code = |before| {
+            let place = at.checked_sub(before).filter(|place| self.reached.contains(place));
+            place.and_then(|place| self.program.halves(place)).unwrap_or_default()
+        };
+        let fixed = [(38, [0xf004, 0x0407]), (30, [0xf118, 0x0801]), (22, [0xfb04, 0x880a]), (12, [0xf8cd, 0x8008])];
+        let [[first, second], [_, size]] = [34, 26].map(code);
+        let is_computed = fixed.into_iter().all(|(before, halves)| code(before) == halves)
+            && address_of(at.wrapping_sub(34), first, second) == Some((8, begin))
+            && [code(26)[0], size & 0xff00] == [0xf04f, 0x0a00];
+        ensure!(is_computed, "{at:#x} loads the program counter with what is not followed here");
+        Ok((0..8).map(move |step| begin + step * u32::from(size & 0xff)))
     }
 
     /// Returns the constant that MOVW and MOVT have put into a register, right before an instruction.

@@ -39,6 +39,8 @@ pub(crate) enum Step {
     Table(u32),
     /// A branch to one of the branches after the instruction.
     Branches,
+    /// A branch to one of the equal steps after the instruction, by the address in the third word of the stack.
+    Steps,
     /// A call.
     Call(u32),
     /// A call of a register's value.
@@ -127,6 +129,9 @@ fn transfer(first: u16, second: u16) -> Option<Step> {
     let by = |up: bool, bytes: i32| Step::Stack(if up { -bytes } else { bytes });
     if bits(first, 3, 0) != SP {
         return None;
+    }
+    if [first, second] == [0xf8dd, 0xf008] {
+        return Some(Step::Steps);
     }
     let popped = second & 0x8000 != 0;
     Some(match first & 0xfe40 {
@@ -302,6 +307,8 @@ mod tests {
         check([0xe8df, 0xf000], Step::Table(1)); // tbb [pc, r0]
         check([0xe8df, 0xf010], Step::Table(2)); // tbh [pc, r0, lsl #1]
         check([0x46b7, 0], Step::Branches); // mov pc, r6
+        check([0xf8dd, 0xf008], Step::Steps); // ldr.w pc, [sp, #8]
+        check([0xf8dd, 0xf00c], Step::Unknown); // ldr.w pc, [sp, #12]
         check([0xbd10, 0], Step::Return(8)); // pop {r4, pc}
         check([0xe8bd, 0x8ff0], Step::Return(36)); // pop.w {r4-r11, pc}
         check([0xf85d, 0xfb04], Step::Return(4)); // ldr pc, [sp], #4

@@ -90,6 +90,23 @@ fn a_computed_branch_follows_all_its_branches() -> Result<()> {
 }
 
 #[test]
+fn a_loop_may_be_entered_at_any_step() -> Result<()> {
+    // and r4, r4, #7; adr.w r8, the first step; adds.w r8, r8, #1; mov.w r10, #4; mla r8, r4, r10, r8; sub sp, #16
+    let choice = [0xf004, 0x0407, 0xf20f, 0x0824, 0xf118, 0x0801, 0xf04f, 0x0a04, 0xfb04, 0x880a, 0xb084];
+    // strd r1, r3, [sp]; str.w r8, [sp, #8]; mov r1, r0; clrm {r0}; ldr r3, [sp]; ldr.w pc, [sp, #8]
+    let branch = [0xe9cd, 0x1300, 0xf8cd, 0x8008, 0x4601, 0xe89f, 0x0001, 0x9b00, 0xf8dd, 0xf008];
+    // Eight steps of two instructions, of which one at a time is 4 bytes; add sp, #16.
+    let code = |choice: &[u16]| [choice, &branch, &[NOP], &[0x2001; 16], &[0xb004, BX_LR]].concat();
+    assert_eq!(frame_of(&code(&choice))?, 16);
+    for (place, half) in [(1, 0x040f), (3, 0x0828), (5, 0x0802), (7, 0x0904), (9, 0x8809)] {
+        let mut other = choice;
+        other[place] = half;
+        assert!(refused(&code(&other)).contains("is not followed here"), "{place}");
+    }
+    Ok(())
+}
+
+#[test]
 fn instructions_after_it_share_one_condition() -> Result<()> {
     // itt ne: addne sp, #8; popne {r4, pc}. Then the same without IT.
     let code = [PUSH_R4_LR, SUB_SP_8, 0xbf1c, ADD_SP_8, POP_R4_PC, SUB_SP_8, 0xb004, POP_R4_PC];
