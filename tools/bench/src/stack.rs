@@ -13,6 +13,7 @@
 
 mod depth;
 mod flow;
+mod narrow;
 mod program;
 pub(crate) mod step;
 #[cfg(test)]

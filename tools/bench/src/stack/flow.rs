@@ -11,14 +11,14 @@ use crate::instruction::{Class, Instruction};
 /// Registers that a call may change: r0 to r3, r12 and the link register (AAPCS).
 const CALLER_SAVED: u32 = 0x500f;
 
-/// The filler of an assembler for words, unless it is 0.
-const NOP: u16 = 0xbf00;
+/// The fillers of an assembler for words, unless they are 0; the second one is MOV of r8 to itself, of Armv6-M.
+const NOPS: [u16; 2] = [0xbf00, 0x46c0];
 
 /// Bytes before a computed branch in which the address of the branches is taken.
-const ADDRESS_WINDOW: u32 = 32;
+pub(super) const ADDRESS_WINDOW: u32 = 32;
 
 /// Returns the register and the address of ADR.
-fn address_of(at: u32, first: u16, second: u16) -> Option<(u32, u32)> {
+pub(super) fn address_of(at: u32, first: u16, second: u16) -> Option<(u32, u32)> {
     let pc = at.wrapping_add(4) & !3;
     let [first, second] = [first, second].map(u32::from);
     match first {
@@ -50,9 +50,9 @@ pub(super) struct Frame {
 
 /// The known state before an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct State {
+pub(super) struct State {
     /// Depth of the stack, bytes.
-    depth: i32,
+    pub(super) depth: i32,
     /// The registers that hold the return address.
     link: u32,
     /// The flag Z, if known.
@@ -81,16 +81,16 @@ pub(super) fn frame(program: &Program, function: &Function) -> Result<Frame> {
     Ok(walk.frame)
 }
 
-struct Walk<'p> {
-    program: &'p Program,
+pub(super) struct Walk<'p> {
+    pub(super) program: &'p Program,
     function: &'p Function,
     frame: Frame,
     /// The known state at each place. A kernel may have more on its stack when the flag Z is set: these are two places.
-    known: BTreeMap<(u32, Option<bool>), State>,
+    pub(super) known: BTreeMap<(u32, Option<bool>), State>,
     /// Places whose successors are still to be followed.
     left: Vec<(u32, Option<bool>)>,
     /// Addresses of the visited instructions.
-    reached: BTreeSet<u32>,
+    pub(super) reached: BTreeSet<u32>,
 }
 
 impl Walk<'_> {
@@ -113,7 +113,7 @@ impl Walk<'_> {
         halves.with_context(|| format!("{at:#x} is reached, where no code of the function is"))
     }
 
-    fn holds(&self, at: u32) -> bool {
+    pub(super) fn holds(&self, at: u32) -> bool {
         at.wrapping_sub(self.function.address) < self.function.size && self.program.is_code(at)
     }
 
@@ -121,7 +121,7 @@ impl Walk<'_> {
     fn step(&mut self, at: u32, state: State) -> Result<Vec<(u32, State)>> {
         let [first, second] = self.halves(at)?;
         let instruction = Instruction::decode(first, second);
-        let step = Step::decode(at, first, second);
+        let step = self.resolved(at, Step::decode(at, first, second), state.depth)?;
         let next = at + instruction.size as u32;
         self.reached.insert(at);
         let mut after = State {
@@ -153,7 +153,7 @@ impl Walk<'_> {
                 // Code that ends the program resets the stack. Treat it as if it continued at its depth, which is not
                 // less.
                 let begin = self.program.symbol("_stack_start")?;
-                let set = self.constant_before(at, register);
+                let set = self.constant_before(at, register).or_else(|| self.literal_before(at, register));
                 ensure!(set == Some(begin), "{at:#x} sets the stack pointer, not to the stack's begin");
                 vec![(next, after)]
             }
@@ -176,23 +176,33 @@ impl Walk<'_> {
                 self.call(Callee::Pointer, state);
                 Vec::new()
             }
-            Step::Table(size) => self.table(at, size)?.into_iter().map(|to| (to, after)).collect(),
-            Step::Branches => self
-                .branches(at, u32::from(first >> 3 & 0xf), next.next_multiple_of(4))?
-                .into_iter()
-                .map(|to| (to, after))
-                .collect(),
+            Step::Table(size) => self.table(at, at + 4, at + 4, size)?.into_iter().map(|to| (to, after)).collect(),
+            Step::Offset(register) => self.offsets(at, register)?.into_iter().map(|to| (to, after)).collect(),
+            Step::Branches => {
+                let register = u32::from(first >> 3 & 0xf);
+                let to = match self.addresses(at, register) {
+                    Some(addresses) => addresses?.into_iter().collect(),
+                    None => self.branches(at, register, next.next_multiple_of(4))?,
+                };
+                to.into_iter().map(|to| (to, after)).collect()
+            }
             Step::Steps => self.steps(at, next.next_multiple_of(4))?.map(|to| (to, after)).collect(),
+            // A far branch of Armv6-M, whose B does not reach as far as its BL.
+            Step::Call(to) if to != self.function.address && self.holds(to) => vec![(to, after)],
             Step::Call(_) | Step::CallRegister => {
                 let callee = if let Step::Call(to) = step { Callee::Function(to) } else { Callee::Pointer };
                 self.call(callee, state);
                 after = State { link: after.link & !CALLER_SAVED, zero: None, ..after };
-                // If no code follows, the callee does not return.
-                if self.holds(next) { vec![(next, after)] } else { Vec::new() }
+                // If no code follows, except a filler, the callee does not return.
+                let is_filler = self.program.halves(next).is_some_and(|[half, _]| NOPS.contains(&half));
+                let place = if is_filler { next + 2 } else { next };
+                if self.holds(place) { vec![(next, after)] } else { Vec::new() }
             }
             Step::Return(bytes) => self.end(at, State { depth: state.depth - bytes, ..state })?,
             Step::Trap => Vec::new(),
-            Step::Unknown => bail!("{at:#x}: {first:04x} {second:04x} is not understood"),
+            Step::AddToStack(_) | Step::RestoreStack(_) | Step::Unknown => {
+                bail!("{at:#x}: {first:04x} {second:04x} is not understood")
+            }
         })
     }
 
@@ -251,9 +261,9 @@ impl Walk<'_> {
         Ok(ways)
     }
 
-    /// Returns the targets of the table after TBB or TBH: it ends where code begins, and before its first target.
-    fn table(&self, at: u32, size: u32) -> Result<BTreeSet<u32>> {
-        let begin = at + 4;
+    /// Returns the targets of a table at `begin` with halves of the distances from `base`, as of TBB and TBH: it ends where
+    /// code begins, and before its first target.
+    pub(super) fn table(&self, at: u32, begin: u32, base: u32, size: u32) -> Result<BTreeSet<u32>> {
         let end = self.program.data_end(begin).filter(|_| !self.program.is_code(begin));
         let mut end = end.with_context(|| format!("{at:#x} branches by a table that is not marked as data"))?;
         let mut targets = BTreeSet::new();
@@ -262,8 +272,8 @@ impl Walk<'_> {
             let half = self.program.halves(entry).unwrap_or_default()[0];
             let offset = if size == 1 { half & 0xff } else { half };
             // These fill the last word.
-            if !matches!(offset, 0 | NOP) {
-                let target = begin + 2 * u32::from(offset);
+            if offset != 0 && !NOPS.contains(&offset) {
+                let target = base + 2 * u32::from(offset);
                 targets.insert(target);
                 end = end.min(target);
             }
@@ -326,12 +336,21 @@ impl Walk<'_> {
 
     /// Checks that all code of the function was visited, except word fillers.
     fn all_is_reached(&self) -> Result<()> {
+        // Branches that a known flag excludes, as compilers for Armv6-M make them for far places.
+        let mut excluded = BTreeSet::new();
+        for &at in &self.reached {
+            if let Some(Step::Conditional { to, .. }) = self.program.halves(at).map(|[a, b]| Step::decode(at, a, b)) {
+                excluded.extend([to, at + 2]);
+            }
+        }
         let mut at = self.function.address;
         while at < self.function.address + self.function.size {
             let size = match self.program.halves(at) {
                 Some([first, second]) if self.program.is_code(at) => {
+                    let step = Step::decode(at, first, second);
+                    let is_excluded = matches!(step, Step::Branch(_)) && excluded.contains(&at);
                     // The compiler puts UDF after a call that does not return.
-                    let fills = matches!(first, NOP | 0) || Step::decode(at, first, second) == Step::Trap;
+                    let fills = first == 0 || NOPS.contains(&first) || step == Step::Trap || is_excluded;
                     ensure!(self.reached.contains(&at) || fills, "{at:#x} is not reached: a way into it is missing");
                     Instruction::decode(first, second).size as u32
                 }

@@ -17,6 +17,10 @@ pub(crate) enum Step {
     Stack(i32),
     /// A register's value becomes the main stack pointer.
     SetStack(u32),
+    /// The stack shrinks by a register's value.
+    AddToStack(u32),
+    /// A register's value becomes the stack pointer in use.
+    RestoreStack(u32),
     /// IT: this mask and the condition's last bit select which of the next instructions are executed.
     If {
         /// Bits 3 to 0 of the instruction.
@@ -37,7 +41,9 @@ pub(crate) enum Step {
     BranchRegister(u32),
     /// A branch by a table after the instruction, with entries of this many bytes.
     Table(u32),
-    /// A branch to one of the branches after the instruction.
+    /// A branch by this register's offset from a table after the instruction.
+    Offset(u32),
+    /// A branch to one of the branches after the instruction, or to an address from a table.
     Branches,
     /// A branch to one of the equal steps after the instruction, by the address in the third word of the stack.
     Steps,
@@ -114,6 +120,9 @@ fn narrow(pc: u32, half: u16) -> Option<Step> {
         0xd0..=0xdd => Step::Conditional { to: to(signed(8)), zero: equal(bits(half, 11, 8)) },
         0xde => Step::Trap,
         0xe0..=0xe7 => Step::Branch(to(signed(11))),
+        0x44 if half & 0x87 == 0x85 => Step::AddToStack(bits(half, 6, 3)),
+        0x46 if half & 0x87 == 0x85 => Step::RestoreStack(bits(half, 6, 3)),
+        0x44 if half & 0x87 == 0x87 => Step::Offset(bits(half, 6, 3)),
         // MOV to the program counter.
         0x46 if half & 0x87 == 0x87 => Step::Branches,
         // With bit 2 set they change the security state.
@@ -263,6 +272,8 @@ mod tests {
         check([0xf6ad, 0x2df8], Step::Stack(2808)); // subw sp, sp, #2808
         check([0xf50d, 0x6d9e], Step::Stack(-1264)); // add.w sp, sp, #1264
         check([0xf60d, 0x2df8], Step::Stack(-2808)); // addw sp, sp, #2808
+        check([0x46b5, 0], Step::RestoreStack(6)); // mov sp, r6
+        check([0x44b5, 0], Step::AddToStack(6)); // add sp, r6
     }
 
     #[test]
@@ -279,8 +290,6 @@ mod tests {
     #[test]
     fn unsupported_changes_are_unknown() {
         check([0xebad, 0x0d00], Step::Unknown); // sub.w sp, sp, r0
-        check([0x46bd, 0], Step::Unknown); // mov sp, r7
-        check([0x4485, 0], Step::Unknown); // add sp, r0
         check([0xe8ad, 0x5140], Step::Unknown); // stmia sp!, {r6, r8, r12, lr}
         check([0xf382, 0x8809], Step::Unknown); // msr psp, r2
         check([0xf382, 0x8814], Step::Unknown); // msr control, r2
@@ -307,6 +316,7 @@ mod tests {
         check([0xe8df, 0xf000], Step::Table(1)); // tbb [pc, r0]
         check([0xe8df, 0xf010], Step::Table(2)); // tbh [pc, r0, lsl #1]
         check([0x46b7, 0], Step::Branches); // mov pc, r6
+        check([0x4487, 0], Step::Offset(0)); // add pc, r0
         check([0xf8dd, 0xf008], Step::Steps); // ldr.w pc, [sp, #8]
         check([0xf8dd, 0xf00c], Step::Unknown); // ldr.w pc, [sp, #12]
         check([0xbd10, 0], Step::Return(8)); // pop {r4, pc}

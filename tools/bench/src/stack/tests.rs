@@ -1,5 +1,7 @@
 //! Tests of the analysis on programs of a few instructions, with functions 256 bytes apart.
 
+use std::ops::Range;
+
 use super::depth::Depths;
 use super::flow::{Callee, frame};
 use super::program::{Function, Program};
@@ -131,7 +133,9 @@ fn contradicting_paths_are_refused() {
     assert!(refused(&[NOP, SUB_SP_8, 0xe7fc]).contains("0x1000 is reached with"));
     assert_eq!(refused(&[SUB_SP_8, BX_LR]), "0x1002 returns with 8 bytes of stack left");
     assert_eq!(refused(&[ADD_SP_8, BX_LR]), "0x1000 pops what the function has not pushed");
-    assert_eq!(refused(&[0x46bd, BX_LR]), "0x1000: 46bd 4770 is not understood"); // mov sp, r7
+    assert_eq!(refused(&[0x4774, BX_LR]), "0x1000: 4774 4770 is not understood"); // bxns lr
+    assert_eq!(refused(&[0x46bd, BX_LR]), "0x1000 sets the stack pointer to what is not followed here"); // mov sp, r7
+    assert_eq!(refused(&[0x4485, BX_LR]), "0x1000 adds what is not followed here"); // add sp, r0
     assert_eq!(refused(&[BX_LR, SUB_SP_8]), "0x1002 is not reached: a way into it is missing");
     assert_eq!(refused(&[SUB_SP_8]), "0x1002 is reached, where no code of the function is");
 }
@@ -161,6 +165,55 @@ fn all_entries_of_a_table_are_followed() -> Result<()> {
     program.marks.clear();
     program.marks.insert(at(0), true);
     assert!(format!("{:#}", frame(&program, f0).expect_err("no data")).contains("not marked as data"));
+    Ok(())
+}
+
+/// Returns the frame of code of Armv6-M with data at the halves `data`.
+fn frame_with_data(halves: &[u16], data: Range<u32>) -> Result<u32> {
+    let mut program = program(&[halves]);
+    program.marks.extend([(at(0) + 2 * data.start, false), (at(0) + 2 * data.end, true)]);
+    Ok(frame(&program, &program.functions[&at(0)])?.bytes)
+}
+
+#[test]
+fn large_frames_of_armv6m_are_constants_in_data() -> Result<()> {
+    // push {r4-r7, lr}; add r7, sp, #12; ldr r6, the constant; add sp, r6; subs r6, r7, #7; subs r6, #5; mov sp, r6;
+    // pop {r4-r7, pc}; -1024.
+    let code = [0xb5f0, 0xaf03, 0x4e02, 0x44b5, 0x1ffe, 0x3e05, 0x46b5, 0xbdf0, 0xfc00, 0xffff];
+    assert_eq!(frame_with_data(&code, 8..10)?, 20 + 1024);
+    for (place, half) in [(1, NOP), (2, NOP), (4, NOP), (5, NOP), (5, 0x3e01)] {
+        let mut other = code;
+        other[place] = half;
+        assert!(frame_with_data(&other, 8..10).is_err(), "{place}");
+    }
+    Ok(())
+}
+
+#[test]
+fn tables_of_armv6m_are_followed() -> Result<()> {
+    // add r0, pc; ldrh r0, [r0, #4]; lsls r0, r0, #1; add pc, r0; two halfwords; a constant.
+    let offsets = [&[0x4478, 0x8880, 0x0040, 0x4487, 2, 5, 0x7fff][..], &leaf(8), &[BX_LR]].concat();
+    assert_eq!(frame_with_data(&offsets, 4..7)?, 8);
+    // adr r3, the words; ldr r3, [r3, r2]; mov pc, r3; a filler; two words.
+    let words = [&[0xa301, 0x589b, 0x469f, 0x46c0, 0x1011, 0, 0x1017, 0][..], &leaf(8), &[BX_LR]].concat();
+    assert_eq!(frame_with_data(&words, 4..8)?, 8);
+    for (code, data, place) in [(&offsets, 4..7, 0), (&offsets, 4..7, 1), (&offsets, 4..7, 2), (&words, 4..8, 0)] {
+        let mut other = code.clone();
+        other[place] = NOP;
+        assert!(frame_with_data(&other, data).is_err(), "{place}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_far_branch_of_armv6m_is_no_call() -> Result<()> {
+    let [high, low] = far(at(0) + 2, at(0) + 8, true);
+    let program = program(&[&[PUSH_R4_LR, high, low, 0x46c0, POP_R4_PC]]);
+    let frame = frame(&program, &program.functions[&at(0)])?;
+    assert_eq!((frame.bytes, frame.calls.len()), (8, 0));
+    // cmp r0, r0; beq past a branch, which no path reaches.
+    assert_eq!(frame_of(&[0x4280, 0xd000, 0xe7fe, BX_LR])?, 0);
+    assert!(refused(&[0x4280, 0xd000, 0x2001, BX_LR]).contains("is not reached"));
     Ok(())
 }
 
