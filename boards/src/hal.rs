@@ -29,6 +29,18 @@ pub trait Watchdog {
     fn feed(&mut self);
 }
 
+/// The timer of the control tick, which triggers the tick at the end of each period.
+pub trait Ticker {
+    /// Starts the timer and its interrupt. `period` is in cycles of the board's [`Clock`].
+    fn start(&mut self, period: u32);
+
+    /// Returns the rest of the period in cycles: `period` - 1 after its begin, 0 at its end.
+    fn count(&self) -> u32;
+
+    /// Returns `true` if a period has ended since the last call.
+    fn has_ended(&mut self) -> bool;
+}
+
 /// Source of the core's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
@@ -38,7 +50,7 @@ pub enum Source {
     Fallback,
 }
 
-/// The core's clock.
+/// The clock of the core and of [`Ticker`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clock {
     /// Cycles per second.
@@ -105,7 +117,7 @@ pub trait Stage {
 
 /// A board that has been set up.
 #[derive(Debug)]
-pub struct Parts<U, W, S> {
+pub struct Parts<U, W, S, T> {
     /// The core's clock.
     pub clock: Clock,
     /// Cause of its last reset.
@@ -116,4 +128,6 @@ pub struct Parts<U, W, S> {
     pub watchdog: W,
     /// Its power stage, off.
     pub stage: S,
+    /// The timer of the control tick, off.
+    pub ticker: T,
 }

@@ -10,7 +10,7 @@
 
 // On both, so that the host tests them.
 pub mod hal;
-#[cfg(any(not(target_os = "none"), feature = "cmsdk"))]
+#[cfg(any(not(target_os = "none"), feature = "cmsdk", feature = "virt"))]
 pub mod no_stage;
 pub mod port;
 pub mod ram;
@@ -37,6 +37,8 @@ mod mps3;
 #[cfg(any(not(target_os = "none"), feature = "stm32f405"))]
 pub mod stm32f405;
 #[cfg(not(target_os = "none"))]
+mod v6m;
+#[cfg(any(not(target_os = "none"), feature = "virt"))]
 mod virt;
 
 #[cfg(not(target_os = "none"))]
@@ -49,3 +51,5 @@ pub use mps2::target as device;
 pub use stm32f405::target as device;
 #[cfg(not(target_os = "none"))]
 pub use table::{Clock, Target, root, target_dir, version};
+#[cfg(all(target_os = "none", feature = "virt"))]
+pub use virt::target as device;

@@ -18,6 +18,7 @@ const DEFAULT_MEMORY: &str = "memory.x";
 pub fn link() -> Result<(), String> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rustc-check-cfg=cfg(actq_small)");
+    println!("cargo::rustc-check-cfg=cfg(actq_armv6m)");
     let Some(target) = target()? else { return Ok(()) };
     let board = target.board();
     // From the variable of this run, because the build script may have been compiled for another checkout.
@@ -45,6 +46,9 @@ pub fn link() -> Result<(), String> {
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
     if env::vars_os().any(|(name, _)| name.to_string_lossy().starts_with("CARGO_FEATURE_DEFMT")) {
         println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
+    }
+    if target.triple().starts_with("thumbv6m") {
+        println!("cargo::rustc-cfg=actq_armv6m");
     }
     if board.small {
         println!("cargo::rustc-cfg=actq_small");

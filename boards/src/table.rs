@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::board::Board;
-use crate::{microbit, mps2, mps3, stm32f405, virt};
+use crate::{microbit, mps2, mps3, stm32f405, v6m, virt};
 
 /// Clock of an emulated board. It never runs ahead of the host's clock, whose time is in the host's frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +61,7 @@ targets! {
     /// Cortex-M0: the portable kernels in little memory.
     Small: "thumbv6m-none-eabi" on microbit::BOARD;
     /// Code of the Cortex-M0 on a Cortex-M3, which has the memory to count all of it.
-    V6m: "thumbv6m-none-eabi" on mps2::host::AN385;
+    V6m: "thumbv6m-none-eabi" on v6m::BOARD;
     /// RV32IMAC: the portable kernels.
     Riscv: "riscv32imac-unknown-none-elf" on virt::BOARD;
     /// Cortex-M33 with FPU and DSP extension.
@@ -196,6 +196,6 @@ mod tests {
     #[test]
     fn features_select_boards_that_triples_do_not() {
         let chosen: Vec<_> = Target::ALL.into_iter().filter_map(Target::feature).collect();
-        assert_eq!(chosen, ["mps2-an385", "mps2-an500", "stm32f405", "mps3-an547"]);
+        assert_eq!(chosen, ["mps2-an385-v6m", "mps2-an500", "stm32f405", "mps3-an547"]);
     }
 }

@@ -136,7 +136,7 @@ where
         match self.state.faults.push(byte) {
             Some(Request::Hide(parts)) => self.state.hidden_parts = parts,
             #[cfg(target_os = "none")]
-            Some(Request::Undefined) => cortex_m::asm::udf(),
+            Some(Request::Undefined) => actq_firmware_support::machine::undefined(),
             #[cfg(target_os = "none")]
             Some(Request::Recursion) => drop(core::hint::black_box(crate::faults::recurse(0))),
             Some(Request::Panic) => panic!("asked for"),

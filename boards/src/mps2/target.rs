@@ -7,10 +7,13 @@ use core::cell::Cell;
 use crate::hal::{self, Cause, Clock, Source};
 use crate::ram::Ram;
 pub use crate::target::cmsdk::{Uart, Watchdog};
-#[cfg(not(feature = "armv8m"))]
+#[cfg(feature = "armv6m")]
+pub use crate::target::lowest::guard_stack;
+#[cfg(not(any(feature = "armv6m", feature = "armv8m")))]
 pub use crate::target::mpu::guard_stack;
 #[cfg(feature = "armv8m")]
 pub use crate::target::msplim::guard_stack;
+pub use crate::target::systick::SysTick as Ticker;
 use crate::target::vectors::interrupts;
 
 /// Clocks and addresses of AN385, AN386 and AN500.
@@ -47,7 +50,7 @@ interrupts!(42 of 96);
 interrupts!(43 of 96);
 
 /// Number of bits of an interrupt's priority.
-pub const NVIC_PRIO_BITS: u8 = 3;
+pub const NVIC_PRIO_BITS: u8 = if cfg!(feature = "armv6m") { 2 } else { 3 };
 /// Scratch memory for a head, in words.
 pub const SCRATCH: usize = super::SCRATCH;
 /// `true` if a non-maskable interrupt announces the watchdog's reset.
@@ -61,7 +64,7 @@ pub type Stage = crate::no_stage::NoStage<4200>;
 pub type Flash = Ram<'static, 4, { 128 << 10 }>;
 
 /// The parts of the board.
-pub type Parts = hal::Parts<Uart, Watchdog, Stage>;
+pub type Parts = hal::Parts<Uart, Watchdog, Stage, Ticker>;
 
 /// Sets the board up, with its serial port at `baud`.
 ///
@@ -70,10 +73,11 @@ pub type Parts = hal::Parts<Uart, Watchdog, Stage>;
 /// Call it once: the caller owns all of the board's peripherals.
 pub unsafe fn start(baud: u32) -> Parts {
     // SAFETY: these are the documented addresses, and nothing else uses the peripherals.
-    let (uart, watchdog) =
-        unsafe { (Uart::new(map::UART.0, map::UART.1, baud), Watchdog::new(map::WATCHDOG.0, map::WATCHDOG.1)) };
+    let (uart, watchdog, ticker) = unsafe {
+        (Uart::new(map::UART.0, map::UART.1, baud), Watchdog::new(map::WATCHDOG.0, map::WATCHDOG.1), Ticker::new())
+    };
     let clock = Clock { hz: map::HZ, source: Source::Crystal };
-    Parts { clock, cause: Cause::Unknown, uart, watchdog, stage: Stage::default() }
+    Parts { clock, cause: Cause::Unknown, uart, watchdog, stage: Stage::default(), ticker }
 }
 
 /// Uses all of `memory`.

@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-/// Returns the addresses from the end of all variables to the stack's start.
+/// Returns the addresses from the stack's end to its start.
 pub(crate) fn memory() -> Range<u32> {
     unsafe extern "C" {
         static _stack_end: u32;

@@ -5,11 +5,9 @@
 
 pub mod count;
 pub mod host;
-#[cfg(target_arch = "arm")]
 pub mod kept;
 pub mod machine;
 pub mod slot;
-#[cfg(target_arch = "arm")]
 pub mod stack;
 
 use core::fmt::Write as _;
@@ -24,7 +22,7 @@ pub fn panicked(info: &PanicInfo<'_>) -> ! {
     host::exit(false)
 }
 
-/// Declares [`panicked`] as the panic handler.
+/// Declares [`panicked`] as the panic handler, and that an exception of RISC-V is a panic.
 #[macro_export]
 macro_rules! panic_to_host {
     () => {
@@ -32,13 +30,19 @@ macro_rules! panic_to_host {
         fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
             $crate::panicked(info)
         }
+
+        // riscv-rt would loop.
+        #[cfg(target_arch = "riscv32")]
+        #[unsafe(export_name = "abort")]
+        extern "C" fn abort() -> ! {
+            $crate::exception()
+        }
     };
 }
 
-/// Handles an exception as a panic with its code and address; riscv-rt would loop.
+/// Handles an exception as a panic with its code and address.
 #[cfg(target_arch = "riscv32")]
-#[unsafe(export_name = "abort")]
-extern "C" fn exception() -> ! {
+pub fn exception() -> ! {
     use riscv::register::{mcause, mepc};
     panic!("exception {} at {:#x}", mcause::read().code(), mepc::read())
 }

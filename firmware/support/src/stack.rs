@@ -1,6 +1,6 @@
 //! The stack's high-water mark: paints the memory below the stack pointer and reads it later.
 
-use cortex_m::register::msp;
+use crate::machine::stack_pointer;
 
 const PAINT: u32 = 0x5a5a_a5a5;
 
@@ -20,7 +20,7 @@ impl Room {
     /// The stack has room for `words` words.
     #[inline(always)]
     pub unsafe fn below_here(words: usize) -> Self {
-        Self { top: msp::read() as usize / 4, words }
+        Self { top: stack_pointer() / 4, words }
     }
 
     /// Covers the memory below the stack's start.
@@ -46,7 +46,7 @@ impl Room {
     /// No interrupt occurs meanwhile.
     #[inline(always)]
     pub unsafe fn paint(self) {
-        let in_use = self.top - msp::read() as usize / 4;
+        let in_use = self.top - stack_pointer() / 4;
         for below in in_use + 1..=self.words {
             // SAFETY: unused memory of the stack below its pointer, as the creator of this value promised.
             unsafe { self.address(below).write_volatile(PAINT) };

@@ -156,7 +156,7 @@ fn worst(program: &Program, tasks: &BTreeMap<String, u8>) -> Result<Worst> {
 
 /// Returns the priorities of the application's tasks, by their handlers, as its source declares them to RTIC.
 fn tasks() -> Result<BTreeMap<String, u8>> {
-    let path = root().join("firmware-demo/src/bin/controller/main.rs");
+    let path = root().join("firmware-demo/src/bin/controller/app.rs");
     let source = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
     bound(&source).with_context(|| path.display().to_string())
 }

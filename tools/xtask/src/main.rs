@@ -177,7 +177,7 @@ mod tests {
         for (line, expected) in [
             (
                 "xtask firmware --board microbit --out f.elf",
-                "use one of mps2-an386, mps2-an385, mps2-an505, mps2-an500, stm32f405, mps3-an547",
+                "use one of mps2-an386, mps2-an385, mps2-an385-v6m, virt, mps2-an505, mps2-an500, stm32f405, mps3-an547",
             ),
             ("xtask firmware --board stm32f4 --list", "use one of"),
             ("xtask firmware --board stm32f405", "--out <FILE.elf>"),

@@ -24,6 +24,7 @@ pub use watchdog::Iwdg as Watchdog;
 
 use crate::hal::{self, Cause};
 pub use crate::target::mpu::guard_stack;
+pub use crate::target::systick::SysTick as Ticker;
 use crate::target::vectors::interrupts;
 
 // USART 1.
@@ -39,7 +40,7 @@ pub const WATCHDOG_NMI: bool = false;
 pub const FLASH_WHILE_ARMED: bool = false;
 
 /// The parts of the board.
-pub type Parts = hal::Parts<Uart, Watchdog, Stage>;
+pub type Parts = hal::Parts<Uart, Watchdog, Stage, Ticker>;
 /// The board's flash for updates.
 pub type Flash = super::flash::Flash<Controller>;
 
@@ -68,7 +69,9 @@ pub unsafe fn start(baud: u32) -> Parts {
     let uart = Uart::new(p.USART1, &p.RCC, &p.GPIOB, bus_hz, baud);
     let stage = Stage::new(p.TIM1, &p.RCC, &p.GPIOA, &p.GPIOB, timer_hz, Currents::new(p.ADC1, &p.RCC, &p.GPIOC));
     let watchdog = Watchdog::new(p.IWDG);
-    Parts { clock, cause, uart, watchdog, stage }
+    // SAFETY: as above.
+    let ticker = unsafe { Ticker::new() };
+    Parts { clock, cause, uart, watchdog, stage, ticker }
 }
 
 /// Returns the part's flash, of which `memory` may be written.

@@ -1,9 +1,9 @@
 //! The safety state machine, shared by loop and tick.
 
 use actq_controller::{Safety, Shared};
-use rtic::Mutex;
+use rtic_core::Mutex;
 
-/// An RTIC resource, whose lock is a priority.
+/// A resource, whose lock is a priority (RTIC) or disables interrupts.
 pub(crate) struct Locked<M>(pub(crate) M);
 
 impl<const AXES: usize, M: Mutex<T = Safety<AXES>>> Shared<AXES> for Locked<M> {

@@ -75,9 +75,14 @@ impl Drop for Running {
 
 #[test]
 fn the_start_is_logged() -> Result<()> {
-    let elf = firmware::controller(Target::Fpu, "defmt-semihosting")?;
+    logs_its_start(Target::Fpu, 25_000_000)?;
+    logs_its_start(Target::Riscv, 10_000_000)
+}
+
+fn logs_its_start(target: Target, clock_hz: u32) -> Result<()> {
+    let elf = firmware::controller(target, "defmt-semihosting")?;
     let formats = formats(&elf)?;
-    let mut command = Target::Fpu.run(&elf);
+    let mut command = target.run(&elf);
     // The watchdog counts the board's time, not that of a machine that may stop QEMU for seconds.
     command.args(["-icount", "shift=5"]);
     let mut running = Running(command.stdin(Stdio::null()).stdout(Stdio::piped()).spawn()?);
@@ -87,9 +92,9 @@ fn the_start_is_logged() -> Result<()> {
     let mut frames = frames.filter(|frame| !frame.as_ref().is_ok_and(Vec::is_empty));
     let crc = ImageBuffer::read(built_in()?)?.image(built_in()?)?.crc();
     let image = format!("image {crc:08x} of slot {BUILT_IN}, refusal 0");
-    for expected in ["start 1, reset cause 0, 25000000 Hz", &image] {
+    for expected in [format!("start 1, reset cause 0, {clock_hz} Hz"), image] {
         let frame = frames.next().context("QEMU has ended")??;
-        assert_eq!(text(&formats, &frame)?, expected);
+        assert_eq!(text(&formats, &frame)?, expected, "{target:?}");
     }
     Ok(())
 }

@@ -317,7 +317,7 @@ fn every_priority_adds_its_deepest_handler() -> Result<()> {
 
 #[test]
 fn task_priorities_come_from_the_source() -> Result<()> {
-    assert_eq!(tasks()?, [("SERIAL".to_owned(), 2), ("SysTick".to_owned(), 3)].into());
+    assert_eq!(tasks()?, [("SERIAL".to_owned(), 2), ("SysTick".to_owned(), 4)].into());
     assert_eq!(bound("#[task(binds = UART0, local = [x])]")?, [("UART0".to_owned(), 1)].into());
     assert!(bound("#[task(priority = 1)]").is_err());
     assert!(bound("").is_err());

@@ -190,23 +190,22 @@ impl Steps {
     /// Adds the lints of the application with all its features, for every board, and of the other firmware styles.
     fn application_lints(&mut self) {
         let programs = ["--lib", "--bin", "controller", "--features"];
+        // Any 64 digits will do.
+        let digits = "0".repeat(64);
+        let key = ("ACTQ_PUBLIC_KEY", digits.as_str());
         for (target, _) in firmware::boards() {
             let name = target.board().name;
-            let features = [name, "defmt-rtt", "faults"].map(|feature| format!("{APPLICATION}/{feature}")).join(",");
+            let features =
+                [name, "defmt-rtt", "faults", "signed"].map(|feature| format!("{APPLICATION}/{feature}")).join(",");
             let packages = ["--package", APPLICATION, "--package", "actq-boards"];
             let arguments = [&["clippy"], &build_for(target)[..], &packages, &programs, &[&features], &DENY].concat();
-            self.add_of_firmware(
-                &format!("lints of the application, {name}"),
-                &arguments,
-                target.rustflags().as_slice(),
-            );
+            let environment: Vec<_> = target.rustflags().into_iter().chain([key]).collect();
+            self.add_of_firmware(&format!("lints of the application, {name}"), &arguments, &environment);
         }
         let fpu = build_for(Target::Fpu);
-        let features = ["mps2-an386,tick-8khz,foc,signed"];
+        let features = ["mps2-an386,tick-8khz,foc"];
         let arguments = [&["clippy", "--package", APPLICATION], &fpu[..], &programs, &features, &DENY].concat();
-        // Any 64 digits will do.
-        let key = "0".repeat(64);
-        self.add_of_firmware("lints of the application's other features", &arguments, &[("ACTQ_PUBLIC_KEY", &key)]);
+        self.add_of_firmware("lints of the application's other features", &arguments, &[]);
         let current_loop = ["test", "--profile", PROFILE, "--package", APPLICATION, "--lib", "--features", "foc"];
         self.add("tests of the application's current loop", &current_loop);
         let styles = [&["clippy", "--package", STYLES, "--lib", "--bins"], &fpu[..], &DENY].concat();
