@@ -240,10 +240,13 @@ impl Image {
             return Err(error!("steps is 0; use a whole number from 1 on"));
         }
         let (buffer, own) = (self.buffer.clone(), self.name.clone());
-        work::interruptible(py, None, move |_| {
-            let golden = golden.as_deref().map(|file| (file, steps));
-            export_c::export(buffer.image(&own)?, buffer.bytes(), &folder, &name, golden, None, force)
-        })
+        let (place, recording) = (folder.clone(), golden.clone());
+        let files = work::interruptible(py, None, move |_| {
+            let golden = recording.as_deref().map(|file| (file, steps));
+            export_c::texts(buffer.image(&own)?, buffer.bytes(), &place, &name, golden)
+        })?;
+        let inputs: Vec<&Path> = golden.as_deref().into_iter().collect();
+        py.detach(|| export_c::write(&files, &folder, &inputs, force)).or_raise()
     }
 
     /// Writes the image's network as an ONNX file in f32, whole or not at all. Replaces only a file whose name ends in

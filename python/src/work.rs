@@ -2,7 +2,7 @@
 //!
 //! The work holds no lock of Python. Ctrl-C, or an exception of a callback, is raised at once, and the thread is
 //! abandoned: at its next report of progress it unwinds, and everything that it holds is dropped. It writes no files but
-//! temporary ones; an export to C, which reports nothing, still writes its files, each of them whole.
+//! temporary ones: the calling thread writes the results, so that nothing is written after an interrupt.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -212,69 +212,100 @@ except KeyboardInterrupt:
     assert os.listdir(tmp_path) == []
 
 
-def test_ctrl_c_ends_a_policys_actions_within_a_second(mlp):
-    script = f"""
-import actq, numpy, signal, time
-signal.signal(signal.SIGINT, signal.default_int_handler)
-policy = actq.import_policy({str(mlp)!r})
-rows = numpy.zeros((1_000_000, 12), numpy.float32)
-try:
-    print("begun", flush=True)
-    policy(rows)
-except KeyboardInterrupt:
-    print("interrupted", flush=True)
-"""
-    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
-    assert process.stdout.readline() == "begun\n"
-    time.sleep(0.5)
-    process.send_signal(signal.SIGINT)
-    sent = time.monotonic()
-    assert process.stdout.readline() == "interrupted\n"
-    assert time.monotonic() - sent < 1
-    process.kill()
-    process.wait()
-
-
 LONG = """
 import actq, numpy, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
-image, folder = actq.Image.load(sys.argv[1] + "/i.actq"), sys.argv[1]
+folder = sys.argv[1]
+policy, image = actq.import_policy(folder + "/wide.onnx"), actq.Image.load(folder + "/i.actq")
 obs = numpy.ones((1, image.obs_len), numpy.float32)
 def head(n):
     return actq.Head(image, n)
+{before}
 print("begun", flush=True)
 try:
     {call}
 except KeyboardInterrupt:
     print("interrupted", flush=True)
 """
+DRIVEN = """
+import gymnasium
+class Env(gymnasium.Env):
+    observation_space = gymnasium.spaces.Box(-10, 10, (image.obs_len,), numpy.float32)
+    action_space = gymnasium.spaces.Box(-1, 1, (image.act_len,), numpy.float32)
+    def reset(self, *, seed=None, options=None):
+        return obs[0], {}
+    def step(self, action):
+        return obs[0], 0.0, False, False, {}
+env = gymnasium.vector.SyncVectorEnv([Env] * 3)
+"""
 
 
 @pytest.mark.parametrize(
     "call",
     [
+        "policy(obs.repeat(200_000, axis=0))",
         "image.report(recordings=[folder + '/obs.npy'])",
         "image.export_c(folder + '/c', golden=folder + '/obs.npy', steps=10**9)",
         "[head(100_000) for _ in range(10**6)]",
         "actq.Head(image)(obs.repeat(300_000, axis=0))",
     ],
 )
-def test_ctrl_c_ends_other_calls_within_a_second(tmp_path, call):
+def test_ctrl_c_ends_a_call_within_a_second(tmp_path, call):
     """Each of them would take longer."""
+    wide_image(tmp_path)
+    np.save(tmp_path / "obs.npy", np.random.default_rng(1).normal(size=(200_000, 64)).astype(np.float32))
+    assert seconds_of_ctrl_c(LONG.format(before="", call=call), tmp_path) < 1
+
+
+def test_ctrl_c_ends_a_rollout_within_a_second(tmp_path):
+    pytest.importorskip("gymnasium", reason="gymnasium is not installed")
+    wide_image(tmp_path)
+    assert seconds_of_ctrl_c(LONG.format(before=DRIVEN, call="actq.rollout(head(3), env, frames=10**9)"), tmp_path) < 1
+
+
+def test_an_interrupted_export_writes_nothing(tmp_path):
+    image, recording = wide_image(tmp_path), tmp_path / "obs.npy"
+    np.save(recording, np.random.default_rng(1).normal(size=(40_000, 64)).astype(np.float32))
+    began = time.monotonic()
+    assert len(image.export_c(tmp_path / "whole", golden=recording, steps=10**9)) == 4
+    whole = time.monotonic() - began
+    # A process in the background ignores the signal.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    timer = threading.Timer(whole / 4, signal.raise_signal, [signal.SIGINT])
+    try:
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            image.export_c(tmp_path / "none", golden=recording, steps=10**9)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    # So long that the abandoned work has ended.
+    time.sleep(2 * whole)
+    assert sorted(os.listdir(tmp_path)) == ["i.actq", "obs.npy", "whole", "wide.onnx"]
+
+
+def wide_image(folder):
+    """Saves an image as i.actq, and returns it."""
     random = np.random.default_rng(1)
     layers = [(random.normal(size=size) / 16, np.zeros(size[1])) for size in [(64, 256), (256, 256), (256, 8)]]
-    policy = actq.import_policy(write_mlp(tmp_path / "wide.onnx", layers))
-    actq.quantize(policy, bits=4, method="rtn", progress=False).save(tmp_path / "i.actq")
-    np.save(tmp_path / "obs.npy", random.normal(size=(200_000, 64)).astype(np.float32))
-    process = subprocess.Popen([sys.executable, "-c", LONG.format(call=call), tmp_path], stdout=subprocess.PIPE, text=True)
-    assert process.stdout.readline() == "begun\n"
-    time.sleep(0.5)
-    process.send_signal(signal.SIGINT)
-    sent = time.monotonic()
-    assert process.stdout.readline() == "interrupted\n"
-    assert time.monotonic() - sent < 1
-    process.kill()
-    process.wait()
+    policy = actq.import_policy(write_mlp(folder / "wide.onnx", layers))
+    image = actq.quantize(policy, bits=4, method="rtn", progress=False)
+    image.save(folder / "i.actq")
+    return image
+
+
+def seconds_of_ctrl_c(script, folder):
+    """Interrupts a script half a second after its call began; returns the seconds until it has ended the call."""
+    process = subprocess.Popen([sys.executable, "-c", script, folder], stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout.readline() == "begun\n"
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        sent = time.monotonic()
+        assert process.stdout.readline() == "interrupted\n"
+        return time.monotonic() - sent
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_arguments_are_whole_names(tmp_path):

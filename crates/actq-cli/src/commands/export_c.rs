@@ -10,7 +10,7 @@ use anyhow::{Result, ensure};
 use crate::args::ExportCArgs;
 use crate::outputs::files::refuse_unlike;
 use crate::outputs::unfinished::OutputFolder;
-use crate::report::export::{Golden, files};
+use crate::report::export::{Files, Golden, files};
 use crate::terminal::{print, reserve};
 
 /// Writes an image as source code of C.
@@ -18,23 +18,27 @@ pub(crate) fn run(args: &ExportCArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let golden = args.golden.as_deref().map(|recording| (recording, args.steps.get()));
-    let paths = export(image, buffer.bytes(), &args.out, &args.name, golden, Some(&args.image), args.force)?;
+    let files = texts(image, buffer.bytes(), &args.out, &args.name, golden)?;
+    let inputs: Vec<&Path> = [Some(&*args.image), args.golden.as_deref()].into_iter().flatten().collect();
+    let paths = write(&files, &args.out, &inputs, args.force)?;
     let list: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     print(&format!("{}\n", list.join("\n")))
 }
 
-/// Writes an image of these `bytes` as source code of C into a folder, and returns the paths. `golden` is a recording,
-/// and the most steps of it to run. `file` is the image's own, which no output may replace. Files that were not
-/// exported are replaced only with `force`.
-pub fn export(
+/// Returns the source code of C of an image of these `bytes`, for [`write`] into `folder`. `golden` is a recording, and
+/// the most steps of it to run.
+///
+/// # Errors
+///
+/// If the name is no identifier of C, if the recording cannot be run, or if the folder has the golden run of an earlier
+/// export and `golden` is `None`.
+pub fn texts(
     image: Image<'_>,
     bytes: &[u8],
     folder: &Path,
     name: &str,
     golden: Option<(&Path, usize)>,
-    file: Option<&Path>,
-    force: bool,
-) -> Result<Vec<PathBuf>> {
+) -> Result<Files> {
     let is_identifier = name.starts_with(|c: char| c.is_ascii_lowercase())
         && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
     ensure!(is_identifier, "--name {name:?}: use lower-case letters, digits and underscores, a letter first");
@@ -46,14 +50,18 @@ pub fn export(
         "{}: it is of an earlier export; remove it, or pass --golden",
         stale.display()
     );
-    let files = files(&image, bytes, name, run.as_ref())?;
+    files(&image, bytes, name, run.as_ref())
+}
 
+/// Writes files into a folder, all or none, and returns their paths. None replaces one of `inputs`; files that were not
+/// exported are replaced only with `force`.
+pub fn write(files: &Files, folder: &Path, inputs: &[&Path], force: bool) -> Result<Vec<PathBuf>> {
     let _folder = OutputFolder::new(folder)?;
     let paths: Vec<PathBuf> = files.iter().map(|(name, _)| folder.join(name)).collect();
-    for (path, (_, text)) in paths.iter().zip(&files) {
+    for (path, (_, text)) in paths.iter().zip(files) {
         refuse_unlike(path, text, force)?;
     }
-    let outputs = reserve(&paths, file.into_iter().chain(golden.map(|(recording, _)| recording)))?;
+    let outputs = reserve(&paths, inputs)?;
     outputs.write(&files.iter().map(|(_, text)| text).collect::<Vec<_>>())?;
     Ok(paths)
 }
