@@ -1,5 +1,7 @@
 """On-policy rounds in Gymnasium's vector environments."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -63,6 +65,22 @@ def test_every_robot_drives_as_many_whole_episodes(mlp, mode):
     assert shares[-1] == 1 and repr(driven).startswith("Rollout(7 episodes, 135 frames, mean return -")
     with pytest.raises(actq.Error, match="frames and episodes are given; pass one of them"):
         actq.rollout(actq.Head(image, 3), env, episodes=7, frames=100)
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_rollouts_show_progress_on_a_terminal(monkeypatch, capsys, is_terminal):
+    from actq import _progress
+
+    monkeypatch.setitem(sys.modules, "IPython", None)
+    monkeypatch.setitem(sys.modules, "tqdm.auto", None)
+    monkeypatch.setattr(_progress, "INTERVAL", 0.0)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
+    act = lambda x, reset: x[:, :4]  # noqa: E731
+    actq.rollout(act, envs(AutoresetMode.NEXT_STEP), frames=30)
+    shown = capsys.readouterr().err
+    assert shown.endswith("100%: driving\n") if is_terminal else shown == ""
+    actq.rollout(act, envs(AutoresetMode.NEXT_STEP), frames=30, progress=False)
+    assert capsys.readouterr().err == ""
 
 
 def test_rounds_learn_from_their_rollouts(mlp):
