@@ -462,6 +462,48 @@ def test_networks_without_biases_are_imported(function):
         assert actq.import_policy(nn.Sequential(*layers, nn.Linear(64, 3, bias=False)), torch.zeros(1, 11)).act_len == 3
 
 
+class FreshRecurrent(nn.Module):
+    """A fresh policy without biases: its actions are tiny where its observations are."""
+
+    def __init__(self, cell, function, exported=None):
+        super().__init__()
+        torch.manual_seed(0)
+        self.first, self.cell, self.out = nn.Linear(11, 64, bias=False), cell(64, 64, bias=False), nn.Linear(64, 3, bias=False)
+        self.function, self.exported = function, exported or function
+
+    def forward(self, obs, *states):
+        hidden = (self.exported if torch.onnx.is_in_onnx_export() else self.function)(self.first(obs))
+        states = self.cell(hidden, states) if len(states) > 1 else (self.cell(hidden, *states),)
+        return (self.out(states[0]), *states)
+
+
+class Keeping(nn.Module):
+    """Keeps the states by itself."""
+
+    def __init__(self, module, count):
+        super().__init__()
+        self.module, self.states = module, tuple(torch.zeros(1, 64) for _ in range(count))
+
+    def forward(self, obs):
+        action, *states = self.module(obs, *self.states)
+        self.states = tuple(states)
+        return action
+
+
+@pytest.mark.parametrize("cell, names", [(nn.GRUCell, ["h"]), (nn.LSTMCell, ["h", "c"])])
+def test_recurrent_modules_may_differ_by_the_errors_of_functions(cell, names):
+    after = [f"{name}_next" for name in names]
+    ports = {"input_names": ["obs", *names], "output_names": ["action", *after], "states": dict(zip(names, after))}
+    example = (torch.zeros(1, 11), *(torch.zeros(1, 64) for _ in names))
+    for function in (nn.ELU(), torch.tanh):
+        assert actq.import_policy(FreshRecurrent(cell, function), example, **ports).state_len == 64 * len(names)
+        kept = Keeping(FreshRecurrent(cell, function), len(names))
+        assert actq.import_policy(kept, torch.zeros(1, 11)).state_len == 64 * len(names)
+    for other in (nn.Hardtanh(), lambda x: 1.0003 * torch.tanh(x), lambda x: torch.tanh(x + 3e-5)):
+        with pytest.raises(actq.Error, match="more than roundings explain. If forward computes outside of torch"):
+            actq.import_policy(FreshRecurrent(cell, torch.tanh, other), example, **ports)
+
+
 class Exported(nn.Module):
     """Computes something else while it is exported."""
 
@@ -483,7 +525,10 @@ def test_another_function_or_weight_is_refused(exported):
 
 
 def test_errors_of_functions_are_summed():
-    from actq._functions import bounds
+    from actq import _functions
+
+    def bounds(*given):
+        return list(_functions.bounds(*given))
 
     torch.manual_seed(0)
     first, out = nn.Linear(5, 7), nn.Linear(7, 2)
@@ -501,3 +546,6 @@ def test_errors_of_functions_are_summed():
     expected = 1.4e-7 * (out.weight.detach().abs() * hidden).sum(dim=1).numpy()
     np.testing.assert_allclose(bounds(lambda given: out(nn.functional.silu(first(*given))), [x], both), expected, rtol=1e-5)
     np.testing.assert_array_equal(bounds(lambda given: first(*given), [x], both), 0)
+    # Of an episode, with the errors of all steps until then.
+    run = lambda given: torch.cat([torch.tanh(given[0][:i]).sum(0) for i in (1, 2, 3)])  # noqa: E731
+    np.testing.assert_allclose(bounds(run, [torch.randn(3, 1)], np.arange(3)), 1.5e-7 * np.array([1, 2, 3]), rtol=1e-5)

@@ -26,48 +26,57 @@ ERRORS = {
 #: Multiple of a tolerance that no errors of functions and roundings explain.
 HOPELESS = 1e3
 
+Output = Callable[[Sequence[torch.Tensor]], torch.Tensor]
+
 
 def beyond(
     difference: Array,
     tolerance: Array,
-    output: Callable[[Sequence[torch.Tensor]], torch.Tensor],
+    output: Output,
     inputs: Callable[[int], Sequence[torch.Tensor]],
+    hopeless: float = HOPELESS,
 ) -> Array:
     """Returns absolute differences [row, value] less what errors of functions may change, where they exceed their tolerances.
 
     output: computes the values of a row; inputs: gives the inputs of a row by its number.
+    hopeless: ends with the first value of which more than this multiple of its tolerance is left.
     """
-    left = np.array(difference)
-    for row in np.flatnonzero((difference > tolerance).any(axis=1)):
-        values = np.flatnonzero(difference[row] > tolerance[row])
-        left[row, values] = np.maximum(left[row, values] - bounds(output, inputs(int(row)), values), 0.0)
-        if (left[row] > HOPELESS * tolerance[row]).any():
-            break
+    left, shares = np.array(difference), difference / tolerance
+    for row in np.flatnonzero((shares > 1).any(axis=1)):
+        # The worst first.
+        values = np.argsort(-shares[row])[: (shares[row] > 1).sum()]
+        for value, bound in zip(values, bounds(output, inputs(int(row)), values)):
+            left[row, value] = max(left[row, value] - bound, 0.0)
+            if left[row, value] > hopeless * tolerance[row, value]:
+                return left
     return left
 
 
-def bounds(output: Callable[[Sequence[torch.Tensor]], torch.Tensor], inputs: Sequence[torch.Tensor], values: Array) -> Array:
-    """Returns how much the errors of all functions may change each of these values together: to the first order, the sum over
-    all elements of functions of |d value / d element| times the element's largest error. 0 if it has no gradients."""
-    found, script = np.zeros(len(values)), cast(Any, torch.jit)
+def bounds(output: Output, inputs: Sequence[torch.Tensor], values: Array) -> Iterator[float]:
+    """Yields how much the errors of all functions may change each of these values together: to the first order, the sum over
+    all elements of functions of |d value / d element| times the element's largest error. Nothing if it has no gradients."""
     # Scripts without fused functions, which have no names.
-    with torch.enable_grad(), script.optimized_execution(False):
+    with torch.enable_grad(), cast(Any, torch.jit).optimized_execution(False):
         leaves = [value.detach().clone().requires_grad_(value.is_floating_point()) for value in inputs]
         try:
             # Not the leaves themselves, which no operation may change in place.
             flat = output([leaf + 0 if leaf.requires_grad else leaf for leaf in leaves]).reshape(-1)
         except Exception:
-            return found
-        sums: List[torch.Tensor] = []
-        for node, error in _functions(flat.grad_fn):
-            node.register_prehook(lambda gradients, error=error: sums.append((gradients[0].abs() * error).sum()))
-        known = [leaf for leaf in leaves if leaf.requires_grad]
-        for i, value in enumerate(values):
-            sums.clear()
-            if flat.requires_grad:
-                torch.autograd.grad(flat[int(value)], known, retain_graph=True, allow_unused=True)
-            found[i] = float(sum(sums))
-    return found
+            return
+    sums: List[torch.Tensor] = []
+    for node, error in _functions(flat.grad_fn):
+        node.register_prehook(lambda gradients, error=error: sums.append((gradients[0].abs() * error).sum()))
+    known = [leaf for leaf in leaves if leaf.requires_grad]
+    for value in values:
+        sums.clear()
+        if flat.requires_grad:
+            try:
+                with torch.enable_grad():
+                    torch.autograd.grad(flat[int(value)], known, retain_graph=True, allow_unused=True)
+            except RuntimeError:
+                # A module that changes its states in place.
+                return
+        yield float(sum(sums))
 
 
 def _functions(last: Any) -> Iterator[Any]:

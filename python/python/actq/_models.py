@@ -45,7 +45,7 @@ class Model(NamedTuple):
         expected = np.clip(self.predict(self.observations), low or -np.inf, high or np.inf)
         difference, largest = np.abs(policy(self.observations) - expected), max(np.abs(expected).max(), 1e-30)
         lengths = [tensor.numel() for tensor in self.example]
-        # Not with states, whose errors of earlier steps are not known.
+        # Not with states: recurrent models have biases, so that typical observations give no tiny actions.
         if sum(lengths) == self.observations.shape[1]:
 
             def inputs(row: int) -> List[torch.Tensor]:

@@ -16,7 +16,7 @@ import torch
 
 from . import _actq, _sb3
 from ._actq import Error, Policy
-from ._functions import beyond
+from ._functions import HOPELESS, beyond
 from ._memory import changed_values, depends_on, kept_tensors, values_of, wrapped
 from ._typing import Array, Limits
 
@@ -184,7 +184,7 @@ class Source:
             return None
         # The module itself, from its own first states.
         actions = self.run(self.copied(), carried.plan, carried.plan["probes"])
-        return policy if share(carried.plan["actions"] - actions, actions) <= TOLERANCE else None
+        return policy if share(carried.beyond_functions(carried.plan, actions), actions) <= TOLERANCE else None
 
     def onnx_bytes(self) -> bytes:
         """Exports by the tracing exporter, which needs only torch, else by that of torch.export, which knows more
@@ -210,21 +210,12 @@ class Source:
     def run(self, module: Any, plan: Dict[str, Any], probes: Array) -> Array:
         """Runs a copy over observations [block, frame, value], with its states carried on; returns outputs [block, frame,
         value]. Those of a step that raises are not a number."""
-        positions = {name: i for i, name in enumerate(self.input_names)}
-        # A module that keeps its states by itself has no inputs for them.
-        carried = [(positions[of], self.output_names.index(to)) for of, to in plan["states"] if of in positions]
-        held = list(self.inputs)
-        for i, _ in carried:
-            held[i] = torch.zeros_like(held[i])
+        held = self.held(plan)
         rows: List[Array] = []
         failure: Optional[Exception] = None
-        for row in probes.reshape(-1, probes.shape[-1]):
-            self.observe(plan, row, held)
+        for row in torch.from_numpy(probes.reshape(-1, probes.shape[-1])):
             try:
-                outputs = self.outputs(module, held)
-                rows.append(outputs[self.action(plan)].reshape(-1).double().cpu().numpy())
-                for i, k in carried:
-                    held[i] = outputs[k].reshape(held[i].shape)
+                rows.append(self.step(module, plan, row, held).double().cpu().numpy())
             except Exception as error:
                 failure = error
                 rows.append(np.full(plan["actions"].shape[-1], np.nan))
@@ -234,13 +225,31 @@ class Source:
             raise Error(f"{self.name}: the length of the module's action depends on its observation")
         return np.stack(rows).reshape(*probes.shape[:2], -1)
 
-    def observe(self, plan: Dict[str, Any], row: Array, held: List[torch.Tensor]) -> None:
-        """Replaces the observed ones of a module's inputs."""
+    def held(self, plan: Dict[str, Any]) -> List[torch.Tensor]:
+        """Returns a module's inputs at the start of an episode: its states are 0."""
+        held = list(self.inputs)
+        for i, _ in self.carried(plan):
+            held[i] = torch.zeros_like(held[i])
+        return held
+
+    def carried(self, plan: Dict[str, Any]) -> List[Tuple[int, int]]:
+        """Returns the places of the states in the inputs and outputs. A module that keeps its states by itself has none."""
+        positions = {name: i for i, name in enumerate(self.input_names)}
+        return [(positions[of], self.output_names.index(to)) for of, to in plan["states"] if of in positions]
+
+    def step(self, module: Any, plan: Dict[str, Any], row: torch.Tensor, held: List[torch.Tensor]) -> torch.Tensor:
+        """Makes a step of a module at an observation [value]: replaces the observed ones of its inputs, then the states.
+        Returns the action [value]."""
         positions, at = {name: i for i, name in enumerate(self.input_names)}, 0
         for name, length in plan["inputs"]:
             i = positions.get(name, 0)
-            held[i] = torch.from_numpy(row[at : at + length].copy()).reshape(held[i].shape).to(held[i])
+            # The module may change it in place.
+            held[i] = row[at : at + length].clone().reshape(held[i].shape).to(held[i])
             at += length
+        outputs = self.outputs(module, held)
+        for i, k in self.carried(plan):
+            held[i] = outputs[k].reshape(held[i].shape)
+        return outputs[self.action(plan)].reshape(-1)
 
     def outputs(self, module: Any, inputs: Sequence[torch.Tensor]) -> List[torch.Tensor]:
         return [tensor for _, tensor in tensors(module(*inputs), "output", self.name)]
@@ -251,20 +260,19 @@ class Source:
 
     def beyond_functions(self, plan: Dict[str, Any], found: Array) -> Array:
         """Returns the differences [block, frame, value] of policy and module, less what the errors of actq's functions may
-        change. With states, the errors of earlier steps are not known, and nothing is allowed."""
-        difference = np.abs(plan["actions"] - found)
-        if plan["states"]:
-            return difference
-        module, values = self.copied(), found.shape[-1]
+        change: with states, also those of earlier steps."""
+        rows = torch.from_numpy(plan["probes"]).reshape(-1, plan["probes"].shape[-1])
+        episodes, module = rows[None] if plan["states"] else rows[:, None], self.copied()
 
-        def inputs(row: int) -> List[torch.Tensor]:
-            held = list(self.inputs)
-            self.observe(plan, plan["probes"].reshape(-1, plan["probes"].shape[-1])[row], held)
-            return held
+        def output(given: Sequence[torch.Tensor]) -> torch.Tensor:
+            held = self.held(plan)
+            return torch.cat([self.step(module, plan, row, held) for row in given[0]])
 
-        tolerance = np.broadcast_to(TOLERANCE * scale(found), found.shape).reshape(-1, values)
-        output = lambda given: self.outputs(module, given)[self.action(plan)]  # noqa: E731
-        return beyond(difference.reshape(-1, values), tolerance, output, inputs).reshape(found.shape)
+        tolerance = np.broadcast_to(TOLERANCE * scale(found), found.shape).reshape(len(episodes), -1)
+        difference = np.abs(plan["actions"] - found).reshape(len(episodes), -1)
+        # The gradients of an episode take a tenth of a second for each value.
+        hopeless = 1.0 if plan["states"] else HOPELESS
+        return beyond(difference, tolerance, output, lambda i: [episodes[i]], hopeless).reshape(found.shape)
 
     def compare(self, plan: Dict[str, Any], branches: Sequence[warnings.WarningMessage]) -> None:
         """Refuses a policy that differs from the module, with the cause."""
@@ -274,7 +282,8 @@ class Source:
         _sb3.refuse_other_actions(used, probes, self.name)
         changed = changed_values(self.copied(), used)
         error, difference = share(actions - found, found), np.abs(actions - found)
-        if error > TOLERANCE and not changed:
+        # Without states, what a module keeps is an error of its own.
+        if error > TOLERANCE and (plan["states"] or not changed):
             difference = self.beyond_functions(plan, found)
         traced = [warning for warning in branches if f"{torch.__path__[0]}/" not in warning.filename]
         if share(difference, found) > TOLERANCE and not self._is_rounding(plan, found, difference):
