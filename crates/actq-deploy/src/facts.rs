@@ -331,15 +331,7 @@ impl Facts {
         let profile = self.profile.clone();
         let (mut other, mut asked) = (Vec::new(), BTreeMap::<String, Vec<String>>::new());
         for document in documents {
-            if let Some(format) = &profile.format
-                && let Some(version) = document.peek(&format.key).and_then(Node::text)
-                && !format.read.iter().any(|read| read == version)
-            {
-                let (at, read) = (document.location(&format.key), format.read.join(", "));
-                let meaning =
-                    format!("{at} = {}: the rules were read in {read}; do they hold (\"holds\")?", printable(version));
-                self.confirmed("version", &meaning, "holds")?;
-            }
+            self.version(document)?;
             for path in document.unread(&profile.ignored) {
                 let node = document.peek(&path);
                 let says_nothing = |node: &Node| node.is_null() || node.text().is_none() && node.items().is_empty();
@@ -367,6 +359,24 @@ impl Facts {
             self.confirmed(&format!("unread.{name}"), &meaning, "unused")?;
         }
         Ok(other)
+    }
+
+    /// Asks for the version of a document, if it states one that the rules were not read in.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::unread`].
+    pub(crate) fn version(&mut self, document: &Document) -> Result<()> {
+        let Some(Format { key, read }) = self.profile.format.clone() else { return Ok(()) };
+        match document.peek(&key).and_then(Node::text) {
+            Some(version) if !read.iter().any(|read| read == version) => {
+                let (at, read) = (document.location(&key), read.join(", "));
+                let meaning =
+                    format!("{at} = {}: the rules were read in {read}; do they hold (\"holds\")?", printable(version));
+                self.confirmed("version", &meaning, "holds")
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Asks a question that has one answer.

@@ -76,7 +76,7 @@ impl Family for Lerobot {
         let network = graph.network(&features, frames, |feature| format!("{}_normalized", feature.plain()))?;
         graph.refuse_normalizers(bundle, &network, &normalizers, &reverse)?;
 
-        let training = Training::of(bundle, folder)?;
+        let training = Training::of(bundle, folder, facts)?;
         let mut parts = Parts::new("policy", training.rate(facts)?);
         let history = match frames {
             1 => None,

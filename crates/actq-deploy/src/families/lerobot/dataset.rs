@@ -20,8 +20,9 @@ pub(super) struct Training {
 }
 
 impl Training {
-    pub(super) fn of(bundle: &Bundle, folder: &str) -> Result<Self> {
+    pub(super) fn of(bundle: &Bundle, folder: &str, facts: &mut Facts) -> Result<Self> {
         let info = bundle.find(INFO)?.map(|file| Document::read(bundle, file)).transpose()?;
+        info.as_ref().map(|info| facts.version(info)).transpose()?;
         let config = join(folder, TRAINING);
         let config = bundle.has(&config).then(|| Document::read(bundle, &config)).transpose()?;
         Ok(Self { info, config })
