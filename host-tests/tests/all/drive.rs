@@ -364,7 +364,7 @@ fn eval_measures_on_the_images_own_path() -> Result<()> {
     succeeded(&fixture.run(line, b"")?)?;
     answered(&fixture.run("serve again.actq --record again.npz --policy policy", &input)?)?;
     let text = succeeded(&fixture.run(&format!("{line} --calib again.npz"), b"")?)?;
-    ensure!(text.contains("own-path nmse"), "{text}");
+    ensure!(text.contains("error on its own path"), "{text}");
     Ok(())
 }
 

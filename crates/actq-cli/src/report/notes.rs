@@ -130,26 +130,34 @@ pub(crate) fn targets_without_limits(limits: impl IntoIterator<Item = Option<[f3
 
 /// Formats the errors, a line for each.
 pub fn errors(check: &Check) -> String {
-    let learned = if check.learned { " that it learned from" } else { "" };
-    let others = match check.parts {
-        0 => " that it did not learn from".to_owned(),
-        1 => " that it did not learn from, a part of the calibration recording".to_owned(),
-        parts => format!(" that it did not learn from, {parts} parts of the calibration recording in turn"),
+    let calib = if check.learned { LEARNED } else { "error on the calibration frames" };
+    let parts = match check.parts {
+        0 => String::new(),
+        1 => ", a part of the calibration recording".to_owned(),
+        parts => format!(", {parts} parts of the calibration recording in turn"),
     };
     let of = |name: &str, checked: &Checked, which: &str| line(name, &checked.report, checked.recorded, which);
-    let calib = check.calib.as_ref().map_or(String::new(), |checked| of("calibration nmse", checked, learned));
-    let heldout = check.heldout.as_ref().map_or(String::new(), |checked| of("held-out nmse", checked, &others));
-    format!("{calib}{heldout}{:<17} {}\n", "activations", activation_share(&check.activations))
+    let calib = check.calib.as_ref().map_or(String::new(), |checked| of(calib, checked, ""));
+    let heldout = check.heldout.as_ref().map_or(String::new(), |checked| of(OTHERS, checked, &parts));
+    format!("{calib}{heldout}{}", named("activations", &activation_share(&check.activations)))
 }
+
+/// Names of the two errors.
+const LEARNED: &str = "error on frames it learned from";
+const OTHERS: &str = "error on frames it did not learn from";
 
 /// Formats the error on the image's own path.
 pub fn own_path(report: &ErrorReport) -> String {
-    line("own-path nmse", report, report.steps, "")
+    line("error on its own path", report, report.steps, "")
 }
 
 fn line(name: &str, report: &ErrorReport, recorded: usize, which: &str) -> String {
     let of = if recorded > report.steps { format!("{} of ", report.steps) } else { String::new() };
-    format!("{name:<17} {:.3e}   ({of}{}{which})\n", report.nmse, count(recorded, "observation"))
+    named(name, &format!("{:.3e} of the variance   ({of}{}{which})", report.nmse, count(recorded, "observation")))
+}
+
+fn named(name: &str, text: &str) -> String {
+    format!("{name:<width$}  {text}\n", width = OTHERS.len())
 }
 
 /// Returns all notes on the errors of an image made with `options`.
@@ -173,13 +181,13 @@ fn not_held_out(check: &Check, options: &Options) -> Option<String> {
     ))
 }
 
-/// Returns a warning if the held-out error is far above the calibration error.
+/// Returns a warning if the error on other frames is far above that on those that the image learned from.
 pub fn overfit_warning(check: &Check) -> Option<String> {
     let (heldout, calib) = (check.heldout.as_ref()?.report.nmse, check.calib.as_ref()?.report.nmse);
     (!check.outliers && heldout > OVERFIT_RATIO * calib && heldout > calib + OVERFIT_DIFFERENCE).then(|| {
         let frames = check.frames_to_record().map_or(String::new(), |frames| format!(", about {frames} steps in all"));
         format!(
-            "the held-out error is {:.1} times the calibration error: the image fits the calibration recording better than \
+            "the {OTHERS} is {:.1} times that on the calibration recording, which it fits better than \
              new observations; record more episodes, and more varied ones{frames}",
             heldout / calib
         )
@@ -313,7 +321,10 @@ mod tests {
     #[test]
     fn held_out_far_above_calibration_error_warns() {
         let warning = overfit_warning(&check(Some(0.002), 0.0084)).expect("a warning");
-        assert!(warning.starts_with("the held-out error is 4.2 times the calibration error: "), "{warning}");
+        assert!(
+            warning.starts_with("the error on frames it did not learn from is 4.2 times that on the calibration"),
+            "{warning}"
+        );
         // Less than three times; less than 0.002 above; no calibration recording.
         assert_eq!(overfit_warning(&Check { outliers: true, ..check(Some(0.002), 0.0084) }), None);
         for (calib, heldout) in [(Some(0.01), 0.029), (Some(1e-5), 0.002), (None, 0.5)] {
@@ -330,7 +341,10 @@ mod tests {
         for of in [check(Some(0.5), 0.09), check(None, 0.0), calib_only(0.1)] {
             assert_eq!(error_warning(&of, &options()), None, "{of:?}");
         }
-        assert!(errors(&calib_only(0.2)).starts_with("calibration nmse  2.000e-1"));
+        assert!(
+            errors(&calib_only(0.2))
+                .starts_with("error on frames it learned from        2.000e-1 of the variance   (7 of 30 obs")
+        );
     }
 
     #[test]
@@ -399,21 +413,21 @@ mod tests {
     fn the_summary_has_a_line_for_each_error() {
         assert_eq!(
             errors(&check(Some(0.002), 0.0084)),
-            "calibration nmse  2.000e-3   (7 of 30 observations that it learned from)\n\
-             held-out nmse     8.400e-3   (7 observations that it did not learn from)\n\
-             activations       12% of the error (int8; linear operations in int16: 0, 4)\n"
+            "error on frames it learned from        2.000e-3 of the variance   (7 of 30 observations)\n\
+             error on frames it did not learn from  8.400e-3 of the variance   (7 observations)\n\
+             activations                            12% of the error (int8; linear operations in int16: 0, 4)\n"
         );
         let mut one = check(None, 0.5);
         one.activations = ActivationShare { int16: Vec::new(), share: -0.01, ..one.activations };
         assert_eq!(
             errors(&one),
-            "held-out nmse     5.000e-1   (7 observations that it did not learn from)\n\
-             activations       -1% of the error (int8)\n"
+            "error on frames it did not learn from  5.000e-1 of the variance   (7 observations)\n\
+             activations                            -1% of the error (int8)\n"
         );
         one.parts = 5;
-        assert!(
-            errors(&one).contains("(7 observations that it did not learn from, 5 parts of the calibration recording")
-        );
+        assert!(errors(&one).contains("(7 observations, 5 parts of the calibration recording in turn)"));
+        let rounded = Check { learned: false, ..check(Some(0.002), 0.0084) };
+        assert!(errors(&rounded).starts_with("error on the calibration frames        2.000e-3"));
         one.activations.int16 = vec![0, 1, 2, 3, 4];
         assert_eq!(activation_share(&one.activations), "-1% of the error (int16)");
     }
