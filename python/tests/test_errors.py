@@ -243,7 +243,7 @@ env = gymnasium.vector.SyncVectorEnv([Env] * 3)
 @pytest.mark.parametrize(
     "call",
     [
-        "policy(obs.repeat(200_000, axis=0))",
+        "policy(obs.repeat(100_000, axis=0))",
         "image.report(recordings=[folder + '/obs.npy'])",
         "image.export_c(folder + '/c', golden=folder + '/obs.npy', steps=10**9)",
         "[head(100_000) for _ in range(10**6)]",
@@ -265,13 +265,13 @@ def test_ctrl_c_ends_a_rollout_within_a_second(tmp_path):
 
 def test_an_interrupted_export_writes_nothing(tmp_path):
     image, recording = wide_image(tmp_path), tmp_path / "obs.npy"
-    np.save(recording, np.random.default_rng(1).normal(size=(40_000, 64)).astype(np.float32))
+    np.save(recording, np.random.default_rng(1).normal(size=(10_000, 64)).astype(np.float32))
     began = time.monotonic()
     assert len(image.export_c(tmp_path / "whole", golden=recording, steps=10**9)) == 4
     whole = time.monotonic() - began
     # A process in the background ignores the signal.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    timer = threading.Timer(whole / 4, signal.raise_signal, [signal.SIGINT])
+    timer = threading.Timer(whole / 10, signal.raise_signal, [signal.SIGINT])
     try:
         timer.start()
         with pytest.raises(KeyboardInterrupt):
