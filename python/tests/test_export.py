@@ -176,9 +176,10 @@ def test_a_network_with_a_sampler_is_a_flow(tmp_path):
     graph = helper.make_graph(nodes, "flow", ports[:3], ports[3:], [weights])
     path = tmp_path / "flow.onnx"
     onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), path)
-    policy = actq.import_policy(path, sampler={"kind": "flow", "steps": 4})
+    flow = {"kind": "flow", "steps": 4, "time": {"from": 0, "to": 1}}
+    policy = actq.import_policy(path, sampler=flow)
     assert (policy.obs_len, policy.act_len) == (5, 2)
     assert actq.import_policy(path).obs_len == 8
-    for sampler, why in [({"kind": "flow", "steps": 4, "time_input": "time"}, "which is none of them"), ({"kind": 1}, "kind"), ({"steps": {1}}, "sampler")]:
+    for sampler, why in [({**flow, "time_input": "time"}, "none of them"), ({"kind": 1}, "kind"), ({"steps": {1}}, "sampler")]:
         with pytest.raises(actq.Error, match=why):
             actq.import_policy(path, sampler=sampler)

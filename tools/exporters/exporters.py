@@ -999,7 +999,7 @@ def transformers_of_lerobot():
                 return exported(network, example, ["x", "timestep", "conditioning"], "velocity", dynamo)
 
             kind = f"multi_task_dit, flow matching, {'rotary' if rope else 'learned'} positions"
-            sampler = {"kind": "flow", "steps": config.num_integration_steps}
+            sampler = {"kind": "flow", "steps": config.num_integration_steps, "time": {"from": 0, "to": 1}}
             row(kind, "dynamo" if dynamo else "traced", make, episode=episode, sampler=sampler)
 
 

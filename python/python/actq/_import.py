@@ -73,8 +73,9 @@ def import_policy(
         without limits.
     max_step: largest change from one action to the next, a number, or one for each. A bundle takes none.
     rate_hz: actions in a second. A policy folder and a bundle state theirs.
-    sampler: of an ONNX file with the network of a flow or a diffusion policy, its steps, as {"kind": "flow", "steps": 10}
-        (docs/POLICY.md, Flow and diffusion policies). The observation is the inputs but the time and the iterate.
+    sampler: of an ONNX file with the network of a flow or a diffusion policy, its steps, as {"kind": "flow", "steps": 10,
+        "time": {"from": 0, "to": 1}} (docs/POLICY.md, Flow and diffusion policies). The observation is the inputs but the
+        time and the iterate.
 
     Of ONNX and modules, the log `actq` has the inputs in order, the output, and what is left out (level INFO).
 

@@ -30,8 +30,8 @@ pub(crate) struct ImportArgs {
     #[arg(long, value_name = "NAME")]
     pub(crate) observe: Vec<String>,
     /// The file has the network of a flow or a diffusion policy, which makes actions from noise: a JSON file of its steps,
-    /// as {"kind": "flow", "steps": 10} (docs/POLICY.md). The time and the iterate are the inputs of one value and of the
-    /// output's shape, or those that the keys time_input and iterate_input name
+    /// as {"kind": "flow", "steps": 10, "time": {"from": 0, "to": 1}} (docs/POLICY.md). The time and the iterate are the inputs
+    /// of one value and of the output's length, or those that the keys time_input and iterate_input name
     #[arg(long, value_name = "FILE.json")]
     pub(crate) sampler: Option<PathBuf>,
     /// Actions in a second

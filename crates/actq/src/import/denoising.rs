@@ -145,18 +145,30 @@ impl Sampler {
     ///
     /// # Errors
     ///
-    /// For another kind, an unknown key, or one of the wrong type.
+    /// For another kind, an unknown key, one of the wrong type, or without a key in which packages differ.
     pub fn parse(bytes: &[u8]) -> Result<Self> {
         /// Keys beside those of denoising steps. The network itself has the time's features and the normalization.
         const OWN: [&str; 4] = ["kind", "execute", "iterate_input", "time_input"];
+        /// Keys without a default, by kind.
+        const STATED: [(&str, &[&str]); 2] = [
+            ("flow", &["steps", "time"]),
+            ("diffusion", &["train_steps", "schedule", "solver", "prediction", "clip_sample"]),
+        ];
         let Value::Object(mut object) = strict_json::parse(bytes).context("not a JSON object")? else {
             bail!("not a JSON object");
         };
-        object.retain(|_, value| !value.is_null());
         let known = || OWN.iter().chain(&KEYS).copied().filter(|key| *key != "obs_norm");
         if let Some(key) = object.keys().find(|key| !known().any(|known| known == *key)) {
             bail!("the key {key:?} is not known; the keys are {}", known().collect::<Vec<_>>().join(", "));
         }
+        for (of_kind, keys) in STATED {
+            let missing =
+                |key: &&&str| object.get("kind").is_some_and(|kind| kind == of_kind) && !object.contains_key(**key);
+            if let Some(key) = keys.iter().find(missing) {
+                bail!("the key {key:?} is missing, in which packages differ (null: none)");
+            }
+        }
+        object.retain(|_, value| !value.is_null());
         let [of_kind, execute, iterate, time] = OWN.map(|key| object.remove(key));
         let text = |key: &str, value: Option<Value>| match value {
             None => Ok(None),
@@ -167,6 +179,10 @@ impl Sampler {
         ensure!(["flow", "diffusion"].contains(&&*of_kind), "kind is {of_kind:?}; it must be flow or diffusion");
         let mut steps: JsonDenoising = serde_json::from_value(Value::Object(object))?;
         let of_time = steps.time.take().unwrap_or_default();
+        ensure!(
+            of_kind != "flow" || of_time.from.is_some() && of_time.to.is_some(),
+            "time needs from and to, as packages differ: the time at the noise, and at the actions"
+        );
         ensure!(
             of_time.freq.is_none() && of_time.order.is_none() && of_time.turns.is_none(),
             "time takes from and to alone: the network computes its features of the time"

@@ -366,8 +366,9 @@ fn check_runs_the_steps_of_a_sampler() -> Result<()> {
     let dir = TempDir::new()?;
     let [model, out, sampler] = ["model.onnx", "policy", "sampler.json"].map(|name| dir.path().join(name));
     fs::write(&model, super::denoiser::network())?;
-    let diffusion = r#"{"kind": "diffusion", "train_steps": 20, "steps": 4, "schedule": "cosine", "clip_sample": 1}"#;
-    for steps in [r#"{"kind": "flow", "steps": 5, "solver": "midpoint"}"#, diffusion] {
+    let diffusion = r#"{"kind": "diffusion", "train_steps": 20, "steps": 4, "schedule": "cosine", "solver": "ddpm",
+        "prediction": "epsilon", "clip_sample": 1}"#;
+    for steps in [r#"{"kind": "flow", "steps": 5, "solver": "midpoint", "time": {"from": 1, "to": 0}}"#, diffusion] {
         fs::write(&sampler, steps)?;
         let import = ["import", text(&model), "--out", text(&out), "--force", "--check", "--sampler", text(&sampler)];
         let printed = succeeded(&actq(&import).env("ACTQ_PYTHON", &python).output()?)?;

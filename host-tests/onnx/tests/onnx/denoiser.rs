@@ -90,7 +90,8 @@ fn a_flow_adds_the_networks_outputs() -> Result<()> {
 
 #[test]
 fn a_diffusion_policy_reads_the_training_step() -> Result<()> {
-    let sampler = r#"{"kind": "diffusion", "train_steps": 10, "steps": 2, "schedule": "cosine", "solver": "ddim", "time_input": "timestep"}"#;
+    let sampler = r#"{"kind": "diffusion", "train_steps": 10, "steps": 2, "schedule": "cosine", "solver": "ddim", "prediction": "epsilon",
+        "clip_sample": null, "time_input": "timestep"}"#;
     let (found, policy) = imported(&network(), &with(sampler)?)?;
     ensure!(found.denoiser.as_ref().is_some_and(|denoiser| denoiser.times == [5.0, 0.0]), "{:?}", found.denoiser);
     let steps = policy.graph.denoising.as_ref().context("no steps")?.steps.clone();
@@ -115,13 +116,21 @@ fn what_a_sampler_does_not_fit_is_refused_by_name() -> Result<()> {
     for (sampler, expected) in [
         (r#"{"kind": "step"}"#, r#"kind is "step"; it must be flow or diffusion"#),
         (r#"{"kind": "flow", "steps": 5, "step": 5}"#, r#"the key "step" is not known; the keys are kind, execute"#),
-        (r#"{"kind": "flow"}"#, "kind flow needs the key steps"),
-        (r#"{"kind": "flow", "steps": 5, "time": {"freq": "f"}}"#, "time takes from and to alone"),
+        (r#"{"kind": "flow", "time": {}}"#, r#"the key "steps" is missing"#),
+        (r#"{"kind": "flow", "steps": 5, "time": {"to": 1}}"#, "time needs from and to"),
+        (r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1, "freq": "f"}}"#, "time takes from and to alone"),
         (
-            r#"{"kind": "flow", "steps": 5, "time_input": "t"}"#,
+            r#"{"kind": "diffusion", "train_steps": 9, "schedule": "linear", "solver": "ddim", "prediction": "v"}"#,
+            r#"the key "clip_sample" is missing"#,
+        ),
+        (
+            r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "time_input": "t"}"#,
             r#"the sampler's time_input names "t", which is none of them"#,
         ),
-        (r#"{"kind": "flow", "steps": 5, "time_input": "state"}"#, r#"time_input "state" has the shape"#),
+        (
+            r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "time_input": "state"}"#,
+            r#"time_input "state" has the shape"#,
+        ),
     ] {
         let error = format!("{:#}", import(sampler).expect_err(expected));
         ensure!(error.contains(expected), "{error} instead of {expected}");
@@ -132,9 +141,13 @@ fn what_a_sampler_does_not_fit_is_refused_by_name() -> Result<()> {
     file.input("time", &[1, 1]);
     file.write(&[], "velocity := MatMul(Tanh(Concat(a, b, time, axis=1)), drawn(5, 2))");
     file.output("velocity", &[1, 2]);
-    let error = format!("{:#}", imported(&file.bytes(), &with(r#"{"kind": "flow", "steps": 5}"#)?).expect_err("two"));
+    let error = format!(
+        "{:#}",
+        imported(&file.bytes(), &with(r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}}"#)?)
+            .expect_err("two")
+    );
     ensure!(error.contains("the sampler's iterate_input is missing, and may be a, b"), "{error}");
-    let named = with(r#"{"kind": "flow", "steps": 5, "iterate_input": "b"}"#)?;
+    let named = with(r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "iterate_input": "b"}"#)?;
     let (found, _) = imported(&file.bytes(), &named)?;
     ensure!(found.inputs == [("a".to_owned(), 2)], "{:?}", found.inputs);
     Ok(())
