@@ -60,7 +60,8 @@ def row(kind, form, make, act=None, width=OBS, discrete=False, episode=None, tol
     try:
         policy = actq.import_policy(source, **options)
     except actq.Error as error:
-        return outcome(kind, form, f"{'asks' if 'open; write answers' in str(error) else 'refused'}: {short(error)}")
+        asks = re.search(r" leaves \d+ questions? open; ", str(error))
+        return outcome(kind, form, f"{'asks' if asks else 'refused'}: {one_line(str(error))}")
     rows = observations(policy.obs_len) if rows is None else np.asarray(rows, np.float32)
     try:
         expected = run_file(source, rows, policy) if expected is None else expected
@@ -80,10 +81,15 @@ def outcome(kind, form, text, error=""):
 
 
 def short(error):
-    """The first cause in one line, without what differs from run to run."""
+    """The first cause in one line."""
     while error.__cause__ is not None:
         error = error.__cause__
-    text = " ".join(str(error).split()) or type(error).__name__
+    return one_line(str(error) or type(error).__name__)
+
+
+def one_line(text):
+    """Text in one line, without what differs from run to run."""
+    text = " ".join(text.split())
     for place in (tempfile.gettempdir(), os.getcwd(), sys.prefix):
         text = text.replace(place + "/", "")
     # Of an error of the tracing exporter, what follows are places.
@@ -1167,9 +1173,12 @@ def holosoma():
     from types import SimpleNamespace as Stub
 
     from holosoma.config_values.loco.g1.observation import g1_29dof_loco_single_wolinvel as preset
+    from holosoma.config_types.experiment import ExperimentConfig
     from holosoma.config_values.robot import g1_29dof as robot
     from holosoma.managers.observation.manager import ObservationManager
-    from holosoma.utils.inference_helpers import attach_onnx_metadata, export_policy_as_onnx, get_control_gains_from_config
+    from holosoma.utils.inference_helpers import (
+        attach_onnx_metadata, export_policy_as_onnx, get_control_gains_from_config, get_urdf_text_from_robot_config,
+    )  # fmt: skip
     from holosoma.utils.safe_torch_import import torch
 
     names = list(robot.dof_names)
@@ -1209,9 +1218,12 @@ def holosoma():
             path = str(folder("holosoma") / "policy.onnx")
             export_policy_as_onnx(network, path, {"actor_obs": torch.zeros(1, length)})
             stiffness, damping = get_control_gains_from_config(robot)
+            urdf, text = get_urdf_text_from_robot_config(robot)
+            # As its PPO and its checkpoints do (agents/ppo/ppo.py:744-756, agents/base_algo).
             attach_onnx_metadata(path, {
                 "dof_names": names, "kp": stiffness, "kd": damping, "action_scale": scale, "command_ranges": {"lin_vel_x": [-1, 1]},
-                "observation_layout": layout, "observation_clip": cfg.clip_observations,
+                "robot_urdf": text, "robot_urdf_path": urdf, "observation_layout": layout, "observation_clip": cfg.clip_observations,
+                "experiment_config": ExperimentConfig(robot=robot).to_serializable_dict(), "iteration": 7,
             })  # fmt: skip
             made[:] = [manager, network, layout]
             return path

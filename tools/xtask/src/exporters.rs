@@ -30,7 +30,8 @@ const PACKAGES: [Package; 18] = [
     ("tianshou", &["tianshou==2.0.0"], &[]),
     ("torchao", &["torchao==0.18.0"], &[]),
     ("keras", &["keras==3.15.0"], &[]),
-    ("jax2onnx", &["jax2onnx==0.17.0", "flax==0.12.8"], &[]),
+    // flax 0.12.8 cannot be imported with later releases of jax, which it allows.
+    ("jax2onnx", &["jax2onnx==0.17.0", "flax==0.12.8", "jax==0.10.2", "jaxlib==0.10.2"], &[]),
     ("onnxruntime", &[], &[]),
     ("optimizers", &["onnxslim==0.1.98", "onnxsim==0.8.1", "onnxoptimizer==0.4.2"], &[]),
     ("lerobot", LEROBOT, &["lerobot==0.6.1"]),
