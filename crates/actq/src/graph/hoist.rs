@@ -2,13 +2,13 @@
 //!
 //! Values that depend on the time alone become a table, since the steps are known when the image is built. Values that
 //! depend on the observation alone are computed once per output. A linear layer over several of these,
-//! concatenated, is split into their columns.
+//! concatenated, is split into their columns, and a function of them into functions of each.
 
 use ndarray::Array2;
 
 use super::denoising::Denoising;
 use super::nodes::{Graph, Node};
-use super::ops::{Add, Concat, Iterate, Linear, NodeKind, Span, Table};
+use super::ops::{Add, Concat, Iterate, Linear, NodeKind, Pointwise, Span, Table};
 use super::run::Network;
 use super::values::{ValueId, WeightMatrix};
 use super::weights::{Weights, zero_state};
@@ -46,6 +46,7 @@ pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denois
     ensure!(flat.state_len() == 0, "a recurrent network cannot be the head of a flow or a diffusion policy");
     let out = flat.len_of(flat.output());
     ensure!(out == steps.len, "the last op gives {out} values, but the iterate has {}", steps.len);
+    let flat = &with_functions_apart(flat, obs_len, time_len)?;
     // The observation does not affect values that depend on the time alone.
     let rows = Array2::from_shape_fn((times.len(), flat.obs_len), |(k, i)| {
         times[k].get(i.wrapping_sub(obs_len)).copied().unwrap_or(0.0)
@@ -70,6 +71,42 @@ pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denois
     let mut graph = hoist.graph;
     graph.denoising = Some(Denoising { first, ..steps });
     Ok(graph)
+}
+
+/// Returns the network with a function of each part of a concatenation, if the parts differ in dependence.
+fn with_functions_apart(flat: &Graph, obs_len: usize, time_len: usize) -> Result<Graph> {
+    let needs = needs(flat, obs_len, time_len)?;
+    let of_part = |(value, span): &(ValueId, Span)| match value {
+        0 => of_input(span, obs_len, time_len).unwrap_or(Needs::Step),
+        value => needs[*value],
+    };
+    let mut graph = Graph { nodes: Vec::new(), ..flat.clone() };
+    let mut places = vec![0];
+    for node in &flat.nodes {
+        let parts = concatenated(flat, node).unwrap_or_default();
+        let runs: Vec<_> = parts.chunk_by(|a, b| of_part(a) == of_part(b)).collect();
+        let place = match &node.kind {
+            NodeKind::Pointwise(Pointwise(function)) if runs.len() > 1 => {
+                let mut results = Vec::new();
+                for run in runs {
+                    let part = graph.join(run.iter().map(|(value, span)| (places[*value], *span)).collect())?;
+                    let result = graph.add(Pointwise(*function), &[part])?;
+                    results.push((result, Span { from: 0, len: graph.len_of(result) }));
+                }
+                graph.join(results)?
+            }
+            kind => graph.add(kind.clone(), &node.inputs.iter().map(|&value| places[value]).collect::<Vec<_>>())?,
+        };
+        places.push(place);
+    }
+    Ok(graph)
+}
+
+/// Returns the parts of the concatenation that a node reads; `None` if it reads no concatenation.
+fn concatenated(flat: &Graph, node: &Node) -> Option<Vec<(ValueId, Span)>> {
+    let input = &flat.nodes[node.inputs.first()?.checked_sub(1)?];
+    let NodeKind::Concat(Concat(spans)) = &input.kind else { return None };
+    Some(input.inputs.iter().copied().zip(spans.iter().copied()).collect())
 }
 
 /// Returns the dependence of every value; the observation of the flat network, which holds all three parts, counts as
@@ -187,10 +224,8 @@ impl Hoist<'_> {
     #[expect(clippy::type_complexity, reason = "the line above names the parts")]
     fn split_layer<'n>(&self, node: &'n Node) -> Option<(&'n Linear, Vec<(ValueId, Span, Needs)>)> {
         let NodeKind::Linear(linear) = &node.kind else { return None };
-        let input = node.inputs.first()?.checked_sub(1)?;
-        let NodeKind::Concat(Concat(spans)) = &self.flat.nodes[input].kind else { return None };
-        let parts = self.flat.nodes[input].inputs.iter().zip(spans);
-        let parts: Vec<_> = parts.map(|(&value, span)| (value, *span, self.needs_of(value, span))).collect();
+        let parts = concatenated(self.flat, node)?.into_iter();
+        let parts: Vec<_> = parts.map(|(value, span)| (value, span, self.needs_of(value, &span))).collect();
         let first = parts.first()?.2;
         parts.iter().any(|(.., needs)| *needs != first).then_some((linear, parts))
     }

@@ -1,5 +1,6 @@
 //! Networks of flow and diffusion policies, with the steps of a sampler.
 
+use actq::graph::Node;
 use actq::import::Sampler;
 use actq::measure::actions::actions;
 use actq::policy::Policy;
@@ -23,7 +24,7 @@ pub(super) fn network() -> Vec<u8> {
         &[],
         "t = Reshape(timestep, [1, 1]) * [3.0, 7.0]
          features = Concat(Sin(t), Cos(t), state, axis=1)
-         shift = Reshape(Sigmoid(gemm(features, 6, 7)), [1, 1, 6])
+         shift = Reshape(gemm(Tanh(features), 6, 7), [1, 1, 6])
          h = LayerNormalization(MatMul(noisy, drawn(2, 6)) + drawn(4, 6), full(1.0, 6), full(0.0, 6), axis=-1) * shift
          q = MatMul(h, drawn(6, 6))
          k = MatMul(h, drawn(6, 6))
@@ -85,6 +86,19 @@ fn a_flow_adds_the_networks_outputs() -> Result<()> {
         });
         compare(&expected.collect::<Vec<Vec<f32>>>(), &actions(&policy, &rows))?;
     }
+    Ok(())
+}
+
+/// The layer over a function of time and observation is a table, and a layer of the observation that runs once.
+#[test]
+fn what_does_not_change_in_a_chunk_is_computed_once() -> Result<()> {
+    let (_, policy) = imported(&network(), &with(r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}}"#)?)?;
+    let first = policy.graph.denoising.as_ref().context("no steps")?.first;
+    let reads_observation = |node: &Node| node.inputs.contains(&0);
+    ensure!(policy.graph.nodes[..first].iter().any(reads_observation), "{:?}", policy.graph.nodes);
+    ensure!(!policy.graph.nodes[first..].iter().any(reads_observation), "{:?}", policy.graph.nodes);
+    let columns = policy.graph.matrices.iter().map(|matrix| matrix.cols).collect::<Vec<_>>();
+    ensure!(columns.contains(&OBS) && !columns.contains(&(4 + OBS)), "{columns:?}");
     Ok(())
 }
 
