@@ -25,7 +25,7 @@ pub(crate) fn run(args: &ExportCArgs) -> Result<()> {
     print(&format!("{}\n", list.join("\n")))
 }
 
-/// Returns the source code of C of an image of these `bytes`, for [`write`] into `folder`. `golden` is a recording, and
+/// Returns the source code of C of an image of these `bytes`, for [`write()`] into `folder`. `golden` is a recording, and
 /// the most steps of it to run.
 ///
 /// # Errors

@@ -39,9 +39,10 @@ fn every_board_is_linked_with_its_own_memory() -> Result<()> {
         let code = file.sections().filter(|section| section.kind() == object::SectionKind::Text).map(|s| s.address());
         let vectors = file.section_by_name(".vector_table").map(|section| section.address());
         assert_eq!(vectors.or(code.min()), Some(program), "{target:?}: not the program memory of {}", board.memory);
+        let end = regions.get("STACK").unwrap_or(ram).end;
         let stack = file.symbols().find(|symbol| symbol.name() == Ok("_stack_start")).map(|symbol| symbol.address());
-        assert_eq!(stack, Some(ram.end), "{target:?}: not the RAM of {}", board.memory);
-        scripts.insert(board.memory, (program, ram.end));
+        assert_eq!(stack, Some(end), "{target:?}: not the stack of {}", board.memory);
+        scripts.insert(board.memory, (program, end));
     }
     let mut memories: Vec<_> = scripts.values().collect();
     memories.sort();
