@@ -46,7 +46,7 @@ pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denois
     ensure!(flat.state_len() == 0, "a recurrent network cannot be the head of a flow or a diffusion policy");
     let out = flat.len_of(flat.output());
     ensure!(out == steps.len, "the last op gives {out} values, but the iterate has {}", steps.len);
-    let flat = &with_functions_apart(flat, obs_len, time_len)?;
+    let flat = &with_functions_apart(flat, obs_len, time_len, times.len())?;
     // The observation does not affect values that depend on the time alone.
     let rows = Array2::from_shape_fn((times.len(), flat.obs_len), |(k, i)| {
         times[k].get(i.wrapping_sub(obs_len)).copied().unwrap_or(0.0)
@@ -73,8 +73,13 @@ pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denois
     Ok(graph)
 }
 
-/// Returns the network with a function of each part of a concatenation, if the parts differ in dependence.
-fn with_functions_apart(flat: &Graph, obs_len: usize, time_len: usize) -> Result<Graph> {
+/// Bits of a value in a table, and of a weight that it takes the place of.
+const TABLE_BITS: usize = 32;
+const WEIGHT_BITS: usize = 3;
+
+/// Returns the network with a function of each part of a concatenation, if the parts differ in dependence, and if a table
+/// over the `times` is no longer than the weights of a layer that reads the time's part.
+fn with_functions_apart(flat: &Graph, obs_len: usize, time_len: usize, times: usize) -> Result<Graph> {
     let needs = needs(flat, obs_len, time_len)?;
     let of_part = |(value, span): &(ValueId, Span)| match value {
         0 => of_input(span, obs_len, time_len).unwrap_or(Needs::Step),
@@ -85,8 +90,10 @@ fn with_functions_apart(flat: &Graph, obs_len: usize, time_len: usize) -> Result
     for node in &flat.nodes {
         let parts = concatenated(flat, node).unwrap_or_default();
         let runs: Vec<_> = parts.chunk_by(|a, b| of_part(a) == of_part(b)).collect();
+        let of_time: usize = parts.iter().filter(|part| of_part(part) == Needs::Time).map(|(_, span)| span.len).sum();
+        let is_apart = runs.len() > 1 && (of_time == 0 || TABLE_BITS * times <= WEIGHT_BITS * of_time);
         let place = match &node.kind {
-            NodeKind::Pointwise(Pointwise(function)) if runs.len() > 1 => {
+            NodeKind::Pointwise(Pointwise(function)) if is_apart => {
                 let mut results = Vec::new();
                 for run in runs {
                     let part = graph.join(run.iter().map(|(value, span)| (places[*value], *span)).collect())?;
