@@ -108,10 +108,7 @@ def main():
     if not set(outputs) <= set(given):
         raise ValueError(f"{plan['output']} is a value inside the file, not an output; leave out --check")
     width, sampler = sum(length for _, length in plan["inputs"]), plan["sampler"]
-    noise = 0
-    if sampler:
-        draws = 1 + len(sampler["steps"]) if any(by[5] for by in sampler["steps"]) else 1
-        noise = draws * sampler["values"]
+    noise = sampler["noise"] if sampler else 0
     for row in numpy.frombuffer(sys.stdin.buffer.read(), "<f4").reshape(-1, width + noise):
         at = 0
         for name, length in plan["inputs"]:

@@ -116,8 +116,8 @@ fn run(
         let steps: Vec<_> = denoising.steps.iter().map(|by| by.to_array()).collect();
         let limit = |limit: f64| limit.is_finite().then_some(limit);
         serde_json::json!({
-            "iterate": inputs.iterate, "time": inputs.time, "times": inputs.times, "steps": steps, "values": denoising.len,
-            "limit": limit(denoising.limit.into()), "clip_iterate": inputs.clip_iterate,
+            "iterate": inputs.iterate, "time": inputs.time, "times": inputs.times, "steps": steps,
+            "values": denoising.len, "noise": denoising.noise_len(), "limit": limit(denoising.limit.into()), "clip_iterate": inputs.clip_iterate,
         })
     });
     let plan = serde_json::json!({

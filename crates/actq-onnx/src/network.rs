@@ -237,10 +237,12 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         None => None,
     };
     // Its name may be the output's, as that of a state.
-    let iterate = places.map(|places| model.graph.inputs[places.iterate].name.clone());
-    let known = [&options.observed[..], iterate.as_slice()].concat();
-    let observed = observed_inputs(&graph, &live, &pairs, &ImportOptions { observed: known, ..options.clone() })?;
-    let observed = places.map_or(observed.clone(), |places| places.order(&observed));
+    let mut known = options.clone();
+    known.observed.extend(places.map(|places| model.graph.inputs[places.iterate].name.clone()));
+    let mut observed = observed_inputs(&graph, read.clone(), &pairs, &known)?;
+    if let Some(places) = places {
+        observed = places.order(&observed);
+    }
     let mut observation = Observation::of(model, &exprs, &live, &observed);
     let slots = match places {
         Some(_) => observation.of_denoiser()?,

@@ -55,7 +55,7 @@ impl Places {
 fn one(ports: &[Port], read: &[usize], (key, name): (&str, Option<&str>), len: usize) -> Result<usize> {
     let is_it = |i: &&usize| name.map_or(ports[**i].len() == Some(len), |name| ports[**i].name == name);
     let found: Vec<usize> = read.iter().filter(is_it).copied().collect();
-    let names = |which: &[usize]| listed(&which.iter().map(|i| ports[*i].clone()).collect::<Vec<_>>());
+    let names = |which: &[usize]| listed(which.iter().map(|i| &ports[*i]));
     let &[found] = &found[..] else {
         let why = match (name, &found[..]) {
             (Some(name), _) => format!("names {:?}, which is none of them", printable(name)),

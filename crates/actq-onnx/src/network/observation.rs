@@ -57,14 +57,13 @@ pub(super) fn read_inputs(exprs: &Exprs, live: &[Id]) -> Vec<usize> {
     read
 }
 
-/// Returns the indices of the inputs that the action depends on, except states. Refuses an action without any.
+/// Returns the inputs that the action `read`s, by their indices, except states. Refuses an action without any.
 pub(super) fn observed_inputs(
     graph: &Chosen<'_>,
-    live: &[Id],
+    mut read: Vec<usize>,
     pairs: &Pairs,
     options: &ImportOptions,
 ) -> Result<Vec<usize>> {
-    let mut read = read_inputs(graph.exprs, live);
     if !options.is_fed {
         graph.refuse_lost_states(&read, pairs, &options.states, &options.observed)?;
     }

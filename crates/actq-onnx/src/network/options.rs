@@ -35,7 +35,7 @@ pub struct ImportOptions {
 impl ImportOptions {
     /// Fails for names that the file does not have.
     pub(super) fn check(&self, graph: &Graph) -> Result<()> {
-        let outputs = || format!("its outputs are {}", listed(&graph.outputs));
+        let outputs = || format!("its outputs are {}", listed(graph.outputs.iter()));
         if let Some(name) = &self.output {
             let gives =
                 graph.nodes.iter().flat_map(|node| &node.outputs).chain(graph.outputs.iter().map(|port| &port.name));
@@ -51,7 +51,7 @@ impl ImportOptions {
                 graph.inputs.iter().any(|port| port.name == *name),
                 "--observe {}: the file has no input of this name; its inputs are {}",
                 printable(name),
-                listed(&graph.inputs)
+                listed(graph.inputs.iter())
             );
         }
         for (from, to) in &self.states {
@@ -60,7 +60,7 @@ impl ImportOptions {
             ensure!(
                 graph.inputs.iter().any(|port| port.name == *from),
                 "--state {state}: the file has no input {from_name:?}; its inputs are {}",
-                listed(&graph.inputs)
+                listed(graph.inputs.iter())
             );
             ensure!(
                 graph.outputs.iter().any(|port| port.name == *to),
@@ -73,8 +73,9 @@ impl ImportOptions {
 }
 
 /// Lists names for a message.
-pub(super) fn listed(ports: &[Port]) -> String {
-    let names: Vec<_> = ports.iter().take(MAX_LISTED).map(|port| printable(&port.name)).collect();
-    let more = ports.len() - names.len();
+pub(super) fn listed<'p>(ports: impl ExactSizeIterator<Item = &'p Port>) -> String {
+    let count = ports.len();
+    let names: Vec<_> = ports.take(MAX_LISTED).map(|port| printable(&port.name)).collect();
+    let more = count - names.len();
     names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }

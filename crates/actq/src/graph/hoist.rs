@@ -81,10 +81,7 @@ const WEIGHT_BITS: usize = 3;
 /// over the `times` is no longer than the weights of a layer that reads the time's part.
 fn with_functions_apart(flat: &Graph, obs_len: usize, time_len: usize, times: usize) -> Result<Graph> {
     let needs = needs(flat, obs_len, time_len)?;
-    let of_part = |(value, span): &(ValueId, Span)| match value {
-        0 => of_input(span, obs_len, time_len).unwrap_or(Needs::Step),
-        value => needs[*value],
-    };
+    let of_part = |(value, span): &(ValueId, Span)| needs_of(&needs, *value, span, obs_len, time_len);
     let mut graph = Graph { nodes: Vec::new(), ..flat.clone() };
     let mut places = vec![0];
     for node in &flat.nodes {
@@ -137,6 +134,11 @@ fn needs(flat: &Graph, obs_len: usize, time_len: usize) -> Result<Vec<Needs>> {
         needs.push(of.into_iter().reduce(Needs::with).unwrap_or(Needs::Step));
     }
     Ok(needs)
+}
+
+/// Returns the dependence of a part of a value.
+fn needs_of(needs: &[Needs], value: ValueId, span: &Span, obs_len: usize, time_len: usize) -> Needs {
+    if value == 0 { of_input(span, obs_len, time_len).unwrap_or(Needs::Step) } else { needs[value] }
 }
 
 /// Returns the part of the flat network's input that a span is in.
@@ -239,7 +241,7 @@ impl Hoist<'_> {
 
     fn needs_of(&self, value: ValueId, span: &Span) -> Needs {
         let [obs, time, _] = &self.spans;
-        if value == 0 { of_input(span, obs.len(), time.len()).unwrap_or(Needs::Step) } else { self.needs[value] }
+        needs_of(&self.needs, value, span, obs.len(), time.len())
     }
 
     /// Returns the time's share of a split layer, with its biases; `None` if it has none.

@@ -125,7 +125,7 @@ pub(super) struct Schedule {
     pub(super) times: Vec<f64>,
 }
 
-/// How the network of another file is run: its denoising steps, in the keys of `policy.json`, and the names of its inputs.
+/// The sampler of a network in another file: its denoising steps, in the keys of `policy.json`, and the names of its inputs.
 #[derive(Clone, Debug)]
 pub struct Sampler {
     /// `flow` or `diffusion`.

@@ -160,7 +160,7 @@ impl Rig {
         let mut begun = Instant::now();
         while self.status.state != State::Disarmed {
             self.listen()?;
-            self.require_recent(begun, "did not report that it is disarmed")?;
+            self.require_progress(begun, "did not report that it is disarmed")?;
         }
         // A report in each tick gives exact times, and keeps QEMU busy.
         self.client.set(Parameter::StatusPeriod, 0, if exact { 1.0 } else { REPORT_PERIOD })?;
@@ -169,7 +169,7 @@ impl Rig {
         while self.status.state != State::Armed {
             self.exchange()?;
             self.supervise()?;
-            self.require_recent(begun, "did not arm")?;
+            self.require_progress(begun, "did not arm")?;
         }
         self.reaction = None;
         self.disturbed = false;
@@ -198,13 +198,13 @@ impl Rig {
                 break;
             }
             self.listen()?;
-            self.require_recent(begun, "was silent")?;
+            self.require_progress(begun, "was silent")?;
         }
         Ok(())
     }
 
     /// Fails if the controller has not done in time what it should have done since `begun`.
-    fn require_recent(&self, begun: Instant, why: &str) -> Result<()> {
+    fn require_progress(&self, begun: Instant, why: &str) -> Result<()> {
         ensure!(begun.elapsed() < HANG_TIMEOUT, "the controller {why} for {HANG_TIMEOUT:?}: {:?}", self.status);
         Ok(())
     }
