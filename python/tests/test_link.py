@@ -93,7 +93,14 @@ def test_the_listing_of_the_document_runs(port):
     observation = np.ones(image.obs_len, dtype=np.float32)
     names = {"actq": actq, "image": image, "observation": observation}
     listing = listings("PYTHON")[-1].replace('"/dev/ttyACM0"', f'"{port}", timeout=60')
-    exec(compile(listing, "PYTHON", "exec"), names)
+    for _ in range(10):
+        try:
+            exec(compile(listing, "PYTHON", "exec"), names)
+            break
+        except actq.Error as error:
+            # On a machine so busy that the observation came too late, and was refused.
+            if "no action" not in str(error):
+                raise
     assert names["action"].tobytes() == actq.Head(image)(observation).tobytes()
 
 
