@@ -1,5 +1,6 @@
 //! The bytes of an image, from a quantized network.
 
+mod copies;
 mod lower;
 mod raw_values;
 mod repack;

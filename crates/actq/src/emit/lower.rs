@@ -9,6 +9,7 @@
 use actq_kernels::activations::max_prepared_words;
 use actq_kernels::image::{OpKind, Region, kept_words};
 
+use super::copies::{Copies, Steps};
 use crate::around::{Around, OUTPUT};
 use crate::error::{Result, ensure};
 use crate::graph::ValueId;
@@ -127,6 +128,12 @@ struct Placement {
     end: usize,
 }
 
+impl Placement {
+    fn region(&self, slice: Slice) -> Region {
+        Region { offset: self.offsets[slice.buffer] + slice.offset, len: slice.len }
+    }
+}
+
 impl Arena {
     /// Assigns every buffer its offset. What is in `output` is read after the last operation, and by later steps of a
     /// chunk.
@@ -138,18 +145,19 @@ impl Arena {
         act_len: usize,
     ) -> Result<Program> {
         self.lowering.buffers[output.buffer].lifetime = Lifetime::Output;
-        let Lowering { steps, buffers, .. } = &self.lowering;
-        let Placement { offsets, state_len, end } = self.place();
-        let action = Region { offset: end, len: act_len };
+        let buffers = &self.lowering.buffers;
+        let (steps, placement) = self.placed(first_denoising_op);
+        let state_len = placement.state_len;
+        let action = Region { offset: placement.end, len: act_len };
         let work_offset = action.offset + action.len + self.kept_len;
         let words = work_offset + self.work_len;
         ensure!(
             words <= usize::from(u16::MAX),
             "the policy needs {words} words of scratch memory, but at most 65535 are supported; use a smaller network"
         );
-        let region = |s: Slice| Region { offset: offsets[s.buffer] + s.offset, len: s.len };
-        let whole = |buffer: usize| Region { offset: offsets[buffer], len: buffers[buffer].len };
-        let steps = steps.iter().map(|step| Step {
+        let region = |slice: Slice| placement.region(slice);
+        let first_denoising_op = steps.first_denoising_op;
+        let placed = steps.steps.iter().map(|step| Step {
             kind: step.kind,
             dst: region(step.dst),
             src: step.src.map(region),
@@ -157,9 +165,9 @@ impl Arena {
             data: placed_data(&step.data, region),
         });
         Ok(Program {
-            steps: steps.collect(),
+            steps: placed.collect(),
             state: Region { offset: 0, len: state_len },
-            observation: whole(observation),
+            observation: region(Slice { buffer: observation, offset: 0, len: buffers[observation].len }),
             first_denoising_op,
             output: region(output),
             action,
@@ -168,59 +176,90 @@ impl Arena {
         })
     }
 
-    /// Places the buffers: first the state, then the observation, then the values by their lifetimes.
-    fn place(&self) -> Placement {
-        let buffers = &self.lowering.buffers;
-        let mut offsets = vec![0; buffers.len()];
-        let mut top = 0;
-        let mut state_len = 0;
-        for lifetime in [Lifetime::State, Lifetime::Observation] {
-            for (offset, buffer) in offsets.iter_mut().zip(buffers).filter(|(_, b)| b.lifetime == lifetime) {
-                *offset = top;
-                top += buffer.len;
-            }
-            if lifetime == Lifetime::State {
-                state_len = top;
-            }
-        }
-        let mut ends = vec![top];
-        let mut placed: Vec<(usize, (usize, usize))> = Vec::new();
-        for (buffer, life) in self.lifetimes() {
-            let len = buffers[buffer].len;
-            let taken = |offset: usize| {
-                let clash = |&&(other, span): &&(usize, (usize, usize))| {
-                    let meets = span.0 <= life.1 && life.0 <= span.1;
-                    meets && offset < offsets[other] + buffers[other].len && offsets[other] < offset + len
-                };
-                placed.iter().find(clash).map(|&(other, _)| offsets[other] + buffers[other].len)
-            };
-            let mut offset = top;
-            while let Some(next) = taken(offset) {
-                offset = next;
-            }
-            offsets[buffer] = offset;
-            ends.push(offset + len);
-            placed.push((buffer, life));
-        }
-        Placement { offsets, state_len, end: ends.into_iter().max().unwrap_or(top) }
+    /// Places the buffers, without copies as far as this takes no more memory and leaves no gaps.
+    fn placed(&self, first_denoising_op: usize) -> (Steps<'_>, Placement) {
+        let try_without = |copies: Copies| {
+            let Lowering { steps, buffers, .. } = &self.lowering;
+            let steps = Steps { steps: steps.clone(), first_denoising_op, buffers }.without_copies(copies);
+            let placement = place(&steps);
+            (steps, placement)
+        };
+        let with_all = try_without(Copies::None);
+        let without = [Copies::ReadOrComputed, Copies::Read].into_iter().map(try_without);
+        without
+            .filter(|(steps, placed)| placed.end <= with_all.1.end && !has_gaps(steps, placed))
+            .next()
+            .unwrap_or(with_all)
     }
+}
 
-    /// Returns the first and last operation that needs each value's buffer, in order of the first.
-    fn lifetimes(&self) -> Vec<(usize, (usize, usize))> {
-        let mut lives: Vec<(usize, (usize, usize))> = Vec::new();
-        for (at, step) in self.lowering.steps.iter().enumerate() {
-            for slice in [Some(step.dst), step.src, step.third].into_iter().flatten() {
-                let last = match self.lowering.buffers[slice.buffer].lifetime {
-                    Lifetime::Step => at,
-                    Lifetime::Output => usize::MAX,
-                    Lifetime::Observation | Lifetime::State => continue,
-                };
-                match lives.iter_mut().find(|(buffer, _)| *buffer == slice.buffer) {
-                    Some((_, life)) => life.1 = last,
-                    None => lives.push((slice.buffer, (at, last))),
-                }
+/// Returns `true` if an operation writes after a gap, or a gap is left at the end: the image's check refuses both.
+fn has_gaps(steps: &Steps<'_>, placement: &Placement) -> bool {
+    let fixed = |lifetime| matches!(lifetime, Lifetime::Observation | Lifetime::State);
+    let before = steps.buffers.iter().zip(&placement.offsets).filter(|(buffer, _)| fixed(buffer.lifetime));
+    let mut written = before.map(|(buffer, offset)| offset + buffer.len).max().unwrap_or(0);
+    for step in &steps.steps {
+        let dst = placement.region(step.dst);
+        if dst.offset > written {
+            return true;
+        }
+        written = written.max(dst.offset + dst.len);
+    }
+    written < placement.end
+}
+
+/// Places the buffers: first the state, then the observation, then the values by their lifetimes.
+fn place(steps: &Steps<'_>) -> Placement {
+    let buffers = steps.buffers;
+    let mut offsets = vec![0; buffers.len()];
+    let mut top = 0;
+    let mut state_len = 0;
+    for lifetime in [Lifetime::State, Lifetime::Observation] {
+        for (offset, buffer) in offsets.iter_mut().zip(buffers).filter(|(_, b)| b.lifetime == lifetime) {
+            *offset = top;
+            top += buffer.len;
+        }
+        if lifetime == Lifetime::State {
+            state_len = top;
+        }
+    }
+    let mut ends = vec![top];
+    let mut placed: Vec<(usize, (usize, usize))> = Vec::new();
+    for (buffer, life) in lifetimes(steps) {
+        let len = buffers[buffer].len;
+        let taken = |offset: usize| {
+            let clash = |&&(other, span): &&(usize, (usize, usize))| {
+                let meets = span.0 <= life.1 && life.0 <= span.1;
+                meets && offset < offsets[other] + buffers[other].len && offsets[other] < offset + len
+            };
+            placed.iter().find(clash).map(|&(other, _)| offsets[other] + buffers[other].len)
+        };
+        let mut offset = top;
+        while let Some(next) = taken(offset) {
+            offset = next;
+        }
+        offsets[buffer] = offset;
+        ends.push(offset + len);
+        placed.push((buffer, life));
+    }
+    Placement { offsets, state_len, end: ends.into_iter().max().unwrap_or(top) }
+}
+
+/// Returns the first and last operation that needs each value's buffer, in order of the first.
+fn lifetimes(steps: &Steps<'_>) -> Vec<(usize, (usize, usize))> {
+    let mut lives: Vec<(usize, (usize, usize))> = Vec::new();
+    for (at, step) in steps.steps.iter().enumerate() {
+        for slice in [Some(step.dst), step.src, step.third].into_iter().flatten() {
+            let last = match steps.buffers[slice.buffer].lifetime {
+                Lifetime::Step => at,
+                Lifetime::Output => usize::MAX,
+                Lifetime::Observation | Lifetime::State => continue,
+            };
+            match lives.iter_mut().find(|(buffer, _)| *buffer == slice.buffer) {
+                Some((_, life)) => life.1 = last,
+                None => lives.push((slice.buffer, (at, last))),
             }
         }
-        lives
     }
+    lives
 }

@@ -50,7 +50,7 @@ pub enum StepData {
 }
 
 /// Part of a buffer.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Slice {
     /// The buffer.
     pub buffer: BufferId,
