@@ -139,7 +139,7 @@ fn heads(
     see: impl Fn(&[f32], &[&Pair], &[f32]),
 ) {
     let dim = attention.cache.dim;
-    for (unit, (query, y)) in observation.chunks(dim).zip(action.chunks(dim)).enumerate() {
+    for (unit, (query, y)) in attention.queries(observation).chunks(dim).zip(action.chunks(dim)).enumerate() {
         see(query, &slots.seen(attention, unit / attention.heads, unit % attention.heads), y);
     }
 }
@@ -178,7 +178,8 @@ fn outputs_are_near_the_exact_ones() {
 fn the_largest_sizes_fit_their_sums() {
     // All integers at one end of their range.
     let cache = Cache { heads: 1, dim: 120, slots: 512 };
-    let attention = Attention { heads: 1, cache, tokens: 1, is_ring: true, is_causal: false, factor: 1e-6 };
+    let attention =
+        Attention { heads: 1, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: false, factor: 1e-6 };
     let wide = Attention { cache: Cache { heads: 1, dim: 512, slots: 120 }, ..attention };
     for attention in [attention, wide] {
         let observation = vec![-1.0; attention.lengths().iter().sum()];
@@ -230,7 +231,8 @@ fn in_polls(head: &mut Head<'_, '_>, observation: &[f32]) -> (Result<Vec<f32>, S
 #[test]
 fn an_overflow_fails_the_step_and_is_forgotten() {
     let cache = Cache { heads: 1, dim: 3, slots: 4 };
-    let attention = Attention { heads: 1, cache, tokens: 1, is_ring: true, is_causal: false, factor: 1.0 };
+    let attention =
+        Attention { heads: 1, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: false, factor: 1.0 };
     let finite = [1.0f32; 9];
     on_head(&attention.image(), |head| {
         let first = head.step(&finite).map(<[f32]>::to_vec).expect("all is finite");
@@ -274,7 +276,8 @@ fn the_self_test_wraps_around() {
 #[test]
 fn zeros_have_equal_weights() {
     let cache = Cache { heads: 2, dim: 4, slots: 3 };
-    let attention = Attention { heads: 4, cache, tokens: 3, is_ring: false, is_causal: true, factor: 0.5 };
+    let attention =
+        Attention { heads: 4, cache, tokens: 3, is_ring: false, is_causal: true, is_rotated: false, factor: 0.5 };
     let [queries, keys, values] = attention.lengths();
     let mut observation = vec![0.0; queries + keys];
     // Each token's values are its number.

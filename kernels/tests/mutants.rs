@@ -25,7 +25,7 @@ const VALID: &[u8] = include_bytes!("valid.actq");
 /// Returns the valid images: that of all sections, and attention to a ring and to all tokens of a step.
 fn valid() -> Vec<Draft> {
     let cache = Cache { heads: 2, dim: 6, slots: 4 };
-    let ring = Attention { heads: 4, cache, tokens: 1, is_ring: true, is_causal: false, factor: 0.4 };
+    let ring = Attention { heads: 4, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: true, factor: 0.4 };
     let whole = Attention { tokens: 3, is_ring: false, is_causal: true, ..ring };
     let attentions = [ring, whole].map(|attention| Draft(attention.image()));
     [Draft::of(VALID)].into_iter().chain(attentions).collect()
@@ -42,7 +42,7 @@ fn structure(draft: &Draft) -> Vec<usize> {
         (at..at + h::MATRIX_WORDS).chain(blocks..blocks + count * h::BLOCK_WORDS)
     };
     let header = (h::W_KIND..h::W_DIGEST).chain(h::W_MATRICES..h::WORDS);
-    let is_attention = |at: &usize| [op::KEEP, op::ATTEND].contains(&(draft.get(*at) as u8));
+    let is_attention = |at: &usize| [op::KEEP, op::ATTEND, op::ROTARY].contains(&(draft.get(*at) as u8));
     let sizes = ops.clone().step_by(h::OP_WORDS).filter(is_attention).flat_map(|at| (0..4).map(move |i| (at, i)));
     let sizes = sizes.map(|(at, i)| draft.offset(at + 3) + i);
     header.chain(ops.clone()).chain(linear.flat_map(matrix)).chain(sizes).collect()

@@ -161,6 +161,12 @@ impl Lowered {
                 let op = JsonOp::new("rmsnorm").key("w_ln", w_ln).key("eps", Some(*eps));
                 self.push(op, self.place(*x), &[], len)
             }
+            Expr::Rotary(of) => {
+                let [cos, sin] = [("rotary.cos", &of.cos), ("rotary.sin", &of.sin)].map(|(n, v)| self.vector(n, v));
+                let op = JsonOp::new("rotary").key("heads", Some(of.heads)).key("dim", Some(2 * of.cos.len()));
+                let op = op.key("cos", Some(cos?)).key("sin", Some(sin?));
+                self.push(op, self.place(of.x), &[], len)
+            }
             Expr::Attention(of) => self.attention(of, len)?,
             Expr::Products(_) => bail!("{PRODUCT}"),
             Expr::Softmax(..) => bail!("{SOFTMAX}"),

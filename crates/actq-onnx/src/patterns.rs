@@ -5,6 +5,7 @@ pub(crate) mod build;
 pub(crate) mod forms;
 pub(crate) mod norm;
 pub(crate) mod parts;
+pub(crate) mod rotary;
 pub(crate) mod rows;
 pub(crate) mod select;
 pub(crate) mod simplify;

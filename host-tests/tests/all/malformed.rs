@@ -162,7 +162,7 @@ fn impossible_operations_are_refused() {
         ("operations at a huge offset", E::Section, |d| d.set(h::W_OPS, HUGE)),
         ("too many operations", E::Op, |d| d.set_high(h::W_KIND, 0xffff)),
         ("operation code 0", E::Op, |d| d.set(d.op(FUNCTION), 0)),
-        ("operation code 23", E::Op, |d| d.set(d.op(FUNCTION), 23)),
+        ("operation code 24", E::Op, |d| d.set(d.op(FUNCTION), 24)),
         ("an unknown function", E::Op, |d| d.set_low(d.op(FUNCTION), u32::from(op::FUNCTION) | 12 << 8)),
         ("detail 2 in linear", E::Reserved, |d| d.set_low(d.op(FIRST), u32::from(op::LINEAR) | 2 << 8)),
         ("detail 1 in layer norm", E::Reserved, |d| d.set_low(d.op(LAYER_NORM), u32::from(op::LAYER_NORM) | 1 << 8)),

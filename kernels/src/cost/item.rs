@@ -92,6 +92,9 @@ kinds! {
         KeyWord "attend: four columns of a key"
         ValueRow "attend: two columns of values"
         ValueWord "attend: two columns of two values"
+        Rotary "rotary: once"
+        RotatedHead "rotary: a head of a token"
+        RotatedPair "rotary: two elements"
     }
 }
 kinds! {

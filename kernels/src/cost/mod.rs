@@ -257,6 +257,10 @@ fn elements(op: &Op<'_>, len: usize, add: &mut dyn FnMut(CostItem, usize)) {
 #[cfg(feature = "attention")]
 fn heads(op: &Op<'_>, units: usize, is_expected: bool, add: &mut dyn FnMut(CostItem, usize)) {
     let mut add = |which, count| add(CostItem::attention(which), count);
+    if op.kind == OpKind::Rotary {
+        add(Attention::RotatedHead, units);
+        return add(Attention::RotatedPair, units * (op.rotated_heads()[1] / 2));
+    }
     let cache = op.cache();
     if op.kind == OpKind::Keep {
         add(Attention::KeptHead, units);
@@ -346,6 +350,7 @@ pub fn values(op: &Op<'_>) -> (CostItem, CostItem, usize) {
 fn attention(op: &Op<'_>) -> (CostItem, CostItem, usize) {
     let (once, value, len) = match op.kind {
         OpKind::Keep => (Attention::Keep, Attention::KeptValue, 2 * op.src().len),
+        OpKind::Rotary => (Attention::Rotary, Attention::RotatedPair, op.dst().len / 2),
         _ => (Attention::Attend, Attention::Output, op.dst().len),
     };
     (CostItem::attention(once), CostItem::attention(value), len)

@@ -88,6 +88,18 @@ impl Op<'_> {
         Cache { heads, dim, slots }
     }
 
+    /// Returns the heads of [`OpKind::Rotary`] and the dimension of a head.
+    pub fn rotated_heads(&self) -> [usize; 2] {
+        [self.half(0), self.half(1)]
+    }
+
+    /// Returns the cosines, then the sines of [`OpKind::Rotary`]'s angles for a token; empty if the image does not have
+    /// them.
+    pub(crate) fn rotation(&self, token: usize) -> &'_ [u32] {
+        let [_, dim] = self.rotated_heads();
+        self.floats_at(1usize.wrapping_add(token.wrapping_mul(dim)), dim)
+    }
+
     /// Returns the heads of [`OpKind::Attend`]'s queries.
     pub fn query_heads(&self) -> usize {
         self.half(0)
@@ -110,7 +122,7 @@ impl Op<'_> {
 
     /// Returns an operation of attention with the lengths of `src` and of the third region; any other as it is.
     pub(super) fn with_lengths(mut self) -> Self {
-        if !self.kind.is_attention() {
+        if !matches!(self.kind, OpKind::Keep | OpKind::Attend) {
             return self;
         }
         let (cache, is_ring) = (self.cache(), self.is_ring());

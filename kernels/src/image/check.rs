@@ -302,6 +302,15 @@ impl<'a> Image<'a> {
     #[inline(never)]
     fn check_attention(&self, op: &Op<'_>, front: &mut Front<'a>) -> Result<(), ImageError> {
         front.take(op.data(), usize::from(op.form.uses.constants))?;
+        if op.kind == OpKind::Rotary {
+            let ([heads, dim], len) = (op.rotated_heads(), op.dst().len);
+            let token = heads * dim;
+            if token == 0 || !dim.is_multiple_of(2) || !len.is_multiple_of(token) {
+                return Err(ImageError::Shape);
+            }
+            front.take_finite(op.data() + 1, len / heads)?;
+            return Ok(());
+        }
         let (cache, [dst, _, third]) = (op.cache(), op.regions);
         let heads = if op.kind == OpKind::Attend { op.query_heads() } else { cache.heads };
         if [heads, cache.heads, cache.dim, cache.slots].contains(&0) || !heads.is_multiple_of(cache.heads) {

@@ -54,6 +54,10 @@ pub enum OpKind {
     /// scores.
     #[cfg(feature = "attention")]
     Attend,
+    /// `dst` = `dst` with rotary positions ([`crate::ops::attention`]). Data: heads and the dimension of a head, then for
+    /// each token the cosines and the sines of its angles.
+    #[cfg(feature = "attention")]
+    Rotary,
     /// `dst[i] = src[index[i]]`. Data: the length of `src`, 1 if `src` is a quaternion whose length must be near 1, the
     /// indices.
     Select,
@@ -96,7 +100,7 @@ impl OpKind {
     #[inline(always)]
     pub(crate) fn is_attention(self) -> bool {
         #[cfg(feature = "attention")]
-        return matches!(self, Self::Keep | Self::Attend);
+        return matches!(self, Self::Keep | Self::Attend | Self::Rotary);
         #[cfg(not(feature = "attention"))]
         false
     }
@@ -130,7 +134,7 @@ impl OpKind {
             | Self::Table
             | Self::Denoise => return None,
             #[cfg(feature = "attention")]
-            Self::Keep | Self::Attend => return None,
+            Self::Keep | Self::Attend | Self::Rotary => return None,
         })
     }
 
@@ -220,9 +224,9 @@ impl Form {
 /// The kinds of attention. A build without it has no code for them, not even to refuse them: the others take their place
 /// in the table.
 #[cfg(feature = "attention")]
-const ATTENTION: [OpKind; 2] = [OpKind::Keep, OpKind::Attend];
+const ATTENTION: [OpKind; 3] = [OpKind::Keep, OpKind::Attend, OpKind::Rotary];
 #[cfg(not(feature = "attention"))]
-const ATTENTION: [OpKind; 2] = [OpKind::Copy; 2];
+const ATTENTION: [OpKind; 3] = [OpKind::Copy; 3];
 
 macro_rules! operations {
     ($($(#[$doc:meta])* $NAME:ident = $code:literal $text:literal $($label:literal)?: $kind:expr, $uses:expr $(, if $feature:literal)?;)*) => {
@@ -328,4 +332,6 @@ operations! {
     KEEP = 21 "keep" "values": ATTENTION[0], Uses { src: 1, third: 1, constants: 2, ..Uses::NONE }, if "attention";
     /// `OpKind::Attend`, whose data has the length of the third region.
     ATTEND = 22 "attend" "cache": ATTENTION[1], Uses { src: 1, third: 1, constants: 4, ..Uses::NONE }, if "attention";
+    /// `OpKind::Rotary`, whose data has a word of sizes, then half a head of cosines and of sines for each token.
+    ROTARY = 23 "rotary": ATTENTION[2], Uses { constants: 1, reads_dst: true, ..Uses::NONE }, if "attention";
 }

@@ -131,8 +131,12 @@ impl<'a> Op<'a> {
     pub(crate) fn units(&self) -> usize {
         #[cfg(feature = "attention")]
         if self.kind.is_attention() {
+            let (len, dim) = match self.kind {
+                OpKind::Rotary => (self.dst().len, self.rotated_heads()[1]),
+                _ => (self.src().len, self.cache().dim),
+            };
             // At least one, which a damaged image does not have: it fails.
-            return self.src().len.checked_div(self.cache().dim).unwrap_or(0).max(1);
+            return len.checked_div(dim).unwrap_or(0).max(1);
         }
         let kept = if self.kind == OpKind::History { self.src().len } else { 0 };
         self.dst().len * usize::from(self.form.uses.passes) + kept
@@ -142,6 +146,12 @@ impl<'a> Op<'a> {
     pub(crate) fn part(&self, i: usize, range: &Range<usize>) -> &'a [u32] {
         let before = usize::from(self.form.uses.constants) + i * self.dst().len + range.start;
         section(self.image, self.data().wrapping_add(before), range.len()).unwrap_or_default()
+    }
+
+    /// Returns values of the data from word `i` on; empty if the image does not have them.
+    #[cfg(feature = "attention")]
+    pub(super) fn floats_at(&self, i: usize, len: usize) -> &'a [u32] {
+        section(self.image, self.data().wrapping_add(i), len).unwrap_or_default()
     }
 
     /// Returns the offset of the constants or of the matrix record.

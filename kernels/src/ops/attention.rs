@@ -1,4 +1,6 @@
 //! Attention in integers: `keep` writes keys and values to a cache, and `attend` computes the outputs of queries.
+//! `rotary` rotates queries and keys by their positions: of a head, elements `x_i` and `x_j` with `j = i + dim / 2` become
+//! `x_i cos_i - x_j sin_i` and `x_j cos_i + x_i sin_i`, rounded after each operation.
 //!
 //! For each head of a query, with the head of keys and values that it shares (`docs/FORMAT.md` has the cache):
 //!
@@ -14,7 +16,7 @@ use core::ops::Range;
 
 use crate::activations::Scale;
 use crate::arch::{query_keys, weigh_values};
-use crate::arena::regions;
+use crate::arena::{part, regions};
 use crate::error::Fault;
 use crate::image::{Cache, Op, OpKind, Region};
 use crate::math::{Native, Real, exp};
@@ -36,6 +38,9 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], units: &Range<usize>) -> Resul
     if op.kind == OpKind::Keep {
         let [cache, keys, values, _] = regions(arena, &op.regions, Region::default());
         return keep(op, units, cache, f(keys), f(values));
+    }
+    if op.kind == OpKind::Rotary {
+        return rotate(op, units, f(part(arena, &op.dst().range())));
     }
     let [dst, src, cache, work] = regions(arena, &op.regions, op.work());
     attend(op, units, f(dst), f(src), cache, work)
@@ -65,6 +70,22 @@ fn keep(op: &Op<'_>, units: &Range<usize>, cache: &mut [u32], keys: &[f32], valu
         let (slots, next) = (shape.slots as u32, count.saturating_add(1));
         let next = if op.is_ring() && next < 2 * slots { next } else { slots };
         *cache.first_mut().ok_or(Fault::Damaged)? = next;
+    }
+    Ok(())
+}
+
+fn rotate(op: &Op<'_>, units: &Range<usize>, x: &mut [f32]) -> Result<(), Fault> {
+    let [heads, dim] = op.rotated_heads();
+    for unit in units.clone() {
+        let token = unit.checked_div(heads).ok_or(Fault::Damaged)?;
+        let (cosines, sines) = op.rotation(token).split_at_checked(dim / 2).ok_or(Fault::Damaged)?;
+        let head = x.get_mut(unit * dim..(unit + 1) * dim).ok_or(Fault::Damaged)?;
+        let (first, second) = head.split_at_mut_checked(dim / 2).ok_or(Fault::Damaged)?;
+        for (((x, y), cosine), sine) in first.iter_mut().zip(second).zip(cosines).zip(sines) {
+            let of_bits = |bits: &u32| Native::of(f32::from_bits(u32::from_le(*bits)));
+            let (a, b, cosine, sine) = (Native::of(*x), Native::of(*y), of_bits(cosine), of_bits(sine));
+            (*x, *y) = ((a * cosine - b * sine).get(), (b * cosine + a * sine).get());
+        }
     }
     Ok(())
 }

@@ -135,7 +135,7 @@ pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &
         | OpKind::Standstill
         | OpKind::History => return Err(Fault::Damaged),
         #[cfg(feature = "attention")]
-        OpKind::Keep | OpKind::Attend => return Err(Fault::Damaged),
+        OpKind::Keep | OpKind::Attend | OpKind::Rotary => return Err(Fault::Damaged),
     }
     Ok(units.end == len)
 }

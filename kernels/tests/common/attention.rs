@@ -17,6 +17,8 @@ pub(crate) struct Attention {
     /// One token of keys and values a step; else all slots in each.
     pub(crate) is_ring: bool,
     pub(crate) is_causal: bool,
+    /// `true` for queries with rotary positions; the dimension is then even.
+    pub(crate) is_rotated: bool,
     pub(crate) factor: f32,
 }
 
@@ -28,7 +30,28 @@ impl Attention {
         let is_ring = random.below(2) == 0;
         let tokens = if is_ring { 1 } else { 1 + random.below(cache.slots) };
         let factor = 1.0 / (cache.dim as f32).sqrt();
-        Self { heads: groups * sharing, cache, tokens, is_ring, is_causal: random.below(2) == 0, factor }
+        let is_rotated = cache.dim.is_multiple_of(2);
+        Self { heads: groups * sharing, cache, tokens, is_ring, is_causal: random.below(2) == 0, is_rotated, factor }
+    }
+
+    /// Returns the cosines of a token's angles, then the sines.
+    fn angles(&self, token: usize) -> Vec<f32> {
+        let angles = (0..self.cache.dim / 2).map(|i| 0.3 + 0.7 * token as f64 + 0.11 * i as f64);
+        angles.clone().map(|angle| angle.cos() as f32).chain(angles.map(|angle| angle.sin() as f32)).collect()
+    }
+
+    /// Returns the queries of an observation, with their positions.
+    pub(crate) fn queries(&self, observation: &[f32]) -> Vec<f32> {
+        let (dim, half) = (self.cache.dim, self.cache.dim / 2);
+        let mut queries = observation[..self.lengths()[0]].to_vec();
+        for (at, head) in queries.chunks_exact_mut(dim).enumerate().filter(|_| self.is_rotated) {
+            let angles = self.angles(at / self.heads);
+            for i in 0..half {
+                let (x, y, cos, sin) = (head[i], head[half + i], angles[i], angles[half + i]);
+                (head[i], head[half + i]) = (x * cos - y * sin, y * cos + x * sin);
+            }
+        }
+        queries
     }
 
     /// Returns the lengths of queries, keys and values.
@@ -59,15 +82,24 @@ impl Attention {
         let Cache { heads, dim, slots } = self.cache;
         let flag = |flag: bool| usize::from(flag);
         let mut words = vec![0; h::WORDS];
+        if self.is_rotated {
+            words.push(pair(self.heads, dim));
+            words.extend((0..self.tokens).flat_map(|token| self.angles(token)).map(f32::to_bits));
+        }
+        let rotary = h::WORDS as u32;
+        let [keep, attend] = [0, 2].map(|at| words.len() as u32 + at);
         words.extend([pair(heads, dim), pair(slots, flag(self.is_ring))]);
         words.extend([pair(self.heads, heads), pair(dim, slots), pair(flag(self.is_causal), 0), self.factor.to_bits()]);
+        let queried = Region { offset: state, len: queries };
+        let rotate = OpRecord { kind: OpKind::Rotary, dst: queried, src: 0, third: 0, bias: 0, data: rotary };
         let ops = words.len();
-        let [keep, attend] = [h::WORDS as u32, h::WORDS as u32 + 2];
         let (src, third) = (state + queries, state + queries + keys);
         let keep = OpRecord { kind: OpKind::Keep, dst: cache, src, third, bias: 0, data: keep };
         let attend =
             OpRecord { kind: OpKind::Attend, dst: output, src: state, third: cache.offset, bias: 0, data: attend };
-        for record in [keep, attend] {
+        let records = [rotate, keep, attend];
+        let records = &records[usize::from(!self.is_rotated)..];
+        for record in records {
             words.extend(record.emit().expect("small sizes"));
         }
         let (end, step) = (words.len() as u32, observed - state + queries);
@@ -91,7 +123,7 @@ impl Attention {
             action,
             work,
             matrices: Records { offset: h::WORDS as u32, count: 0 },
-            ops: Records { offset: ops as u32, count: 2 },
+            ops: Records { offset: ops as u32, count: records.len() },
             first_denoising_op: 0,
             denoising_steps: 0,
             contract: end,

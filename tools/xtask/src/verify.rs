@@ -2,10 +2,11 @@
 
 mod steps;
 
+use std::collections::VecDeque;
 use std::process::{Command, Stdio};
-use std::sync::mpsc;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use std::{fs, thread};
+use std::{fs, iter, thread};
 
 use actq_boards::Target;
 use anyhow::{Context as _, Error, Result, anyhow, bail};
@@ -55,25 +56,31 @@ fn run_all(steps: Vec<Step>, expected: &Expected) -> Result<()> {
     // Tests write the names of skipped tests to this file.
     let skipped = std::env::temp_dir().join(format!("actq-skipped-{}", std::process::id()));
     let count = steps.len();
-    let mut done = thread::scope(|scope| {
-        let (beside, others) = mpsc::channel::<(Step, String)>();
-        let others = scope.spawn(move || {
-            others.into_iter().map(|(step, number)| run_step(step, &number, start)).collect::<Result<Vec<_>>>()
-        });
-        let mut done = Vec::new();
-        for (i, mut step) in steps.into_iter().enumerate() {
-            if let Ok(command) = &mut step.command {
-                command.env("ACTQ_SKIPPED", &skipped);
-            }
-            let number = format!("{}/{count}", i + 1);
-            match step.is_beside {
-                true => beside.send((step, number)).context("the thread of other steps has ended")?,
-                false => done.push(run_step(step, &number, start)?),
-            }
+    let numbered = |(i, mut step): (usize, Step)| {
+        if let Ok(command) = &mut step.command {
+            command.env("ACTQ_SKIPPED", &skipped);
         }
-        drop(beside);
-        done.extend(others.join().map_err(|_| anyhow!("the thread of other steps panicked"))??);
-        Ok::<_, Error>(done)
+        (step, format!("{}/{count}", i + 1))
+    };
+    let first_beside = steps.iter().position(|step| step.is_beside).unwrap_or(count);
+    let mut steps = steps.into_iter().enumerate().map(numbered);
+    let run = |(step, number): (Step, String)| run_step(step, &number, start);
+    let mut done = steps.by_ref().take(first_beside).map(run).collect::<Result<Vec<_>>>()?;
+    let (beside, others): (Vec<_>, Vec<_>) = steps.partition(|(step, _)| step.is_beside);
+    let beside = Mutex::new(VecDeque::from(beside));
+    let run_beside = || {
+        let next = || beside.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+        iter::from_fn(next).map(run).collect::<Result<Vec<_>>>()
+    };
+    thread::scope(|scope| {
+        let worker = scope.spawn(run_beside);
+        for step in others {
+            done.push(run(step)?);
+        }
+        // Whoever is done first takes the next one.
+        done.extend(run_beside()?);
+        done.extend(worker.join().map_err(|_| anyhow!("the thread of other steps panicked"))??);
+        Ok::<_, Error>(())
     })?;
     done.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
     let tests = fs::read_to_string(&skipped).unwrap_or_default();
@@ -90,7 +97,8 @@ fn run_step(Step { name, command, is_beside }: Step, number: &str, start: Instan
         Ok(mut command) => {
             println!("\n== {number} {name}: {}", text(&command));
             // The output of a step beside others comes as a whole, at its end.
-            let path = std::env::temp_dir().join(format!("actq-output-{}", std::process::id()));
+            let file = format!("actq-output-{}-{}", std::process::id(), number.replace('/', "-"));
+            let path = std::env::temp_dir().join(file);
             if is_beside {
                 let file = fs::File::create(&path)?;
                 command.stdout(file.try_clone()?).stderr(file);

@@ -156,6 +156,10 @@ pub(super) fn row(op: &Op<'_>) -> Vec<String> {
         (OpKind::RmsNorm, _) if op.constant(0) == Balance::FREE_EPS => "factors, by the quantizer".into(),
         (OpKind::History, _) => count(op.dst().len / op.src().len.max(1), "frame"),
         (OpKind::Keep | OpKind::Attend, _) => attention(op),
+        (OpKind::Rotary, _) => {
+            let [heads, dim] = op.rotated_heads();
+            format!("{heads} x {dim}")
+        }
         (kind, _) if kind.label().is_empty() => String::new(),
         (kind, _) => {
             let constants: String = op.constants().map(|constant| format!(" {constant}")).collect();

@@ -125,6 +125,7 @@ fn attention(exprs: &mut Exprs, weights: Id, values: &Tensor, shape: Vec<usize>)
     let (queries, keys) = (by_token(&queries, rows, heads)?, by_token(&keys, cols, kv_heads)?);
     let values = by_token(&values, cols, kv_heads)?;
     let (queries, keys, factor) = unscaled(exprs, queries, keys, factor);
+    let (queries, keys) = (exprs.rotated(queries), exprs.rotated(keys));
     let all = Attention { queries, keys, values, heads, kv_heads, dim, factor, causal, valid, context: 0 };
     let y = exprs.put(Expr::Attention(Box::new(all)), heads * rows * dim);
     let place = |head: usize, token: usize| (token * heads + head) * dim;

@@ -50,6 +50,17 @@ impl Exprs {
                     let s = inverse_root(of(x)?, *eps);
                     of(x)?.iter().zip(weight).map(|(v, w)| v * s * w).collect()
                 }
+                Expr::Rotary(rotary) => {
+                    let half = rotary.cos.len();
+                    let rotated = |head: &[f64]| {
+                        let (x, y) = head.split_at(half);
+                        let by = |a: &[f64], b: &[f64], sign: f64| -> Vec<f64> {
+                            (0..half).map(|i| a[i] * rotary.cos[i] + sign * b[i] * rotary.sin[i]).collect()
+                        };
+                        [by(x, y, -1.0), by(y, x, 1.0)].concat()
+                    };
+                    of(&rotary.x)?.chunks_exact(2 * half).flat_map(rotated).collect()
+                }
                 _ => return None,
             };
             values.insert(id, value);

@@ -99,6 +99,16 @@ pub(crate) struct Attention {
     pub(crate) context: usize,
 }
 
+/// Heads of a token, rotated by its position: of each, elements `x_i` and `x_j` with `j = i + cos.len()` become
+/// `x_i cos_i - x_j sin_i` and `x_j cos_i + x_i sin_i`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Rotary {
+    pub(crate) x: Id,
+    pub(crate) heads: usize,
+    pub(crate) cos: Vec<f64>,
+    pub(crate) sin: Vec<f64>,
+}
+
 /// An expression; [`Exprs`] holds its length.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Expr {
@@ -130,6 +140,8 @@ pub(crate) enum Expr {
     /// Softmax of the rows of products times a factor, `true` if a row sees no later column than its own. The elements
     /// are as in [`Attention::valid`]. In patterns only.
     Softmax(Id, f64, bool, Vec<Option<(Id, usize)>>),
+    /// Queries or keys with rotary positions.
+    Rotary(Box<Rotary>),
     /// Attention of queries to keys and values.
     Attention(Box<Attention>),
     /// The hidden state after the step.
@@ -151,6 +163,7 @@ impl Expr {
                 [of.queries, of.keys, of.values].into_iter().chain(valid).collect()
             }
             Self::Cell(cell) => vec![cell.x],
+            Self::Rotary(rotary) => vec![rotary.x],
             Self::Spread(x)
             | Self::Affine(x, ..)
             | Self::Linear(x, ..)
@@ -176,6 +189,7 @@ impl Expr {
                 [&mut all.queries, &mut all.keys, &mut all.values].into_iter().chain(valid).for_each(|id| *id = of(id));
             }
             Self::Cell(cell) => cell.x = of(&cell.x),
+            Self::Rotary(rotary) => rotary.x = of(&rotary.x),
             Self::Spread(x)
             | Self::Affine(x, ..)
             | Self::Linear(x, ..)

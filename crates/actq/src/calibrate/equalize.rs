@@ -152,6 +152,7 @@ impl Elements {
                 | NodeKind::Normalize(_)
                 | NodeKind::Balance(_)
                 | NodeKind::Attention(_)
+                | NodeKind::Rotary(_)
                 | NodeKind::Iterate(_) => {
                     inputs.into_iter().chain([output]).for_each(|of| elements.fix(of));
                 }

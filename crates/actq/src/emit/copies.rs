@@ -5,7 +5,7 @@
 
 use actq_kernels::image::OpKind;
 
-use crate::graph::lowering::{Buffer, Lifetime, Slice, Step};
+use crate::graph::lowering::{Buffer, BufferId, Lifetime, Slice, Step};
 
 /// Operations over buffers, in order.
 pub(super) struct Steps<'a> {
@@ -16,31 +16,17 @@ pub(super) struct Steps<'a> {
     pub(super) buffers: &'a [Buffer],
 }
 
-/// Which copies [`Steps::without_copies`] removes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Copies {
-    /// Those of what can be read or computed in its place.
-    ReadOrComputed,
-    /// Those of what can be read in its place.
-    Read,
-    /// None.
-    None,
-}
-
 /// An operation's index, and its operands with other slices.
 type Renamed = (usize, [Option<Slice>; 3]);
 
 impl Steps<'_> {
-    /// Removes copies.
-    pub(super) fn without_copies(mut self, which: Copies) -> Self {
-        if which == Copies::None {
-            return self;
-        }
+    /// Removes copies. The parts of some buffers stay `apart`: computed elsewhere, and copied.
+    pub(super) fn without_copies(mut self, apart: &dyn Fn(BufferId) -> bool) -> Self {
         let mut at = 0;
         while let Some(step) = self.steps.get(at) {
             let from = step.copied().filter(|_| self.is_of_step(step.dst));
             let renamed = from.and_then(|from| {
-                let computed = || if which < Copies::Read { self.computed_in_place(at, from) } else { None };
+                let computed = || if apart(step.dst.buffer) { None } else { self.computed_in_place(at, from) };
                 self.read_in_place(at, from).or_else(computed)
             });
             let Some(renamed) = renamed else {
@@ -54,6 +40,7 @@ impl Steps<'_> {
             }
             self.remove(at);
         }
+        (0..self.steps.len()).for_each(|at| self.hoist(at));
         let mut at = 0;
         while at < self.steps.len() {
             self.merge(at);
@@ -66,6 +53,20 @@ impl Steps<'_> {
     fn remove(&mut self, at: usize) {
         self.steps.remove(at);
         self.first_denoising_op -= usize::from(at < self.first_denoising_op);
+    }
+
+    /// Moves a copy to where its source is ready, if a later part of its destination is computed in place before it: the
+    /// parts are then written in order as often as possible, and leave no gap.
+    fn hoist(&mut self, at: usize) {
+        let (to, Some(from)) = (self.steps[at].dst, self.steps[at].copied()) else { return };
+        let start = if at < self.first_denoising_op { 0 } else { self.first_denoising_op };
+        let is_part = |step: &Step<Slice>| step.dst.buffer == to.buffer;
+        if self.steps[start..at].iter().any(|step| is_part(step) && step.dst.offset > to.offset) {
+            let is_earlier = |step: &Step<Slice>| is_part(step) && step.dst.offset < to.offset;
+            let is_before = |step: &Step<Slice>| step.writes(from) || step.touches(to) || is_earlier(step);
+            let ready = self.steps[start..at].iter().rposition(is_before).map_or(start, |i| start + i + 1);
+            self.steps[ready..=at].rotate_right(1);
+        }
     }
 
     /// Returns the index of a later copy of `from` to `to` that can as well be made at `at`.
@@ -256,8 +257,8 @@ mod tests {
     }
 
     /// Returns each operation's destination and source, as buffer and offset.
-    fn without(steps: Vec<Step<Slice>>, copies: Copies) -> Vec<[(usize, usize); 2]> {
-        let steps = Steps { steps, first_denoising_op: 0, buffers: &BUFFERS }.without_copies(copies);
+    fn without(steps: Vec<Step<Slice>>, are_apart: bool) -> Vec<[(usize, usize); 2]> {
+        let steps = Steps { steps, first_denoising_op: 0, buffers: &BUFFERS }.without_copies(&|_| are_apart);
         let at = |slice: Slice| (slice.buffer, slice.offset);
         steps.steps.iter().map(|step| [at(step.dst), at(step.src.unwrap_or(step.dst))]).collect()
     }
@@ -265,8 +266,7 @@ mod tests {
     #[test]
     fn a_part_is_read_in_its_place() {
         let steps = vec![step(OpKind::Copy, 1, [0, 2], Some((0, [2, 2]))), step(LINEAR, 4, WHOLE, Some((1, [0, 2])))];
-        assert_eq!(without(steps.clone(), Copies::Read), [[(4, 0), (0, 2)]]);
-        assert_eq!(without(steps, Copies::None).len(), 2);
+        assert_eq!(without(steps, true), [[(4, 0), (0, 2)]]);
     }
 
     #[test]
@@ -279,26 +279,41 @@ mod tests {
             step(OpKind::Copy, 3, [2, 2], Some((2, [0, 2]))),
             step(LINEAR, 4, WHOLE, Some((3, WHOLE))),
         ];
-        let all = without(steps.clone(), Copies::ReadOrComputed);
+        let all = without(steps.clone(), false);
         assert_eq!(all, [[(3, 0), (0, 0)], [(3, 0), (3, 0)], [(3, 2), (0, 0)], [(4, 0), (3, 0)]]);
-        assert_eq!(without(steps, Copies::Read).len(), 6);
+        assert_eq!(without(steps, true).len(), 6);
+    }
+
+    #[test]
+    fn a_part_that_is_copied_comes_before_those_computed_after_it() {
+        let part = |of: usize, at: usize| step(LINEAR, of, [at, 2], Some((0, WHOLE)));
+        let steps = vec![
+            part(1, 0),
+            part(2, 0),
+            step(LINEAR, 4, WHOLE, Some((1, WHOLE))),
+            step(OpKind::Copy, 3, [0, 2], Some((1, [0, 2]))),
+            step(OpKind::Copy, 3, [2, 2], Some((2, [0, 2]))),
+            step(LINEAR, 4, WHOLE, Some((3, WHOLE))),
+        ];
+        let all = without(steps, false);
+        assert_eq!(all[..3], [[(1, 0), (0, 0)], [(3, 0), (1, 0)], [(3, 2), (0, 0)]]);
     }
 
     #[test]
     fn neighbours_are_copied_together() {
         let part = |at: usize| step(OpKind::Copy, 4, [at, 2], Some((0, [at, 2])));
         let steps = vec![part(0), step(LINEAR, 1, WHOLE, Some((0, WHOLE))), part(2)];
-        assert_eq!(without(steps, Copies::Read), [[(4, 0), (0, 0)], [(1, 0), (0, 0)]]);
+        assert_eq!(without(steps, true), [[(4, 0), (0, 0)], [(1, 0), (0, 0)]]);
         // Not if the destination is read in between.
         let steps = vec![part(0), step(LINEAR, 1, WHOLE, Some((4, WHOLE))), part(2)];
-        assert_eq!(without(steps, Copies::Read).len(), 3);
+        assert_eq!(without(steps, true).len(), 3);
     }
 
     #[test]
     fn a_source_that_repeats_is_copied_in_doubles() {
         let value = |at: usize| step(OpKind::Copy, 4, [at, 1], Some((0, [0, 1])));
         let expected = [[(4, 0), (0, 0)], [(4, 1), (4, 0)], [(4, 2), (4, 0)]];
-        assert_eq!(without((0..4).map(value).collect(), Copies::Read), expected);
+        assert_eq!(without((0..4).map(value).collect(), true), expected);
     }
 
     #[test]
@@ -308,9 +323,9 @@ mod tests {
         let of_value = step(LINEAR, 1, WHOLE, Some((0, WHOLE)));
         let later = step(OpKind::Add, 2, WHOLE, Some((1, WHOLE)));
         let steps = vec![of_value.clone(), copy.clone(), step(RELU, 2, WHOLE, None), later];
-        assert_eq!(without(steps, Copies::ReadOrComputed).len(), 4);
+        assert_eq!(without(steps, false).len(), 4);
         // The value changes before the copy is read.
         let steps = vec![of_value, copy, step(RELU, 1, WHOLE, None), step(OpKind::Add, 1, WHOLE, Some((2, WHOLE)))];
-        assert_eq!(without(steps, Copies::ReadOrComputed).len(), 4);
+        assert_eq!(without(steps, false).len(), 4);
     }
 }

@@ -9,7 +9,7 @@
 use actq_kernels::activations::max_prepared_words;
 use actq_kernels::image::{OpKind, Region, kept_words};
 
-use super::copies::{Copies, Steps};
+use super::copies::Steps;
 use crate::around::{Around, OUTPUT};
 use crate::error::{Result, ensure};
 use crate::graph::ValueId;
@@ -178,34 +178,55 @@ impl Arena {
 
     /// Places the buffers, without copies as far as this takes no more memory and leaves no gaps.
     fn placed(&self, first_denoising_op: usize) -> (Steps<'_>, Placement) {
-        let try_without = |copies: Copies| {
-            let Lowering { steps, buffers, .. } = &self.lowering;
-            let steps = Steps { steps: steps.clone(), first_denoising_op, buffers }.without_copies(copies);
+        let Lowering { steps, buffers, .. } = &self.lowering;
+        let with_copies = || Steps { steps: steps.clone(), first_denoising_op, buffers };
+        let most = place(&with_copies()).end;
+        let mut apart = vec![false; buffers.len()];
+        for _ in 0..MAX_TRIES {
+            let steps = with_copies().without_copies(&|buffer| apart[buffer]);
             let placement = place(&steps);
-            (steps, placement)
-        };
-        let with_all = try_without(Copies::None);
-        let without = [Copies::ReadOrComputed, Copies::Read].into_iter().map(try_without);
-        without
-            .filter(|(steps, placed)| placed.end <= with_all.1.end && !has_gaps(steps, placed))
-            .next()
-            .unwrap_or(with_all)
+            match gap(&steps, &placement) {
+                None if placement.end <= most => return (steps, placement),
+                Some(Some(partial)) if !apart[partial] => apart[partial] = true,
+                _ => break,
+            }
+        }
+        let steps = with_copies().without_copies(&|_| true);
+        let placement = place(&steps);
+        if placement.end <= most && gap(&steps, &placement).is_none() {
+            return (steps, placement);
+        }
+        let steps = with_copies();
+        let placement = place(&steps);
+        (steps, placement)
     }
 }
 
-/// Returns `true` if an operation writes after a gap, or a gap is left at the end: the image's check refuses both.
-fn has_gaps(steps: &Steps<'_>, placement: &Placement) -> bool {
+/// Arrangements with parts computed in place that are tried before one with all parts apart.
+const MAX_TRIES: usize = 16;
+
+/// Finds an operation that writes after a gap, or a gap at the end: the image's check refuses both. Returns the buffer
+/// in which it is, if there is one.
+fn gap(steps: &Steps<'_>, placement: &Placement) -> Option<Option<BufferId>> {
     let fixed = |lifetime| matches!(lifetime, Lifetime::Observation | Lifetime::State);
     let before = steps.buffers.iter().zip(&placement.offsets).filter(|(buffer, _)| fixed(buffer.lifetime));
     let mut written = before.map(|(buffer, offset)| offset + buffer.len).max().unwrap_or(0);
-    for step in &steps.steps {
-        let dst = placement.region(step.dst);
-        if dst.offset > written {
-            return true;
+    let mut begun = Vec::new();
+    let end = Region { offset: placement.end, len: 0 };
+    // Of each operation, and of the end.
+    for dst in steps.steps.iter().map(|step| Some(step.dst)).chain([None]) {
+        let region = dst.map_or(end, |dst| placement.region(dst));
+        begun.extend(dst.map(|dst| dst.buffer));
+        if region.offset > written {
+            let is_partial = |buffer: &&BufferId| {
+                let offset = placement.offsets[**buffer];
+                (offset..offset + steps.buffers[**buffer].len).contains(&written)
+            };
+            return Some(begun.iter().rev().find(is_partial).copied());
         }
-        written = written.max(dst.offset + dst.len);
+        written = written.max(region.offset + region.len);
     }
-    written < placement.end
+    None
 }
 
 /// Places the buffers: first the state, then the observation, then the values by their lifetimes.

@@ -82,6 +82,7 @@ fn constants(graph: &Graph) -> Marks {
                 (0..node.len).map(all).collect()
             }
             NodeKind::Attention(_)
+            | NodeKind::Rotary(_)
             | NodeKind::Lstm(_)
             | NodeKind::Gru(_)
             | NodeKind::Iterate(_)
@@ -124,7 +125,7 @@ fn mark_inputs(graph: &Graph, n: usize, live: &mut Marks) {
             let any = live[value].contains(&true);
             [value, node.inputs[0]].into_iter().for_each(|of| live[of].iter_mut().for_each(|mark| *mark |= any));
         }
-        NodeKind::Attention(_) => {
+        NodeKind::Attention(_) | NodeKind::Rotary(_) => {
             let any = live[value].contains(&true);
             let all = node.inputs.iter().copied().chain([value]);
             all.for_each(|of| live[of].iter_mut().for_each(|mark| *mark |= any));
@@ -279,7 +280,7 @@ impl Rebuilt {
             let read = match (product, &node.kind) {
                 (Some(product), _) => columns[product.matrix].clone(),
                 (None, NodeKind::LayerNorm(_) | NodeKind::RmsNorm(_)) => (0..node.len).collect(),
-                (None, NodeKind::Attention(_)) => self.kept[input].clone(),
+                (None, NodeKind::Attention(_) | NodeKind::Rotary(_)) => self.kept[input].clone(),
                 (None, _) => kept.clone(),
             };
             self.select(input, read)

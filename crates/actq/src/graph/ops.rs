@@ -25,6 +25,7 @@ mod mul;
 mod norm;
 mod normalize;
 mod recurrent;
+mod rotary;
 mod table;
 
 use std::ops::{Deref, DerefMut};
@@ -40,6 +41,7 @@ pub use lstm::Lstm;
 pub use mul::Mul;
 pub use norm::{LayerNorm, RmsNorm};
 pub use normalize::{Balance, Normalize};
+pub use rotary::Rotary;
 pub use table::Table;
 
 use super::operation::Operation;
@@ -114,6 +116,8 @@ operations! {
     Mul,
     /// Attention of queries to keys and values.
     Attention,
+    /// Rotary positions of queries or keys.
+    Rotary,
     /// Concatenated parts of values.
     Concat,
     /// A recurrent cell with a cell state.

@@ -242,7 +242,7 @@ pub(super) mod tests {
     use crate::graph::ops::{
         Add, Attention, Concat, Gru, LayerNorm, Linear, Lstm, Mul, NodeKind, Normalize, Pointwise, RmsNorm, Span,
     };
-    use crate::graph::ops::{Iterate, Table};
+    use crate::graph::ops::{Iterate, Rotary, Table};
     use crate::graph::values::{ValueId, WeightMatrix};
     use crate::graph::weights::{Vectors, zero_state};
     use crate::random::Random;
@@ -290,7 +290,7 @@ pub(super) mod tests {
     }
 
     /// Makes a network of attention: causal to the three tokens of an evaluation, with one head of keys and values for two
-    /// of queries, then to the last two steps.
+    /// of queries with rotary positions, then to the last two steps.
     pub(in crate::graph) fn attentive() -> Graph {
         let mut seed = Random::new(14);
         let mut graph = Graph::new(5);
@@ -302,6 +302,10 @@ pub(super) mod tests {
         };
         let full = Attention { heads: 2, kv_heads: 1, dim: 2, factor: 0.7, causal: true, context: 0 };
         let inputs = [12, 6, 6].map(|rows| linear(&mut graph, rows, 0));
+        let angles = [0.0f32, 0.9, -2.0];
+        let [cos, sin] = [f32::cos, f32::sin].map(|f| angles.map(f).to_vec());
+        let inputs =
+            [graph.add(Rotary { heads: 2, dim: 2, cos, sin }, &inputs[..1]).expect("it fits"), inputs[1], inputs[2]];
         let tokens = graph.add(full, &inputs).expect("it fits");
         let inputs = [4, 2, 2].map(|rows| linear(&mut graph, rows, tokens));
         let last = graph.add(Attention { causal: false, context: 2, ..full }, &inputs).expect("it fits");

@@ -57,7 +57,7 @@ fn impossible_operations_around_a_network_are_refused() -> Result<()> {
         ("a ring over the frame", E::Overlap, |d| d.set_high(d.op(HISTORY) + THIRD, d.high(d.op(HISTORY) + 1))),
         ("a clip with data", E::Reserved, |d| d.set(d.op(CLIP) + 3, 40)),
         ("the code after the last", E::Op, |d| {
-            d.map_low(d.op(HISTORY), |half| (half & !0xff) | u32::from(op::ATTEND + 1));
+            d.map_low(d.op(HISTORY), |half| (half & !0xff) | u32::from(op::ROTARY + 1));
         }),
         ("a flag beside that of ports", E::Reserved, |d| d.set(h::W_KIND, d.get(h::W_KIND) | 2 << 8)),
         ("an input too few", E::Ports, |d| d.set(ports(d), d.get(ports(d)) - 1)),

@@ -10,13 +10,14 @@ use crate::draft::Draft;
 
 const KEEP: (u8, usize) = (op::KEEP, 0);
 const ATTEND: (u8, usize) = (op::ATTEND, 0);
+const ROTARY: (u8, usize) = (op::ROTARY, 0);
 /// The third region of the record of an operation.
 const THIRD: usize = 2;
 
 /// Two heads share those of the cache; three queries see four tokens.
 fn whole() -> Attention {
     let cache = Cache { heads: 2, dim: 6, slots: 4 };
-    Attention { heads: 4, cache, tokens: 3, is_ring: false, is_causal: true, factor: 0.4 }
+    Attention { heads: 4, cache, tokens: 3, is_ring: false, is_causal: true, is_rotated: false, factor: 0.4 }
 }
 
 fn ring() -> Attention {
@@ -90,6 +91,26 @@ fn impossible_attentions_are_refused() {
         &[
             ("a ring that takes all slots at a time", E::Overlap, |d| d.set_high(d.data(KEEP) + 1, 0)),
             ("a ring outside the state", E::Arena, |d| d.set_high(h::W_STATE, d.high(h::W_STATE) - 1)),
+        ],
+    );
+}
+
+#[test]
+fn impossible_rotary_positions_are_refused() {
+    refused_of(
+        &draft(Attention { is_rotated: true, ..whole() }),
+        &[
+            ("positions of no heads", E::Shape, |d| d.set_low(d.data(ROTARY), 0)),
+            ("positions of heads without columns", E::Shape, |d| d.set_high(d.data(ROTARY), 0)),
+            ("positions of an odd column", E::Shape, |d| d.set_high(d.data(ROTARY), 3)),
+            ("positions of part of a token", E::Shape, |d| d.set_low(d.data(ROTARY), 5)),
+            ("the largest sizes of positions", E::Shape, |d| d.set(d.data(ROTARY), u32::MAX)),
+            ("a sine NaN", E::Constant, |d| d.set_f32(d.data(ROTARY) + 4, NAN)),
+            ("an infinite cosine", E::Constant, |d| d.set_f32(d.data(ROTARY) + 1, f32::INFINITY)),
+            ("angles outside", E::Section, |d| d.set(d.op(ROTARY) + 3, d.0.len() as u32)),
+            ("a source of positions", E::Reserved, |d| d.set_high(d.op(ROTARY) + 1, 1)),
+            ("a third region of positions", E::Reserved, |d| d.set_high(d.op(ROTARY) + THIRD, 1)),
+            ("a detail of rotary", E::Reserved, |d| d.map_low(d.op(ROTARY), |half| half | 1 << 8)),
         ],
     );
 }

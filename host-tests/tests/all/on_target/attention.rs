@@ -30,7 +30,8 @@ fn observations(attention: &Attention, random: &mut Random) -> Vec<Vec<f32>> {
 fn attentions() -> Vec<Attention> {
     let mut random = Random::new(11);
     let cache = Cache { heads: 2, dim: 9, slots: 7 };
-    let ring = Attention { heads: 6, cache, tokens: 1, is_ring: true, is_causal: false, factor: 0.3 };
+    let ring =
+        Attention { heads: 6, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: false, factor: 0.3 };
     let wide = Attention { heads: 2, cache: Cache { heads: 1, dim: 64, slots: 5 }, ..ring };
     let whole = Attention { tokens: 4, is_ring: false, is_causal: true, ..ring };
     let drawn = (0..5).map(|_| Attention::draw(&mut random));
@@ -67,7 +68,7 @@ const COLUMNS: usize = 48;
 /// Returns a token's attention to a ring of this many slots.
 fn context(slots: usize) -> Attention {
     let cache = Cache { heads: HEADS, dim: COLUMNS, slots };
-    Attention { heads: HEADS, cache, tokens: 1, is_ring: true, is_causal: false, factor: 0.15 }
+    Attention { heads: HEADS, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: false, factor: 0.15 }
 }
 
 /// A step with a full ring: it costs a constant, and a constant for each token of the context.

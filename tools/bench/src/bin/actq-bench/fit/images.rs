@@ -72,6 +72,7 @@ pub(super) fn images() -> Result<Vec<(String, Vec<u8>)>> {
     let name = "added biases";
     images.push((name.to_owned(), builder.accumulating(name)?));
     images.push(around()?);
+    images.push(rotary()?);
     for heads in [(1, 1), (4, 2)] {
         for shapes in ATTENTIONS.chunks(4) {
             images.push(attention(heads, shapes)?);
@@ -131,6 +132,46 @@ fn attention((heads, kv_heads): (usize, usize), shapes: &[(usize, usize)]) -> Re
         ports: Vec::new(),
     };
     Ok((name, emit::image_around(&policy, &outcomes, &around)?))
+}
+
+/// Rotary positions of heads, dimensions and tokens.
+fn rotary() -> Result<(String, Vec<u8>)> {
+    let name = "Rotary positions of attention";
+    let mut builder = Builder::new(8);
+    builder.linear((8, 8), Activations::Int8, |_| Some(Width::W2), 0, true)?;
+    let (policy, outcomes) = builder.finish(name.to_owned(), false);
+    let mut buffers = vec![Buffer { len: OBSERVATION, lifetime: Lifetime::Observation }];
+    let mut before = Vec::new();
+    let mut value = |len: usize| {
+        buffers.push(Buffer { len, lifetime: Lifetime::Step });
+        Slice { buffer: buffers.len() - 1, offset: 0, len }
+    };
+    let mut copy = |before: &mut Vec<_>, len: usize| {
+        let (dst, raw) = (value(len), Slice { buffer: 0, offset: 0, len });
+        before.push(Step { kind: OpKind::Copy, dst, src: Some(raw), third: None, data: StepData::None });
+        dst
+    };
+    for (heads, dim, tokens) in
+        [(1, 2, 1), (1, 8, 1), (4, 12, 1), (8, 32, 1), (4, 48, 2), (2, 6, 8), (1, 64, 10), (16, 4, 4)]
+    {
+        let dst = copy(&mut before, heads * dim * tokens);
+        let angles = vec![0.6f32.to_bits(); dim * tokens];
+        let data = StepData::Words([vec![(heads | dim << 16) as u32], angles].concat());
+        before.push(Step { kind: OpKind::Rotary, dst, src: None, third: None, data });
+    }
+    let [observation, action] = [8, 8].map(|len| copy(&mut before, len));
+    let output = Slice { buffer: OUTPUT, ..action };
+    let after = vec![Step { kind: OpKind::Copy, dst: action, src: Some(output), third: None, data: StepData::None }];
+    let around = Around {
+        buffers,
+        before,
+        observation: observation.buffer,
+        after,
+        action: action.buffer,
+        limits: None,
+        ports: Vec::new(),
+    };
+    Ok((name.to_owned(), emit::image_around(&policy, &outcomes, &around)?))
 }
 
 /// Operations around a network, each of every length.
@@ -196,7 +237,7 @@ fn around() -> Result<(String, Vec<u8>)> {
 
 /// Ops of policy.json with shapes of their own. All others are measured with [`LENGTHS`], so that a new one needs no
 /// line here.
-const WITH_SHAPES: [&str; 4] = ["attention", "linear", "lstm", "gru"];
+const WITH_SHAPES: [&str; 5] = ["attention", "linear", "lstm", "gru", "rotary"];
 
 /// An op of policy.json with the same values for every key.
 struct Filled<'b> {
@@ -376,7 +417,7 @@ mod tests {
         }
         let name = |item: &CostItem| format!("{item:?}");
         let expected = CostItem::all().filter(|f| {
-            ["operation(", "function(", "Attention::Attend)", "Attention::Keep)"]
+            ["operation(", "function(", "Attention::Attend)", "Attention::Keep)", "Attention::Rotary)"]
                 .iter()
                 .any(|kind| name(f).contains(kind))
         });
