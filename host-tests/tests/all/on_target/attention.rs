@@ -32,7 +32,7 @@ fn attentions() -> Vec<Attention> {
     let cache = Cache { heads: 2, dim: 9, slots: 7 };
     let ring =
         Attention { heads: 6, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: false, factor: 0.3 };
-    let wide = Attention { heads: 2, cache: Cache { heads: 1, dim: 64, slots: 5 }, ..ring };
+    let wide = Attention { heads: 2, cache: Cache { heads: 1, dim: 64, slots: 5 }, is_rotated: true, ..ring };
     let whole = Attention { tokens: 4, is_ring: false, is_causal: true, ..ring };
     let drawn = (0..5).map(|_| Attention::draw(&mut random));
     [ring, wide, whole].into_iter().chain(drawn).collect()
