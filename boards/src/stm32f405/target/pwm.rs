@@ -2,7 +2,7 @@
 //! center-aligned, and a break input that switches all six off in hardware. It triggers the ADC in the middle of a
 //! period.
 //!
-//! QEMU does not emulate TIM 1, so this module has never run. `docs/BOARDS.md` lists the checks on hardware.
+//! QEMU does not emulate TIM 1, so this module has never run. `firmware-demo/README.md` lists the checks on hardware.
 
 use core::convert::Infallible;
 
