@@ -2,7 +2,7 @@
 //!
 //! The rate is constant as long as the error falls; then it falls to zero along a cosine, over 3 in 10 of all steps. So
 //! learning ends when it has converged or reaches a limit. The result equals that of a schedule planned for this
-//! length: at equal steps, it is no worse than a cosine from the first step on (docs/QUANTIZER.md).
+//! length: at equal steps, it is no worse than a cosine from the first step on (docs/records/2026-11-22-learning.md).
 
 use std::time::{Duration, Instant};
 
