@@ -11,12 +11,15 @@ use std::process::Command;
 use crate::board::Board;
 use crate::{microbit, mps2, mps3, stm32f405, v6m, virt};
 
-/// Clock of an emulated board. It never runs ahead of the host's clock, whose time is in the host's frames.
+/// Clock of an emulated board. Except [`Self::Free`], it never runs ahead of the host's clock, whose time is in the host's
+/// frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
     /// 2^`0` ns per instruction: times are the same in every run. QEMU then takes about a millisecond per byte of the
     /// serial port.
     Counted(u32),
+    /// 2^`0` ns per instruction, and ahead of the host's clock if the host is fast: for a program that waits for no host.
+    Free(u32),
     /// The host's time, with a variable number of instructions. A byte takes about 40 µs.
     Host,
 }
@@ -119,6 +122,7 @@ impl Target {
         let mut command = self.emulate(elf, serial);
         let count = match clock {
             Clock::Counted(instruction) => format!("shift={instruction},align=on"),
+            Clock::Free(instruction) => format!("shift={instruction},align=off"),
             Clock::Host => "shift=auto".to_owned(),
         };
         command.args(["-icount", &count]);

@@ -11,6 +11,8 @@ pub mod cycles;
 pub mod descriptions;
 pub mod evaluation;
 pub mod firmware;
+#[cfg(unix)]
+pub mod flips;
 pub mod golden;
 pub mod instruction;
 pub mod networks;

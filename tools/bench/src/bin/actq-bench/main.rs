@@ -10,6 +10,8 @@ mod demo;
 mod descriptions;
 mod faults;
 mod fit;
+#[cfg(unix)]
+mod flips;
 mod gallery;
 mod heads;
 mod kernels;
@@ -22,6 +24,8 @@ use std::process::ExitCode;
 
 use actq::runtime::ImageBuffer;
 use actq_bench::capi::{CORES, Core};
+#[cfg(unix)]
+use actq_bench::flips::Region;
 use actq_kernels::cost;
 use anyhow::{Context as _, Result};
 use clap::{Parser, Subcommand};
@@ -79,6 +83,24 @@ enum Command {
     /// One episode of 4 s for each fault: frames lost, delayed, repeated and damaged, a cut cable, a stalled host, a
     /// reset, an update.
     Faults,
+    /// Inject bit flips into the application that runs in QEMU, and class the outcomes by region
+    ///
+    /// Flips are uniform over the bytes of a region and over time. The same seed gives the same flips and outcomes.
+    #[cfg(unix)]
+    Flips {
+        /// Seed of the flips
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Flips in each region
+        #[arg(long, default_value_t = 2000)]
+        count: u64,
+        /// Only these regions
+        #[arg(long, value_name = "REGION,..", value_delimiter = ',', value_parser = region)]
+        region: Vec<Region>,
+        /// Print every flip with its outcome
+        #[arg(long)]
+        list: bool,
+    },
     /// Measure instructions, code, scratch and stack, and compare them with budgets.json
     Budgets {
         /// Write the measured figures to budgets.json
@@ -158,6 +180,14 @@ fn core(name: &str) -> Result<cost::Core, String> {
     cost::Core::of_name(name).ok_or_else(|| format!("use one of {}", cost::Core::ALL.map(|(name, _)| name).join(", ")))
 }
 
+/// Reads the name of a region.
+#[cfg(unix)]
+fn region(name: &str) -> Result<Region, String> {
+    let known = Region::ALL.map(|region| region.to_string());
+    let found = Region::ALL.into_iter().find(|region| region.to_string() == name);
+    found.ok_or_else(|| format!("use one of {}", known.join(", ")))
+}
+
 /// Packages the C interface for a core.
 fn capi(core: &str, out: &Path, image: Option<&Path>, compact: bool) -> Result<()> {
     let names: Vec<_> = CORES.iter().map(|core| core.name).collect();
@@ -177,6 +207,10 @@ fn main() -> ExitCode {
         Command::Demo { episodes, qemu_episodes, .. } => demo::run(episodes, qemu_episodes),
         Command::Descriptions { count, first, qemu } => descriptions::run(first, count, qemu),
         Command::Faults => faults::all(),
+        #[cfg(unix)]
+        Command::Flips { seed, count, region, list } => {
+            flips::run(seed, count, if region.is_empty() { &Region::ALL } else { &region }, list)
+        }
         Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
         Command::Fit { core, only } => fit::run(&core, only.as_deref()),
