@@ -21,7 +21,7 @@ pub use self::denoiser::Denoiser;
 use self::denoiser::Places;
 use self::observation::{Observation, named_states, observed_inputs, read_inputs, refuse_integers};
 pub use self::options::ImportOptions;
-use self::output::{actions, choose, refuse_batch, refused_actions};
+use self::output::{actions, choose, refuse_batch, refuse_column, refused_actions};
 use crate::action;
 use crate::file::model::Model;
 use crate::lower::lower;
@@ -254,6 +254,7 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         (1, values)
     } else {
         refuse_batch(model, &observed, &output.value.shape)?;
+        refuse_column(model, &observed, output)?;
         actions(&output.value.shape, values)?
     };
     // The last nodes of a denoiser are not those of its actions.

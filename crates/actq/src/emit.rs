@@ -1,6 +1,5 @@
 //! The bytes of an image, from a quantized network.
 
-mod copies;
 mod lower;
 mod raw_values;
 mod repack;

@@ -6,6 +6,7 @@
 mod append;
 pub mod arrays;
 mod builder;
+pub(crate) mod copies;
 mod denoising;
 mod evaluate;
 pub mod hoist;

@@ -4,7 +4,7 @@ use actq::error::{Context as _, Error, Result, bail};
 use actq::text::printable;
 
 use super::options::ImportOptions;
-use crate::file::model::Model;
+use crate::file::model::{Model, Port};
 use crate::states::{Cells, Output, is_state};
 use crate::values::expr::Exprs;
 
@@ -138,6 +138,22 @@ pub(super) fn refuse_batch(model: &Model, read: &[usize], act_shape: &[usize]) -
             "the action and the input {:?} have {batch} rows, which is a batch, and a step has one observation; export with a batch of \
              1, and a history with a chunk of its length as [1, {batch}, n]",
             printable(&model.graph.inputs[i].name)
+        );
+    }
+    Ok(())
+}
+
+/// Refuses a column in a file that declares a row for each observation: skl2onnx 1.20 writes the values of one action so,
+/// which would look like a chunk.
+pub(super) fn refuse_column(model: &Model, read: &[usize], output: &Output) -> Result<()> {
+    let &[rows, 1] = &output.value.shape[..] else { return Ok(()) };
+    let has_free_rows = |port: &Port| port.shape.as_deref().is_some_and(|axes| axes.first() == Some(&None));
+    let declared = model.graph.outputs.iter().find(|port| port.name == output.name);
+    if rows > 1 && declared.is_some_and(has_free_rows) && read.iter().any(|&i| has_free_rows(&model.graph.inputs[i])) {
+        bail!(
+            "the action is a column of {rows} values for one observation, and the file declares a row for each observation; export \
+             [1, {rows}] for an action of {rows} values (in skl2onnx by MultiOutputRegressor), or [1, {rows}, 1] for a chunk of \
+             {rows} actions"
         );
     }
     Ok(())

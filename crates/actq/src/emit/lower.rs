@@ -9,10 +9,10 @@
 use actq_kernels::activations::max_prepared_words;
 use actq_kernels::image::{OpKind, Region, kept_words};
 
-use super::copies::Steps;
 use crate::around::{Around, OUTPUT};
 use crate::error::{Result, ensure};
 use crate::graph::ValueId;
+use crate::graph::copies::Steps;
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, Step, StepData};
 use crate::graph::steps::{lower_nodes, readers};
 use crate::policy::Policy;

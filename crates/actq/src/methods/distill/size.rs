@@ -8,6 +8,7 @@ use actq_kernels::math::Function;
 
 use super::balance::balance_bytes;
 use super::dimension::{Dimension, Widths};
+use crate::graph::copies::Steps;
 use crate::graph::lowering::{Lowering, Slice, Step};
 use crate::graph::operation::{Operand, Product};
 use crate::graph::steps::{lower_nodes, readers};
@@ -183,13 +184,16 @@ pub(super) fn cycles_of_elements(graph: &Graph, core: Core) -> f64 {
     let first = graph.denoising.as_ref().map_or(graph.nodes.len(), |denoising| denoising.first);
     let (once, repeated) = graph.nodes.split_at(first);
     lower_nodes(once, &mut lowering);
-    let before = lowering.steps.len();
+    let first_denoising_op = lowering.steps.len();
     lower_nodes(repeated, &mut lowering);
+    let Lowering { steps, buffers, .. } = lowering;
+    let Steps { steps, first_denoising_op, .. } =
+        Steps { steps, first_denoising_op, buffers: &buffers }.without_copies(&|_| false);
     let of_step = |(i, step): (usize, &Step<Slice>)| {
-        let runs = if i < before { 1 } else { graph.denoising_steps() as u64 };
+        let runs = if i < first_denoising_op { 1 } else { graph.denoising_steps() as u64 };
         runs * core.rates().of_elements(step.kind, step.dst.len).cycles
     };
-    let elementwise = lowering.steps.iter().enumerate().filter(|(_, step)| !matches!(step.kind, OpKind::Linear { .. }));
+    let elementwise = steps.iter().enumerate().filter(|(_, step)| !matches!(step.kind, OpKind::Linear { .. }));
     elementwise.map(of_step).sum::<u64>() as f64
 }
 

@@ -31,6 +31,8 @@ pub(crate) fn run(seed: u64, count: u64, regions: &[Region], list: bool) -> Resu
             let outcome = board.run(&flip).with_context(|| format!("{flip:?}"))?;
             if list {
                 println!("{flip:?} {outcome:?}");
+            } else if (number + 1).is_multiple_of(100) {
+                println!("{region}: {} of {count} flips", number + 1);
             }
             if let Outcome::Detected { by, ticks, .. } = outcome {
                 causes.entry((region, by)).or_default().push(ticks);

@@ -1,19 +1,20 @@
 //! Fewer copies: a part of a value is read in its place, a part of a concatenation is computed in its place, and copies
 //! of neighbours are one.
 //!
-//! It works on operations over buffers ([`crate::graph::lowering`]), each of which the graph lowers alone.
+//! It works on operations over buffers ([`crate::graph::lowering`]), which the graph's nodes emit one by one.
 
 use actq_kernels::image::OpKind;
 
-use crate::graph::lowering::{Buffer, BufferId, Lifetime, Slice, Step};
+use super::lowering::{Buffer, BufferId, Lifetime, Slice, Step};
 
 /// Operations over buffers, in order.
-pub(super) struct Steps<'a> {
+pub(crate) struct Steps<'a> {
     /// The operations.
-    pub(super) steps: Vec<Step<Slice>>,
+    pub(crate) steps: Vec<Step<Slice>>,
     /// First operation of the denoising steps, which run several times; 0 if none do.
-    pub(super) first_denoising_op: usize,
-    pub(super) buffers: &'a [Buffer],
+    pub(crate) first_denoising_op: usize,
+    /// The buffers.
+    pub(crate) buffers: &'a [Buffer],
 }
 
 /// An operation's index, and its operands with other slices.
@@ -21,7 +22,7 @@ type Renamed = (usize, [Option<Slice>; 3]);
 
 impl Steps<'_> {
     /// Removes copies. The parts of some buffers stay `apart`: computed elsewhere, and copied.
-    pub(super) fn without_copies(mut self, apart: &dyn Fn(BufferId) -> bool) -> Self {
+    pub(crate) fn without_copies(mut self, apart: &dyn Fn(BufferId) -> bool) -> Self {
         let mut at = 0;
         while let Some(step) = self.steps.get(at) {
             let from = step.copied().filter(|_| self.is_of_step(step.dst));
