@@ -2,7 +2,7 @@
 
 use actq_kernels::activations::{Plan, max_prepared_words};
 use actq_kernels::cost::Core;
-use actq_kernels::image::{BlockRecord, Image, Matrix, MatrixRecord, Port, Records, RowBlock, header as h, op};
+use actq_kernels::image::{BlockRecord, Image, Matrix, MatrixRecord, OpKind, Port, Records, RowBlock, header as h, op};
 use actq_kernels::layout::{BlockShape, Lanes, pack};
 
 use super::writer::sealed;
@@ -42,7 +42,10 @@ struct Repacked {
 
 impl Repacked {
     fn of(image: &Image<'_>, core: Core) -> Result<Self> {
-        let (mut words, mut records, mut work) = (vec![0; h::WORDS], Vec::new(), 0);
+        let (mut words, mut records) = (vec![0; h::WORDS], Vec::new());
+        // Attention needs as much on every core.
+        let attention = image.ops().filter(|op| op.kind == OpKind::Attend);
+        let mut work = attention.map(|op| op.cache().work_words()).max().unwrap_or(0);
         for matrix in image.matrices() {
             let mut blocks = Vec::new();
             for block in matrix.blocks() {

@@ -123,10 +123,16 @@ impl Trained {
     ) -> u32 {
         let (n, at) = (op.dst().len, old[old[h::W_OPS] as usize + h::OP_WORDS * i + 3] as usize);
         let constants = op.constants().count();
-        if op.kind == OpKind::Denoise {
-            // Its first words are not only f32 constants: see the writer.
+        // Data whose first words are not only f32 constants: see the writer.
+        let of_words = match op.kind {
+            OpKind::Denoise => Some(h::COEFFICIENTS * image.denoising_steps()),
+            OpKind::Rotary => Some(n / op.rotated_heads()[0]),
+            OpKind::Keep | OpKind::Attend => Some(0),
+            _ => None,
+        };
+        if let Some(more) = of_words {
             let offset = words.len() as u32;
-            words.extend(&old[at..at + constants + h::COEFFICIENTS * image.denoising_steps()]);
+            words.extend(&old[at..at + constants + more]);
             *shared = words.len();
             return offset;
         }
@@ -227,7 +233,8 @@ mod tests {
     use crate::budget::Budget;
     use crate::data::Recordings;
     use crate::emit::{Core, repack};
-    use crate::graph::Graph;
+    use crate::graph::ops::{Attention, Linear, Rotary};
+    use crate::graph::{Graph, WeightMatrix};
     use crate::methods::{Method, Options};
     use crate::pipeline::quantize;
     use crate::policy::Policy;
@@ -266,9 +273,30 @@ mod tests {
         trained
     }
 
+    /// Makes a network of attention to one token with a rotary position.
+    fn attentive() -> Graph {
+        let mut graph = Graph::new(8);
+        let rotary = Rotary { heads: 2, dim: 4, cos: vec![0.8, 0.6], sin: vec![0.6, 0.8] };
+        let rotated = graph.add(rotary, &[0]).expect("it fits");
+        let attention = Attention { heads: 2, kv_heads: 2, dim: 4, factor: 0.5, causal: false, context: 0 };
+        let attended = graph.add(attention, &[rotated, 0, 0]).expect("it fits");
+        let matrix = WeightMatrix { name: "m".into(), rows: 2, cols: 8, data: (1..17).map(|i| i as f32).collect() };
+        let matrix = graph.add_matrix(matrix).expect("a matrix");
+        graph.add(Linear { matrix, bias: vec![0.1; 2] }, &[attended]).expect("it fits");
+        graph
+    }
+
     #[test]
     fn trained_values_are_those_of_the_new_image() -> Result<()> {
-        for (graph, core) in [(testing::lstm(), Core::M4f), (testing::lstm(), Core::M3), (testing::mlp(), Core::M0)] {
+        let lstm = testing::lstm;
+        let graphs = [
+            (lstm(), Core::M4f),
+            (lstm(), Core::M3),
+            (testing::mlp(), Core::M0),
+            (attentive(), Core::M4f),
+            (testing::transformer(100), Core::M3),
+        ];
+        for (graph, core) in graphs {
             for (width, group) in [(Width::W2, 32), (Width::W3, 0), (Width::W4, 32), (Width::W8, 0)] {
                 let bytes = image_of(graph.clone(), width, group, core);
                 let mut values = values_of(&bytes);

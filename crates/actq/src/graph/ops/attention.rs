@@ -160,6 +160,14 @@ impl Attention {
         if let Some(cache) = to.cache(of) {
             return (cache, sizes);
         }
+        // An operation's regions do not overlap.
+        let values = if inputs[1] == inputs[2] {
+            let copy = to.buffer(values.len, Lifetime::Step);
+            to.emit(OpKind::Copy, to.whole(copy), Some(values), None, StepData::None);
+            to.whole(copy)
+        } else {
+            values
+        };
         let cache = to.buffer(sizes.words(), lifetime);
         let data = vec![pair(self.kv_heads, self.dim), pair(slots, usize::from(self.context > 0))];
         to.emit(OpKind::Keep, to.whole(cache), Some(keys), Some(values), StepData::Words(data));
