@@ -270,7 +270,7 @@ fn place(steps: &Steps<'_>) -> Placement {
 fn lifetimes(steps: &Steps<'_>) -> Vec<(usize, (usize, usize))> {
     let mut lives: Vec<(usize, (usize, usize))> = Vec::new();
     for (at, step) in steps.steps.iter().enumerate() {
-        for slice in [Some(step.dst), step.src, step.third].into_iter().flatten() {
+        for slice in step.operands().into_iter().flatten() {
             let last = match steps.buffers[slice.buffer].lifetime {
                 Lifetime::Step => at,
                 Lifetime::Output => usize::MAX,

@@ -187,7 +187,8 @@ impl Step<Slice> {
         self.src.filter(|_| self.kind == OpKind::Copy)
     }
 
-    fn operands(&self) -> [Option<Slice>; 3] {
+    /// Returns destination, source and third operand.
+    pub(crate) fn operands(&self) -> [Option<Slice>; 3] {
         [Some(self.dst), self.src, self.third]
     }
 

@@ -120,18 +120,7 @@ fn attention((heads, kv_heads): (usize, usize), shapes: &[(usize, usize)]) -> Re
     }
     let [observation, action] = [512, 8].map(&mut value);
     add(OpKind::Copy, observation, Some(Slice { buffer: 0, offset: 0, len: 512 }), None, StepData::None);
-    let output = Slice { buffer: OUTPUT, ..action };
-    let after = vec![Step { kind: OpKind::Copy, dst: action, src: Some(output), third: None, data: StepData::None }];
-    let around = Around {
-        buffers,
-        before,
-        observation: observation.buffer,
-        after,
-        action: action.buffer,
-        limits: None,
-        ports: Vec::new(),
-    };
-    Ok((name, emit::image_around(&policy, &outcomes, &around)?))
+    Ok((name, image_around(&policy, &outcomes, buffers, before, [observation, action])?))
 }
 
 /// Rotary positions of heads, dimensions and tokens.
@@ -160,6 +149,18 @@ fn rotary() -> Result<(String, Vec<u8>)> {
         before.push(Step { kind: OpKind::Rotary, dst, src: None, third: None, data });
     }
     let [observation, action] = [8, 8].map(|len| copy(&mut before, len));
+    Ok((name.to_owned(), image_around(&policy, &outcomes, buffers, before, [observation, action])?))
+}
+
+/// Makes an image of a network with operations before it, which give its `observation`; its output is copied to the
+/// `action`.
+fn image_around(
+    policy: &Policy,
+    outcomes: &[Outcome],
+    buffers: Vec<Buffer>,
+    before: Vec<Step<Slice>>,
+    [observation, action]: [Slice; 2],
+) -> Result<Vec<u8>> {
     let output = Slice { buffer: OUTPUT, ..action };
     let after = vec![Step { kind: OpKind::Copy, dst: action, src: Some(output), third: None, data: StepData::None }];
     let around = Around {
@@ -171,7 +172,7 @@ fn rotary() -> Result<(String, Vec<u8>)> {
         limits: None,
         ports: Vec::new(),
     };
-    Ok((name.to_owned(), emit::image_around(&policy, &outcomes, &around)?))
+    Ok(emit::image_around(policy, outcomes, &around)?)
 }
 
 /// Operations around a network, each of every length.
@@ -221,18 +222,7 @@ fn around() -> Result<(String, Vec<u8>)> {
     }
     let [observation, action] = [8, 8].map(|len| value(len, Lifetime::Step));
     add(OpKind::Copy, observation, Some(Slice { buffer: 0, offset: 0, len: 8 }), None, StepData::None);
-    let output = Slice { buffer: OUTPUT, ..action };
-    let after = vec![Step { kind: OpKind::Copy, dst: action, src: Some(output), third: None, data: StepData::None }];
-    let around = Around {
-        buffers,
-        before,
-        observation: observation.buffer,
-        after,
-        action: action.buffer,
-        limits: None,
-        ports: Vec::new(),
-    };
-    Ok((name.to_owned(), emit::image_around(&policy, &outcomes, &around)?))
+    Ok((name.to_owned(), image_around(&policy, &outcomes, buffers, before, [observation, action])?))
 }
 
 /// Ops of policy.json with shapes of their own. All others are measured with [`LENGTHS`], so that a new one needs no
