@@ -29,6 +29,23 @@ pub enum Output {
     Coast,
 }
 
+impl Output {
+    /// Returns its content, for a checksum.
+    pub(crate) const fn words(&self) -> [u32; 2] {
+        match self {
+            Self::Drive(value) => [0, value.to_bits()],
+            Self::Brake => [1, 0],
+            Self::Coast => [2, 0],
+        }
+    }
+
+    /// Returns `true` unless it drives a value outside the axis' limits. [`Safety::tick`](crate::Safety::tick) returns
+    /// none: check it where the value becomes a duty cycle or a message, against faults of the processor.
+    pub fn is_within(&self, axis: &Axis) -> bool {
+        !matches!(self, Self::Drive(value) if !(axis.low..=axis.high).contains(value))
+    }
+}
+
 /// Limits and safe action of an axis, in the unit of the actions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
@@ -126,6 +143,18 @@ impl Axis {
     /// Returns the action after latching.
     pub const fn safe(&self) -> SafeAction {
         self.safe
+    }
+
+    /// Returns its content, for a checksum.
+    pub(crate) const fn words(&self) -> [u32; 6] {
+        let Self { low, high, rate, start, safe } = self;
+        let (safe, step) = match safe {
+            SafeAction::Hold => (0, 0),
+            SafeAction::Brake => (1, 0),
+            SafeAction::Coast => (2, 0),
+            SafeAction::Ramp { step } => (3, step.to_bits()),
+        };
+        [low.to_bits(), high.to_bits(), rate.to_bits(), start.to_bits(), safe, step]
     }
 
     /// Limits a finite value. It compares, because a Cortex-M4 has no instruction for `f32::max` and would call a

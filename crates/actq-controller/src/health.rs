@@ -59,6 +59,16 @@ impl Health {
         }
     }
 
+    /// Returns `true` if a check has passed.
+    pub(crate) fn has_passed(&self, check: Check) -> bool {
+        self.passed.iter().zip(Check::ALL).any(|(passed, which)| *passed && which == check)
+    }
+
+    /// Returns the outcomes as bits, for a checksum.
+    pub(crate) fn bits(&self) -> u8 {
+        self.passed.iter().fold(0, |bits, passed| bits << 1 | u8::from(*passed))
+    }
+
     /// Returns the permission to arm.
     ///
     /// # Errors

@@ -45,6 +45,10 @@ impl<const AXES: usize> Safety<AXES> {
     /// range.
     pub fn set(&mut self, token: u32, parameter: Parameter, axis: u8, value: f32) -> Result<(), Refusal> {
         self.may_change(token)?;
+        self.change(|safety| safety.replace(parameter, axis, value))
+    }
+
+    fn replace(&mut self, parameter: Parameter, axis: u8, value: f32) -> Result<(), Refusal> {
         if parameter == Parameter::Deadline {
             let built = &self.built.deadline;
             self.deadline = whole(value, *built.start(), *built.end())?;

@@ -3,6 +3,9 @@
 //! A control interrupt calls [`Safety::tick`]. All other calls come from lower priorities, through [`Shared`]. A call
 //! takes at most time proportional to the number of axes.
 
+#[cfg(test)]
+mod tests;
+
 use core::mem;
 use core::ops::RangeInclusive;
 
@@ -10,7 +13,7 @@ use actq_link::code::{self, Fault, Refusal};
 
 use crate::axis::{Axis, Output};
 use crate::health::{Check, Health};
-use crate::state::{Disarmed, State};
+use crate::state::{Disarmed, Latched, State};
 
 /// A [`Safety`] shared with a control interrupt, with the firmware's kind of lock: RTIC's resource, a critical section.
 pub trait Shared<const AXES: usize> {
@@ -47,6 +50,10 @@ pub struct Safety<const AXES: usize> {
     since_observation: u32,
     ticks: u32,
     token: u32,
+    /// The memory was changed by something else.
+    is_lost: bool,
+    /// [`Self::sum`] after the last change.
+    sum: u32,
 }
 
 impl<const AXES: usize> Safety<AXES> {
@@ -57,7 +64,7 @@ impl<const AXES: usize> Safety<AXES> {
     pub fn new(axes: [Axis; AXES], deadline: RangeInclusive<u32>, seed: u32) -> Self {
         // Below the age that means that there was no observation.
         let (least, most) = (*deadline.start().max(&1), *deadline.end().clamp(&1, &(u32::MAX - 1)));
-        Self {
+        let mut safety = Self {
             axes,
             deadline: most,
             built: Built { axes, deadline: least..=most },
@@ -67,27 +74,63 @@ impl<const AXES: usize> Safety<AXES> {
             since_observation: u32::MAX,
             ticks: 0,
             token: next_token(seed),
+            is_lost: false,
+            sum: 0,
+        };
+        safety.sum = safety.sum();
+        safety
+    }
+
+    /// Makes a change. If anything else has changed the memory since the last one, the limits and the last outputs
+    /// mean nothing any more: then outputs that brake brake, all others coast, and nothing arms again.
+    pub(crate) fn change<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
+        if self.sum != self.sum() {
+            self.is_lost = true;
+            if !matches!(self.state, State::Disarmed(_)) {
+                self.state = State::Latched(Latched::lost());
+                self.fault = Some(Fault::Memory);
+                self.token = next_token(self.token);
+            }
         }
+        let result = make(self);
+        self.sum = self.sum();
+        result
+    }
+
+    /// Returns a checksum of all other fields. It differs after a change of any single bit.
+    #[inline(never)]
+    fn sum(&self) -> u32 {
+        let Self { axes, deadline, built, health, state, fault, since_observation, ticks, token, is_lost, sum: _ } =
+            self;
+        let fault = fault.map_or(0, Fault::code);
+        let bits = u32::from_le_bytes([fault, u8::from(*is_lost), health.bits(), 0]);
+        let words =
+            [*deadline, *built.deadline.start(), *built.deadline.end(), *since_observation, *ticks, *token, bits];
+        let sum = words.into_iter().fold(0, mix);
+        let sum = axes.iter().chain(&built.axes).fold(sum, |sum, axis| axis.words().into_iter().fold(sum, mix));
+        state.sum(sum)
     }
 
     /// Returns the outputs from now to the next tick. Call it at every tick, and only there.
     pub fn tick(&mut self) -> [Output; AXES] {
-        self.ticks = self.ticks.wrapping_add(1);
-        self.since_observation = self.since_observation.saturating_add(1);
-        if let State::Armed(armed) = &self.state {
-            // The action's age does not include the tick that begins now.
-            let late = armed.since_action() >= self.deadline;
-            if self.is_stale() {
-                self.trip(Fault::Stale);
-            } else if late {
-                self.trip(Fault::Late);
+        self.change(|safety| {
+            safety.ticks = safety.ticks.wrapping_add(1);
+            safety.since_observation = safety.since_observation.saturating_add(1);
+            if let State::Armed(armed) = &safety.state {
+                // The action's age does not include the tick that begins now.
+                let late = armed.since_action() >= safety.deadline;
+                if safety.is_stale() {
+                    safety.latch(Fault::Stale);
+                } else if late {
+                    safety.latch(Fault::Late);
+                }
             }
-        }
-        match &mut self.state {
-            State::Disarmed(disarmed) => disarmed.tick(),
-            State::Armed(armed) => armed.tick(&self.axes),
-            State::Latched(latched) => latched.tick(&self.axes),
-        }
+            match &mut safety.state {
+                State::Disarmed(disarmed) => disarmed.tick(),
+                State::Armed(armed) => armed.tick(&safety.axes),
+                State::Latched(latched) => latched.tick(&safety.axes),
+            }
+        })
     }
 
     /// Returns `true` if no valid observation arrived within the deadline.
@@ -97,15 +140,17 @@ impl<const AXES: usize> Safety<AXES> {
 
     /// Records a valid observation.
     pub fn observed(&mut self) {
-        self.since_observation = 0;
+        self.change(|safety| safety.since_observation = 0);
     }
 
     /// Records that ticks may have been lost, as while flash was written: the age of the last observation is unknown.
     /// So arming needs a new one. No effect while armed, when nothing may hold up the tick.
     pub fn stalled(&mut self) {
-        if !matches!(self.state, State::Armed(_)) {
-            self.since_observation = u32::MAX;
-        }
+        self.change(|safety| {
+            if !matches!(safety.state, State::Armed(_)) {
+                safety.since_observation = u32::MAX;
+            }
+        });
     }
 
     /// Takes an action of the head. While armed, applies it and returns the outputs' targets, within the limits.
@@ -114,27 +159,33 @@ impl<const AXES: usize> Safety<AXES> {
     ///
     /// Returns a fault, and latches, unless the action has one finite value for each axis.
     pub fn act(&mut self, action: &[f32]) -> Result<Option<[f32; AXES]>, Fault> {
-        let fault = match <&[f32; AXES]>::try_from(action) {
-            Err(_) => Fault::ActionLength,
-            Ok(action) if !action.iter().all(|value| value.is_finite()) => Fault::ActionNotFinite,
-            Ok(action) => {
-                let State::Armed(armed) = &mut self.state else { return Ok(None) };
-                let mut target = *action;
-                target.iter_mut().zip(&self.axes).for_each(|(value, axis)| *value = axis.limit(*value));
-                armed.follow(target);
-                return Ok(Some(target));
-            }
-        };
-        self.trip(fault);
-        Err(fault)
+        self.change(|safety| {
+            let fault = match <&[f32; AXES]>::try_from(action) {
+                Err(_) => Fault::ActionLength,
+                Ok(action) if !action.iter().all(|value| value.is_finite()) => Fault::ActionNotFinite,
+                Ok(action) => {
+                    let State::Armed(armed) = &mut safety.state else { return Ok(None) };
+                    let mut target = *action;
+                    target.iter_mut().zip(&safety.axes).for_each(|(value, axis)| *value = axis.limit(*value));
+                    armed.follow(target);
+                    return Ok(Some(target));
+                }
+            };
+            safety.latch(fault);
+            Err(fault)
+        })
     }
 
     /// Latches if armed: after a failure of the head, an overlong tick, or a break input.
     pub fn trip(&mut self, fault: Fault) {
+        self.change(|safety| safety.latch(fault));
+    }
+
+    fn latch(&mut self, fault: Fault) {
         self.state = match mem::replace(&mut self.state, State::Disarmed(Disarmed::new())) {
             State::Armed(armed) => {
                 self.fault = Some(fault);
-                self.renew();
+                self.token = next_token(self.token);
                 State::Latched(armed.latch(fault))
             }
             other => other,
@@ -143,10 +194,15 @@ impl<const AXES: usize> Safety<AXES> {
 
     /// Records the outcome of a check. A failed check prevents arming, and latches an armed controller.
     pub fn check(&mut self, check: Check, passed: bool) {
-        self.health.set(check, passed);
-        if !passed {
-            self.trip(check.fault());
+        if passed && self.health.has_passed(check) {
+            return;
         }
+        self.change(|safety| {
+            safety.health.set(check, passed);
+            if !passed {
+                safety.latch(check.fault());
+            }
+        });
     }
 
     /// Returns the reason why arming would be refused now.
@@ -159,6 +215,7 @@ impl<const AXES: usize> Safety<AXES> {
             State::Latched(latched) => matches!(latched.fault(), Fault::Break | Fault::Overrun),
             _ => false,
         };
+        let hardware = hardware || self.is_lost;
         let limits = || self.axes.iter().any(Axis::is_still).then_some(Refusal::Limits);
         let stale = self.is_stale().then_some(Refusal::Stale);
         self.health.ready().err().or(hardware.then_some(Refusal::Hardware)).or(stale).or_else(limits)
@@ -175,27 +232,29 @@ impl<const AXES: usize> Safety<AXES> {
         if token != self.token {
             return Err(Refusal::Token);
         }
-        if let Some(refusal) = self.refusal() {
-            return Err(refusal);
-        }
-        let ready = self.health.ready()?;
-        self.state = match mem::replace(&mut self.state, State::Disarmed(Disarmed::new())) {
-            State::Disarmed(disarmed) => State::Armed(disarmed.arm(ready)),
-            State::Latched(latched) => State::Armed(latched.arm(ready)),
-            armed @ State::Armed(_) => armed,
-        };
-        self.renew();
-        Ok(())
+        self.change(|safety| {
+            // Unless the memory is lost.
+            let ready = safety.refusal().map_or_else(|| safety.health.ready(), Err)?;
+            safety.state = match mem::replace(&mut safety.state, State::Disarmed(Disarmed::new())) {
+                State::Disarmed(disarmed) => State::Armed(disarmed.arm(ready)),
+                State::Latched(latched) => State::Armed(latched.arm(ready)),
+                armed @ State::Armed(_) => armed,
+            };
+            safety.token = next_token(safety.token);
+            Ok(())
+        })
     }
 
     /// Disarms the controller; never refused.
     pub fn disarm(&mut self) {
-        self.state = match mem::replace(&mut self.state, State::Disarmed(Disarmed::new())) {
-            State::Disarmed(disarmed) => State::Disarmed(disarmed),
-            State::Armed(armed) => State::Disarmed(armed.disarm()),
-            State::Latched(latched) => State::Disarmed(latched.disarm()),
-        };
-        self.renew();
+        self.change(|safety| {
+            safety.state = match mem::replace(&mut safety.state, State::Disarmed(Disarmed::new())) {
+                State::Disarmed(disarmed) => State::Disarmed(disarmed),
+                State::Armed(armed) => State::Disarmed(armed.disarm()),
+                State::Latched(latched) => State::Disarmed(latched.disarm()),
+            };
+            safety.token = next_token(safety.token);
+        });
     }
 
     /// Checks that settings may change: the controller is disarmed, and the request's token is current.
@@ -241,7 +300,7 @@ impl<const AXES: usize> Safety<AXES> {
 
     /// Changes the token, so that earlier requests, observations and actions are no longer accepted.
     pub fn renew(&mut self) {
-        self.token = next_token(self.token);
+        self.change(|safety| safety.token = next_token(safety.token));
     }
 
     /// Returns the token that requests must contain.
@@ -264,6 +323,11 @@ impl<const AXES: usize> Safety<AXES> {
     pub const fn built_axes(&self) -> &[Axis; AXES] {
         &self.built.axes
     }
+}
+
+/// Continues a checksum with a word.
+pub(crate) const fn mix(sum: u32, word: u32) -> u32 {
+    sum.rotate_left(1) ^ word
 }
 
 /// Returns the next of 2^32 different numbers, by a full-period linear congruential generator with the constants of

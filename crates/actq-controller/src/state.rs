@@ -32,6 +32,7 @@ use actq_link::code::Fault;
 
 use crate::axis::{Axis, Output};
 use crate::health::Ready;
+use crate::safety::mix;
 
 /// The disarmed state: outputs coast.
 #[derive(Debug)]
@@ -122,6 +123,11 @@ impl<const AXES: usize> Armed<AXES> {
 }
 
 impl<const AXES: usize> Latched<AXES> {
+    /// Returns the state after a loss of the last outputs: without any.
+    pub(crate) const fn lost() -> Self {
+        Self { last: [Output::Coast; AXES], fault: Fault::Memory }
+    }
+
     /// Returns the cause.
     pub const fn fault(&self) -> Fault {
         self.fault
@@ -155,4 +161,19 @@ pub enum State<const AXES: usize> {
     Armed(Armed<AXES>),
     /// The latched state: outputs do their safe actions.
     Latched(Latched<AXES>),
+}
+
+impl<const AXES: usize> State<AXES> {
+    /// Continues a checksum with the state.
+    pub(crate) fn sum(&self, sum: u32) -> u32 {
+        let outputs = |last: &[Output; AXES], sum| last.iter().flat_map(Output::words).fold(sum, mix);
+        match self {
+            Self::Disarmed(Disarmed { is_coasting }) => mix(sum, u32::from(*is_coasting)),
+            Self::Armed(Armed { last, target, since_action }) => {
+                let sum = mix(mix(outputs(last, sum), *since_action), 2 + u32::from(target.is_some()));
+                target.iter().flatten().fold(sum, |sum, value| mix(sum, value.to_bits()))
+            }
+            Self::Latched(Latched { last, fault }) => mix(outputs(last, sum), 4 + u32::from(fault.code())),
+        }
+    }
 }

@@ -83,6 +83,8 @@ codes! {
         Overrun = 9, "a control tick took longer than its period";
         /// The hardware's break input switched the outputs off.
         Break = 10, "the break input switched the outputs off";
+        /// A bit of the controller's state or limits in memory changed: a restart is necessary.
+        Memory = 11, "the controller's state or limits in memory changed; restart it";
     }
 }
 
@@ -129,8 +131,10 @@ codes! {
         Unsupported = 18, "the controller does not support this request";
         /// The kernels refuse the image, or its input and output lengths do not match the controller.
         Unfit = 19, "this controller cannot run the image";
-        /// The break input is active, or a break or an overrun latched and the controller was not disarmed since.
-        Hardware = 20, "the break input is active, or a break or an overrun latched; remove the cause, disarm, and then arm";
+        /// The break input is active, a break or an overrun latched and the controller was not disarmed since, or its
+        /// memory changed.
+        Hardware = 20, "the break input is active, or a break or an overrun latched: remove the cause, disarm, and then arm; or the \
+            memory changed: restart";
         /// An axis has no finite limits, neither from the built-in image nor from the build, or too small a rate.
         Limits = 21, "an axis has no limits or too small a rate, so no output may move; build the firmware with --limits LOW:HIGH, or with an image \
             whose actions have low and high";
