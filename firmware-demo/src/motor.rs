@@ -57,7 +57,7 @@ impl<S: Stage> Motor<S> {
         // In every tick, so that the rotor's angle is known when the outputs are driven again.
         let measured = self.measure();
         let duties = match (outputs.first(), axes.first(), measured) {
-            (Some(Output::Drive(value)), Some(axis), Some(measured)) => {
+            (Some(output @ Output::Drive(value)), Some(axis), Some(measured)) if output.is_within(axis) => {
                 // An axis with a single value commands no current.
                 let moves = axis.low() < axis.high();
                 let q = if moves { value / largest(axis) * CURRENT } else { 0.0 };

@@ -20,8 +20,11 @@ impl<S: Stage> Bridges<S> {
     }
 
     /// Applies the outputs of a tick; returns `false` if the stage is off and should be on, or coasts and the break
-    /// input is active. All bridges share one enable: if one axis coasts, all of them do.
+    /// input is active, or if a value is outside its limits, which switches the stage off. All bridges share one enable: if one axis coasts, all of them do.
     pub fn apply(&mut self, outputs: &[Output], axes: &[Axis]) -> bool {
+        if !outputs.iter().zip(axes).all(|(output, axis)| output.is_within(axis)) {
+            return self.fail();
+        }
         let mut shares = [0.0; 3];
         for ((place, output), axis) in shares.iter_mut().zip(outputs).zip(axes) {
             *place = match output {
@@ -42,7 +45,6 @@ impl<S: Stage> Bridges<S> {
     }
 
     /// Switches all bridges off until the outputs coast; returns `false`.
-    #[cfg(feature = "foc")]
     pub(crate) fn fail(&mut self) -> bool {
         self.stage.disable();
         self.on = true;
@@ -147,10 +149,28 @@ mod tests {
         let duties = |bridges: &Bridges<Mock>| bridges.stage.duties();
         assert!(bridges.apply(&[-1.0, 0.0, 3.0, 2.0].map(Output::Drive), &axes));
         assert_eq!((duties(&bridges), bridges.stage.on), ([0, 250, 1000], true));
-        assert!(bridges.apply(&[Output::Drive(1.0), Output::Brake, Output::Drive(f32::NAN), Output::Coast], &axes));
-        assert_eq!((duties(&bridges), bridges.stage.on), ([500, 0, 0], true));
+        assert!(bridges.apply(&[Output::Drive(1.0), Output::Brake, Output::Drive(3.0), Output::Coast], &axes));
+        assert_eq!((duties(&bridges), bridges.stage.on), ([500, 0, 1000], true));
         assert!(bridges.apply(&[Output::Drive(0.0), Output::Coast, Output::Brake, Output::Brake], &axes));
         assert!(!bridges.stage.on);
+    }
+
+    /// No controller gives such values, and a processor that has jumped may.
+    #[test]
+    fn values_outside_the_limits_switch_the_stage_off_until_it_coasts() {
+        let axes = [Axis::new(-1.0, 3.0, 1.0, 0.0, SafeAction::Brake).expect("the axis is valid"); 4];
+        for value in [f32::NAN, f32::INFINITY, -1.0 - f32::EPSILON, 3.1] {
+            for axis in 0..4 {
+                let mut bridges = Bridges::new(Mock::default());
+                let mut outputs = [Output::Drive(0.0); 4];
+                assert!(bridges.apply(&outputs, &axes) && bridges.stage.on);
+                outputs[axis] = Output::Drive(value);
+                assert!(!bridges.apply(&outputs, &axes) && !bridges.stage.on, "{value}");
+                assert!(!bridges.apply(&[Output::Drive(0.0); 4], &axes) && !bridges.stage.on, "{value}");
+                assert!(bridges.apply(&[Output::Coast; 4], &axes));
+                assert!(bridges.apply(&[Output::Drive(0.0); 4], &axes) && bridges.stage.on, "{value}");
+            }
+        }
     }
 
     #[test]
