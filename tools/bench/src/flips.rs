@@ -124,7 +124,7 @@ impl fmt::Display for Detection {
 /// The consequence of a flip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
-    /// No action differs in a bit, no output by more than a tick's change, and nothing was detected.
+    /// No action differs in a bit, no output by more than the change of two ticks, and nothing was detected.
     Masked,
     /// Something detected it after `ticks`; `wrong` if an output was wrong before.
     Detected {
@@ -171,17 +171,17 @@ impl<'a> Judge<'a> {
         Self { reference, axes, is_outside: false, share: 0.0, wrong: 0, last: None }
     }
 
-    /// Requires that outputs are within their limits.
-    fn limits(&mut self, outputs: &[Option<f32>]) {
+    /// Returns `true` if outputs are within their limits.
+    fn is_within(&self, outputs: &[Option<f32>]) -> bool {
         let is_outside = |(output, axis): (&Option<f32>, &Axis)| {
             output.is_some_and(|value| !(axis.low()..=axis.high()).contains(&value))
         };
-        self.is_outside |= outputs.iter().zip(self.axes).any(is_outside);
+        !outputs.iter().zip(self.axes).any(is_outside)
     }
 
     /// Takes the end of a period.
     fn take(&mut self, period: usize, sample: &Sample) {
-        self.limits(&sample.outputs);
+        self.is_outside |= !self.is_within(&sample.outputs);
         let Some(right) = self.reference.get(period) else { return };
         let mut share = None;
         for (i, axis) in self.axes.iter().enumerate() {
@@ -190,7 +190,8 @@ impl<'a> Judge<'a> {
                 let [is, should] = [sample.targets[i], right.targets[i]].map(f32::from_bits);
                 share = Some(((is - should).abs() / range).max(share.unwrap_or(0.0)));
             }
-            // An action may come a tick earlier or later.
+            // An action may come two ticks earlier or later: a trial stops twice more than the periods without a flip, and
+            // each stop ends a tick.
             let difference = match (sample.outputs[i], right.outputs[i]) {
                 (Some(is), Some(should)) => (is - should).abs(),
                 (is, should) => {
@@ -201,7 +202,7 @@ impl<'a> Judge<'a> {
                     }
                 }
             };
-            if difference.is_nan() || difference > axis.rate() * ROUNDING {
+            if difference.is_nan() || difference > 2.0 * axis.rate() * ROUNDING {
                 share = Some((difference / range).max(share.unwrap_or(0.0)));
             }
         }

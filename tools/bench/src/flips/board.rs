@@ -32,8 +32,10 @@ const SETTLE: u32 = 2 * PERIOD;
 const START: u32 = 2000;
 
 /// Indices of registers in [`Gdb::core`].
+const R0: usize = 0;
 const R1: usize = 1;
 const SP: usize = 13;
+const LR: usize = 14;
 const PC: usize = 15;
 const XPSR: usize = 16;
 /// Bits of xPSR within an If-Then block.
@@ -362,7 +364,19 @@ impl<'a> Board<'a> {
         }
         self.restart_tick(&core)?;
         let outputs = self.gdb.read(core[R1], 8 * ACT_DIM)?;
-        judge.limits(&drives(&outputs));
+        if !judge.is_within(&drives(&outputs)) {
+            // The power stage may refuse them.
+            let back = core[LR] & !1;
+            self.gdb.set_breakpoint(back)?;
+            self.gdb.resume()?;
+            let core = self.gdb.core()?;
+            self.gdb.clear_breakpoint(back)?;
+            if core[PC] != back {
+                let stop = self.stop(&core)?;
+                return Ok(Some((detection(false, stop).unwrap_or(Detection::Exception), self.since(flipped)?)));
+            }
+            judge.is_outside |= core[R0] & 1 == 1;
+        }
         let passed = (self.gdb.word(self.places.ticks)? + 1).saturating_sub(start).clamp(1, PERIOD);
         let mut cycles = (PERIOD - passed) * CYCLES + CYCLES / 2;
         for period in flip.period..flip.period + LONGEST {
