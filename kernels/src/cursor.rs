@@ -1,6 +1,7 @@
 //! Progress of a step that runs in slices.
 
 use crate::activations::Scale;
+use crate::checksum::Checksum;
 use crate::layout::Width;
 
 /// Progress of an evaluation.
@@ -43,6 +44,11 @@ pub(crate) struct LinearCursor {
     pub(crate) row: usize,
     /// Output of the last finished row, if the block has output steps.
     pub(crate) output: usize,
+    /// Checksums of the arena that the operation does not write, of the prepared input, and of the finished rows; only
+    /// of a long product.
+    pub(crate) quiet: Checksum,
+    pub(crate) input: Checksum,
+    pub(crate) rows: Checksum,
 }
 
 /// Partial sums of a norm: a slice continues the sums of the previous one.

@@ -71,6 +71,7 @@ pub mod arch;
 #[cfg(not(feature = "writer"))]
 mod arch;
 mod arena;
+mod checksum;
 #[cfg(feature = "writer")]
 pub mod cost;
 #[cfg(not(feature = "writer"))]

@@ -5,6 +5,7 @@ mod accuracy;
 mod attention;
 mod budgets;
 mod c_ports;
+mod checksums;
 mod cli;
 mod constants;
 mod controller;

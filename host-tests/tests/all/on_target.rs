@@ -4,6 +4,7 @@
 pub(crate) mod application;
 mod attention;
 mod c;
+mod checksums;
 mod compact;
 mod cost;
 mod counting;

@@ -112,7 +112,10 @@ fn seed(recurrent: bool) -> Result<u64> {
 }
 
 /// Runs `work` with a head of such a network, and observations.
-fn on_sliced(recurrent: bool, work: impl FnOnce(&mut Head<'_, '_>, &[Vec<f32>]) -> Result<()>) -> Result<()> {
+pub(crate) fn on_sliced(
+    recurrent: bool,
+    work: impl FnOnce(&mut Head<'_, '_>, &[Vec<f32>]) -> Result<()>,
+) -> Result<()> {
     let seed = seed(recurrent)?;
     on_head(seed, |head| work(head, &observations(seed)))
 }

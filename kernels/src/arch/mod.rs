@@ -82,6 +82,8 @@ pub(crate) use floats::{denoise, gru_elements, lstm_elements, normalize, sqrt, s
 #[cfg(actq_helium)]
 pub(crate) use helium::{elu, relu, scale};
 pub(crate) use integers::copy;
+#[cfg(feature = "checksums")]
+pub(crate) use integers::xor;
 #[cfg(feature = "attention")]
 pub(crate) use integers::{query_keys, weigh_values};
 pub use product::{Mismatch, Product};

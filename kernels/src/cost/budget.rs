@@ -6,6 +6,7 @@
 
 use super::CostItem;
 use crate::cost;
+use crate::head::Watched;
 use crate::image::{Image, Op, OpKind, RowBlock};
 use crate::meter::{Meter, OutputStart, Work};
 
@@ -119,6 +120,7 @@ impl Image<'_> {
                     };
                     let bias = Work::Start(OutputStart::of(accumulate, !matrix.bias.is_empty()));
                     let first = least(Work::Magnitude(matrix.cols)).max(if start { 0 } else { least(bias) });
+                    let first = first.max(Watched::of(self, &op).map_or(0, |watched| least(watched.work())));
                     matrix.blocks().map(of_block).fold(first, u32::max)
                 }
                 _ => least(Work::Elements(&op)),

@@ -4,6 +4,7 @@
 use super::playback::Playback;
 use super::step::to_next_op;
 use super::{Head, Phase};
+use crate::checksum::Checksum;
 use crate::error::{HeadError, StepError};
 use crate::image::Image;
 use crate::meter::Unlimited;
@@ -67,6 +68,11 @@ impl Head<'_, '_> {
         self.arena
     }
 
+    /// Borrows the whole arena, for a test to change it as a fault of the memory would.
+    pub fn arena_mut(&mut self) -> &mut [u32] {
+        self.arena
+    }
+
     /// Ends the head and keeps what its next steps depend on: the rest of a [`Parked`] is written to `words`, which has
     /// [`Parked::words`]. A step that has begun is dropped, as by [`Self::begin`].
     pub fn park(mut self, words: &mut [u32]) -> Parked {
@@ -116,7 +122,8 @@ impl Parked {
         }
         let Self { is_ready, playback, started, seed, draws } = self;
         let phase = if is_ready { Phase::Ready } else { Phase::Idle };
-        let mut head = Head { image, arena: scratch, least_budget: 0, phase, playback, started, seed, draws };
+        let resting = Checksum::default();
+        let mut head = Head { image, arena: scratch, least_budget: 0, phase, playback, resting, started, seed, draws };
         let mut rest = words;
         for region in head.saved_regions() {
             let to = head.words_mut(region);

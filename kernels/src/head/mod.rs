@@ -8,15 +8,18 @@ mod playback;
 mod saved;
 mod self_test;
 mod step;
+mod watch;
 
 use core::fmt;
 
 #[cfg(feature = "writer")]
 pub use self::lockstep::Parked;
 use self::playback::Playback;
+pub(crate) use self::watch::Watched;
 use crate::arena::part;
+use crate::checksum::{Checksum, xor};
 use crate::cursor::Cursor;
-use crate::error::HeadError;
+use crate::error::{Fault, HeadError};
 use crate::image::{Image, Region};
 
 /// A head: an image and the scratch memory that it runs in.
@@ -28,6 +31,8 @@ pub struct Head<'a, 's> {
     least_budget: u32,
     phase: Phase,
     playback: Playback,
+    /// That of the memory between two steps.
+    resting: Checksum,
     /// `true` after the first action since the reset; the step limit needs one.
     started: bool,
     /// Seed of the noise.
@@ -77,6 +82,7 @@ impl<'a, 's> Head<'a, 's> {
             least_budget: 0,
             phase: Phase::Idle,
             playback,
+            resting: Checksum::default(),
             started: false,
             seed: 0,
             draws: 0,
@@ -130,6 +136,34 @@ impl<'a, 's> Head<'a, 's> {
         &self.image
     }
 
+    /// Begins a change of the memory that lasts between steps.
+    ///
+    /// # Errors
+    ///
+    /// [`Fault::Damaged`] if it changed since the last step; then the step is abandoned.
+    fn wake(&mut self) -> Result<(), Fault> {
+        let intact = self.resting.check(|| self.sum());
+        self.resting = Checksum::default();
+        intact.inspect_err(|_| self.abandon())
+    }
+
+    /// Ends a change of the memory that lasts between steps.
+    fn rest(&mut self) {
+        let mut resting = Checksum::default();
+        resting.set(|| self.sum());
+        self.resting = resting;
+    }
+
+    /// Computes the checksum of everything that a saved state has.
+    fn sum(&self) -> u32 {
+        let Playback { ready, next, old, slot } = self.playback;
+        let flags = u32::from(ready) | u32::from(self.started) << 1;
+        let fields = flags ^ next as u32 ^ old as u32 ^ slot as u32 ^ self.seed ^ self.draws;
+        let of = |region: Region| xor(self.arena.get(region.range()).unwrap_or_default());
+        let [state, output, rest] = self.saved_regions();
+        fields ^ of(state) ^ of(output) ^ of(rest)
+    }
+
     #[inline(never)]
     fn floats(&self, region: Region) -> &[f32] {
         bytemuck::must_cast_slice(self.arena.get(region.range()).unwrap_or(&[]))
@@ -140,6 +174,7 @@ impl<'a, 's> Head<'a, 's> {
     }
 
     fn words_mut(&mut self, region: Region) -> &mut [u32] {
+        self.resting = Checksum::default();
         part(self.arena, &region.range())
     }
 }

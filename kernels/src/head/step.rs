@@ -2,15 +2,16 @@
 
 use core::task::Poll;
 
+use super::watch::run_watched;
 use super::{Head, Phase, contract};
 use crate::arena::regions;
+use crate::checksum::Checksum;
 use crate::cost::budget::Budget;
 use crate::cursor::Cursor;
 use crate::error::{Fault, StepError};
 use crate::image::{Image, Region};
 use crate::meter::{Meter, Unlimited, Work};
 use crate::ops::elementwise::copy;
-use crate::ops::run;
 
 impl Head<'_, '_> {
     /// Computes the action for `observation`, after the action contract; with action chunks, the chunk's next action.
@@ -90,6 +91,7 @@ impl Head<'_, '_> {
     /// [`Self::begin`], then this with its age.) If no action younger than the image's deadline remains, the step ends
     /// with [`StepError::Stale`].
     pub fn pass(&mut self, periods: usize) {
+        self.resting = Checksum::default();
         self.playback.pass(&self.image, self.arena, periods);
     }
 
@@ -103,11 +105,15 @@ impl Head<'_, '_> {
     /// [`Self::step`].
     #[inline(never)]
     pub fn play(&mut self) -> Result<&[f32], StepError> {
+        self.wake()?;
         if let Err(fault) = self.act() {
             if fault != Fault::Stale {
                 self.abandon();
             }
             return Err(fault.into());
+        }
+        if !matches!(self.phase, Phase::Begun(_)) {
+            self.rest();
         }
         Ok(self.floats(self.image.action()))
     }
@@ -135,6 +141,7 @@ impl Head<'_, '_> {
 
     #[inline(never)]
     fn infer_from(&mut self, observation: &[f32], noise: Option<&[f32]>) -> Result<&[f32], StepError> {
+        self.wake()?;
         self.drop_step();
         // From the first operation on, whatever remains of a chunk.
         self.playback.forget(&self.image, self.arena);
@@ -146,6 +153,7 @@ impl Head<'_, '_> {
 
     #[inline(never)]
     pub(super) fn take(&mut self, observation: &[f32], noise: Option<&[f32]>) -> Result<(), StepError> {
+        self.wake()?;
         self.drop_step();
         self.load(observation).inspect_err(|_| self.abandon())?;
         self.playback.turn(&self.image, self.arena);
@@ -252,6 +260,7 @@ impl Head<'_, '_> {
             }
             self.act()?;
             self.phase = Phase::Ready;
+            self.rest();
         }
         Ok(true)
     }
@@ -262,7 +271,9 @@ impl Head<'_, '_> {
         let Phase::Begun(cursor) = &mut self.phase else { return Ok(true) };
         while cursor.op < self.image.op_count() {
             let done = match &self.image.op(cursor.op) {
-                Ok(op) if budget.take(1, Work::Enter(op)) > 0 => run(op, self.arena, cursor, budget),
+                Ok(op) if budget.take(1, Work::Enter(op)) > 0 => {
+                    run_watched(&self.image, op, self.arena, cursor, budget)
+                }
                 Ok(_) => Ok(false),
                 // In a checked image every record parses.
                 Err(_) => Err(Fault::Damaged),

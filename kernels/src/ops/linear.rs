@@ -12,6 +12,7 @@ use crate::activations::{Plan, Prepared, Scale};
 use crate::arch;
 use crate::arch::gemv_with;
 use crate::arch::{Mismatch, Tables};
+use crate::checksum::xor;
 use crate::cursor::LinearCursor;
 use crate::error::Fault;
 use crate::image::header::BLOCK_WORDS;
@@ -218,22 +219,33 @@ impl Matrix<'_> {
                     }
                     at.prepared = Some(shape.width);
                     x_scale.quantize(x, plan, work).ok_or(Fault::Damaged)?;
+                    if at.quiet.is_set() {
+                        at.input.set(|| xor(work.get(..plan.words()).unwrap_or_default()));
+                    }
                 }
             }
             let Some(plan) = &plan else { return Err(Fault::Damaged) };
             let (words, mut tables) = Tables::split(work, plan.words());
             let x = Prepared::new(words, plan).ok_or(Fault::Damaged)?;
+            let first = first_row - shape.rows;
             let work = Work::Strips { shape, in_order: rows.steps.is_empty(), start: start.is_some() };
             let strips = budget.take((shape.rows - at.row).div_ceil(STRIP), work);
             let end = shape.rows.min(at.row + strips * STRIP);
             rows.apply_rows(at.row..end, &mut at.output, &x, &mut tables, x_scale, start, y).ok_or(Fault::Damaged)?;
+            // With a start, every row is written once, in order.
+            if at.quiet.is_set() && start.is_some() {
+                let rows = y.get(first + at.row..first + end).unwrap_or_default();
+                at.rows.add(|| xor(bytemuck::must_cast_slice(rows)));
+            }
             at.row = end;
             if end < shape.rows {
                 return Ok(false);
             }
+            at.input.check(|| xor(words.get(..plan.words()).unwrap_or_default()))?;
             at.block += 1;
             (at.row, at.output) = (0, 0);
         }
+        at.rows.check(|| xor(bytemuck::must_cast_slice(y)))?;
         Ok(true)
     }
 

@@ -70,10 +70,10 @@ pub fn harness(target: Target) -> Result<PathBuf> {
     Ok(build_once((BENCH, HARNESS, "", target), build)?.join(HARNESS))
 }
 
-/// Does the same as [`harness`] with attention, which the other harness does not have: so it takes no instruction there.
-pub fn attention_harness(target: Target) -> Result<PathBuf> {
-    let build = || harness_in_folder(target, ATTENTION, built_in()?);
-    Ok(build_once((BENCH, HARNESS, ATTENTION, target), build)?.join(HARNESS))
+/// Does the same as [`harness`] with a feature that the other harness does not have: so it takes no instruction there.
+pub fn harness_of(target: Target, feature: &'static str) -> Result<PathBuf> {
+    let build = || harness_in_folder(target, feature, built_in()?);
+    Ok(build_once((BENCH, HARNESS, feature, target), build)?.join(HARNESS))
 }
 
 /// Builds the harness with `image` built in, and with attention if the image needs it.

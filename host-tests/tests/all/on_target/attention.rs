@@ -15,7 +15,7 @@ use crate::draft::Draft;
 const ERROR: f64 = 0.015;
 
 fn harness(target: Target) -> Result<Harness> {
-    Harness::of(target, firmware::attention_harness(target)?)
+    Harness::of(target, firmware::harness_of(target, "attention")?)
 }
 
 /// Returns observations for a ring that wraps around, some of them large or zero.

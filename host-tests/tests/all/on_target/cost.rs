@@ -34,7 +34,7 @@ fn recordings(policy: &Policy) -> Result<Recordings> {
     Ok(Recordings { calib: Some(calib), heldout: None })
 }
 
-fn image(policy: &Policy, options: &Options) -> Result<Vec<u8>> {
+pub(super) fn image(policy: &Policy, options: &Options) -> Result<Vec<u8>> {
     Ok(quantize(policy, &recordings(policy)?, options, ())?.image)
 }
 
@@ -46,7 +46,7 @@ fn rtn(width: Width, group: usize, activations: Activations) -> Options {
     Options { group, activations, ..Options::new(Method::Rtn, Budget::Width(width)) }
 }
 
-fn observations(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
+pub(super) fn observations(dir: &Path, policy: &Policy) -> Result<Vec<Vec<f32>>> {
     let dataset = Dataset::load(&dir.join("heldout.npz"), Sizes::of(policy))?;
     let all: Vec<Vec<f32>> = (0..dataset.length.len()).flat_map(|e| dataset.episode(e)).collect();
     ensure!(all.len() >= STEPS, "too few recorded observations");

@@ -69,6 +69,8 @@ pub(crate) fn gemv(product: Product<'_>) {
 unsafe extern "C" {
     #[cfg(not(actq_helium))]
     fn actq_magnitude(x: *const f32, len: usize) -> u32;
+    #[cfg(feature = "checksums")]
+    fn actq_xor(words: *const u32, len: usize) -> u32;
     fn actq_copy(from: *const u32, to: *mut u32, len: usize);
 }
 
@@ -80,6 +82,15 @@ pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
         // SAFETY: both hold at least `len` words, and do not overlap, because one of them is borrowed mutably.
         unsafe { actq_copy(from.as_ptr(), to.as_mut_ptr(), len) }
     }
+}
+
+/// Returns the exclusive or of words.
+#[cfg(feature = "checksums")]
+pub(crate) fn xor(words: &[u32]) -> u32 {
+    let (most, rest) = words.split_at(words.len() & !15);
+    // SAFETY: the length is that of the slice, a multiple of 16 and not 0.
+    let sum = if most.is_empty() { 0 } else { unsafe { actq_xor(most.as_ptr(), most.len()) } };
+    rest.iter().fold(sum, |sum, word| sum ^ word)
 }
 
 /// Returns the bits of the largest magnitude.

@@ -1,4 +1,4 @@
-@ Vectors of words: the largest magnitude of f32 without an FPU, and a copy.
+@ Vectors of words: the largest magnitude of f32 without an FPU, the exclusive or, and a copy.
 
     .syntax unified
     .thumb
@@ -26,6 +26,30 @@ actq_magnitude:
     pop {r4-r9}
     bx lr
     .size actq_magnitude, . - actq_magnitude
+
+@ r0: the exclusive or of r1 (a multiple of 16, > 0) words at r0.
+    .section .text.actq_xor, "ax", %progbits
+    .global actq_xor
+    .type actq_xor, %function
+    .thumb_func
+    .balign 4
+actq_xor:
+    push {r4-r9}
+    mov r12, r0
+    movs r0, #0
+    .balign 4
+1:
+    .rept 2
+    ldmia.w r12!, {r2-r9}
+    .irp x, r2, r3, r4, r5, r6, r7, r8, r9
+    eor.w r0, r0, \x
+    .endr
+    .endr
+    subs r1, r1, #16
+    bne.n 1b
+    pop {r4-r9}
+    bx lr
+    .size actq_xor, . - actq_xor
 
 @ Copies r2 words (> 0) from r0 to r1.
     .section .text.actq_copy, "ax", %progbits

@@ -26,5 +26,7 @@ pub use norm::{standardize, sum, sum_squares};
 pub(crate) use vector::quantize;
 #[cfg(actq_scaling)]
 pub(crate) use vector::scale_one;
+#[cfg(feature = "checksums")]
+pub use vector::xor;
 pub use vector::{copy, magnitude};
 pub use vector::{scale, sqrt};

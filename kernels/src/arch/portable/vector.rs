@@ -5,6 +5,12 @@ use crate::activations::{Plan, lay_out};
 use crate::layout::half::{bf16, half_word};
 use crate::math::{Native, Real};
 
+/// Returns the exclusive or of words.
+#[cfg(feature = "checksums")]
+pub fn xor(words: &[u32]) -> u32 {
+    words.iter().fold(0, |sum, word| sum ^ word)
+}
+
 /// Returns the bits of the largest magnitude.
 pub fn magnitude(x: &[f32]) -> u32 {
     x.iter().fold(0u32, |m, v| m.max(v.to_bits() & 0x7fff_ffff))

@@ -65,7 +65,7 @@ fn of_core(core: Core, only: Option<&str>, all: &mut BTreeMap<CostItem, Row>) ->
             bail!("the rates of {} are those of {}", core.name(), core.measured().name())
         }
     };
-    let attention = Harness::of(target, firmware::attention_harness(target)?)?;
+    let attention = Harness::of(target, firmware::harness_of(target, "attention")?)?;
     // Only images of attention are measured without the other.
     let others = if only == Some("attention") { None } else { Some(Harness::build(target)?) };
     let harness = others.as_ref().unwrap_or(&attention);

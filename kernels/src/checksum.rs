@@ -1,0 +1,59 @@
+//! Checksums of scratch memory that nothing may change for a while: a flipped bit ends the step instead of changing an
+//! action. Without the feature `checksums` they hold nothing and always agree.
+
+/// Computes the checksum of words in any order: their exclusive or, which every single bit changes.
+#[cfg(feature = "checksums")]
+pub(crate) use crate::arch::xor;
+use crate::error::Fault;
+
+/// A checksum of memory, while there is one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Checksum(#[cfg(feature = "checksums")] Option<u32>);
+
+#[cfg(feature = "checksums")]
+impl Checksum {
+    /// Returns `true` if there is one.
+    pub(crate) fn is_set(self) -> bool {
+        self.0.is_some()
+    }
+
+    /// Takes that of other memory.
+    pub(crate) fn set(&mut self, sum: impl FnOnce() -> u32) {
+        self.0 = Some(sum());
+    }
+
+    /// Adds more memory.
+    pub(crate) fn add(&mut self, sum: impl FnOnce() -> u32) {
+        self.0 = Some(self.0.unwrap_or(0) ^ sum());
+    }
+
+    /// Requires that the memory, whose checksum is `sum` now, has not changed.
+    ///
+    /// # Errors
+    ///
+    /// [`Fault::Damaged`].
+    pub(crate) fn check(self, sum: impl FnOnce() -> u32) -> Result<(), Fault> {
+        if self.0.is_none_or(|before| before == sum()) { Ok(()) } else { Err(Fault::Damaged) }
+    }
+}
+
+#[cfg(not(feature = "checksums"))]
+impl Checksum {
+    pub(crate) fn is_set(self) -> bool {
+        false
+    }
+
+    pub(crate) fn set(&mut self, _: impl FnOnce() -> u32) {}
+
+    pub(crate) fn add(&mut self, _: impl FnOnce() -> u32) {}
+
+    pub(crate) fn check(self, _: impl FnOnce() -> u32) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+/// Never called.
+#[cfg(not(feature = "checksums"))]
+pub(crate) const fn xor(_: &[u32]) -> u32 {
+    0
+}

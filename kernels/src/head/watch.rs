@@ -1,0 +1,95 @@
+//! The memory during a long product, which is most of a step's time: with the feature `checksums`, a bit that flips
+//! meanwhile ends the step.
+//!
+//! Three checksums cover it: of the words that the product does not write (values that later operations add, the
+//! recurrent state, a chunk), of its prepared input, and of its finished rows. After it is prepared, its input
+//! itself is not covered: few networks need it again, as those with a sum of a layer's input and output without a norm.
+
+use crate::checksum::xor;
+use crate::cursor::Cursor;
+use crate::error::Fault;
+use crate::image::{Image, Op, OpKind, Region};
+use crate::meter::{Meter, Work};
+use crate::ops::run;
+
+/// Weights of a product for each word of a checksum: before and after together, a word takes two and a half instructions,
+/// so all words at most 3 % of those of a product at 2 bits.
+const WEIGHTS: usize = 112;
+
+/// The words to watch during a product, besides its prepared input and its finished rows.
+#[derive(Clone, Copy)]
+pub(crate) struct Watched {
+    /// Words of scratch memory.
+    scratch: usize,
+    /// Outputs, input and work area: all words but those to watch.
+    others: [Region; 3],
+    /// `true` if these words are too many for the product.
+    is_partial: bool,
+}
+
+impl Watched {
+    /// Returns the words to watch during an operation; `None` if it is no product, or one too short even for its own
+    /// values.
+    #[inline(always)]
+    pub(crate) fn of(image: &Image<'_>, op: &Op<'_>) -> Option<Self> {
+        if !cfg!(feature = "checksums") || !matches!(op.kind, OpKind::Linear { .. }) {
+            return None;
+        }
+        let (rows, cols, scratch) = (op.dst().len, op.src().len, image.scratch_words());
+        // Two prepared values in a word.
+        let (own, most) = (rows + cols / 2, rows * cols / WEIGHTS);
+        if own > most {
+            return None;
+        }
+        let mut others = op.regions;
+        if op.linear_matrix().ok()?.block_count() > 1 {
+            // Blocks of another width prepare the input again.
+            others[1] = Region::default();
+        }
+        let quiet = others.iter().fold(scratch, |words, region| words.saturating_sub(region.len));
+        Some(Self { scratch, others, is_partial: own + quiet > most })
+    }
+
+    /// Returns the work of the checksum, whose words take less time than values compared by magnitude.
+    pub(crate) fn work(&self) -> Work<'static> {
+        Work::Magnitude(if self.is_partial { 0 } else { self.scratch })
+    }
+
+    fn sum(&self, arena: &[u32]) -> u32 {
+        if self.is_partial {
+            return 0;
+        }
+        let (mut sum, mut from) = (0, 0);
+        loop {
+            let others = self.others.iter().filter(|region| region.len > 0 && region.offset >= from);
+            let next = others.min_by_key(|region| region.offset);
+            let end = next.map_or(self.scratch, |region| region.offset);
+            sum ^= xor(arena.get(from..end).unwrap_or_default());
+            let Some(next) = next else { return sum };
+            from = next.end();
+        }
+    }
+}
+
+/// Does the same as [`run`], and watches the memory.
+#[inline(always)]
+pub(super) fn run_watched(
+    image: &Image<'_>,
+    op: &Op<'_>,
+    arena: &mut [u32],
+    cursor: &mut Cursor,
+    budget: &mut impl Meter,
+) -> Result<bool, Fault> {
+    let Some(watched) = Watched::of(image, op) else { return run(op, arena, cursor, budget) };
+    if !cursor.linear.quiet.is_set() {
+        if budget.take(1, watched.work()) == 0 {
+            return Ok(false);
+        }
+        cursor.linear.quiet.set(|| watched.sum(arena));
+    }
+    if !run(op, arena, cursor, budget)? || budget.take(1, watched.work()) == 0 {
+        return Ok(false);
+    }
+    cursor.linear.quiet.check(|| watched.sum(arena))?;
+    Ok(true)
+}
