@@ -106,7 +106,7 @@ enum actq_code {
   ACTQ_OBSERVATION_NOT_FINITE = 81,
   /** the network produced a value that is not finite */
   ACTQ_NOT_FINITE = 82,
-  /** the image's memory has changed since it was checked */
+  /** the image or the scratch memory was changed by something else */
   ACTQ_DAMAGED = 83,
   /** the self-test gave other bits than the image records */
   ACTQ_SELF_TEST = 84,

@@ -56,7 +56,7 @@ codes! {
     /// A value inside the network exceeded the range of float.
     NotFinite = 82, c"the network produced a value that is not finite";
     /// The image's memory has changed since it was opened.
-    Damaged = 83, c"the image's memory has changed since it was checked";
+    Damaged = 83, c"the image or the scratch memory was changed by something else";
     /// The self-test gave other bits than the image records.
     SelfTest = 84, c"the self-test gave other bits than the image records";
     /// The budget is below the image's least budget.

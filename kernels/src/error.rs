@@ -216,8 +216,9 @@ errors! {
         } = 81, "observation value {index} is not finite";
         /// A value inside the network or an action exceeded the range of f32.
         NotFinite = 82, "the network produced a value that is not finite";
-        /// The image's memory has changed since its check: the flash decayed or was rewritten.
-        Damaged = 83, "the image's memory has changed since it was checked";
+        /// The image has changed since its check: the flash decayed or was rewritten. Or, with the feature `checksums`,
+        /// scratch memory changed during a long product or between two steps.
+        Damaged = 83, "the image or the scratch memory was changed by something else";
         /// A self-test step gave other bits than the image records.
         SelfTest {
             /// The self-test step that differed, from 0.

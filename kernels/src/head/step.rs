@@ -21,9 +21,9 @@ impl Head<'_, '_> {
     /// # Errors
     ///
     /// [`StepError::ObservationLength`], [`StepError::ObservationNotFinite`] and [`StepError::ObservationRange`] for
-    /// the observation;
-    /// [`StepError::NotFinite`] if a value inside the network exceeds f32's range, [`StepError::Damaged`] if the
-    /// image's memory has changed since its check, [`StepError::Stale`] if the action is older than its deadline,
+    /// the observation; [`StepError::NotFinite`] if a value inside the network exceeds f32's range;
+    /// [`StepError::Damaged`] if the image has changed since its check, or scratch memory between two steps or during
+    /// one (feature `checksums`); [`StepError::Stale`] if the action is older than its deadline;
     /// [`StepError::Orientation`] if the image reads a quaternion whose length is not near 1.
     ///
     /// An error resets the recurrent state and the chunk, so that no part of a failed evaluation reaches a later
