@@ -194,18 +194,25 @@ impl Client {
     ///
     /// Fails if the controller refuses, does not answer, or may have stopped since.
     pub fn arm(&mut self) -> Result<()> {
-        let outcome = self.change_unless(
-            |token| Message::Arm { token },
-            |client, sent| {
-                // A repetition whose first answer was lost has an old token, too.
-                let status = client.status()?;
-                if sent > 1 {
-                    require_armed(&status)
-                        .context("not armed, or not any more; find out why it stopped, then arm it again")?;
-                }
-                Ok(status.state == State::Armed)
-            },
-        )?;
+        let begun = Instant::now();
+        let outcome = loop {
+            let outcome = self.change_unless(
+                |token| Message::Arm { token },
+                |client, sent| {
+                    // A repetition whose first answer was lost has an old token, too.
+                    let status = client.status()?;
+                    if sent > 1 {
+                        require_armed(&status)
+                            .context("not armed, or not any more; find out why it stopped, then arm it again")?;
+                    }
+                    Ok(status.state == State::Armed)
+                },
+            )?;
+            // After a disarm, outputs coast only from the next tick on.
+            if outcome != Err(Refusal::Busy) || begun.elapsed() >= self.timeout {
+                break outcome;
+            }
+        };
         outcome.context("not armed")?;
         // Earlier statuses describe the earlier state.
         self.events.retain(|event| !matches!(event, Event::Status(_)));

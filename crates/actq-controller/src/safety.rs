@@ -227,8 +227,13 @@ impl<const AXES: usize> Safety<AXES> {
     ///
     /// Fails without any change if the token differs from [`Self::token`], or if the controller is already armed. The
     /// same holds after a failed or missing check, after a break or an overrun that latched until the controller is
-    /// disarmed, without a recent observation, and with an axis without limits.
+    /// disarmed, without a recent observation, and with an axis without limits. After a disarm, returns
+    /// [`Refusal::Busy`] until the next tick.
     pub fn arm(&mut self, token: u32) -> Result<(), Refusal> {
+        // An axis that has not coasted would jump from its last value to its start value.
+        if self.may_stall() == Err(Refusal::Busy) {
+            return Err(Refusal::Busy);
+        }
         if token != self.token {
             return Err(Refusal::Token);
         }

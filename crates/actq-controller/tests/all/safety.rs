@@ -1,7 +1,9 @@
 //! Invariants under any sequence of events.
 
+use std::collections::{HashSet, VecDeque};
+
 use actq_controller::{Axis, Check, Output, SafeAction, Safety};
-use actq_link::code::{Fault, State};
+use actq_link::code::{Fault, Refusal, State};
 use proptest::prelude::*;
 
 #[derive(Clone, Debug)]
@@ -9,6 +11,7 @@ enum Event {
     Tick,
     Ticks(u8),
     Observed,
+    Stalled,
     Act(Vec<f32>),
     Trip(usize),
     Check(usize, bool),
@@ -22,6 +25,7 @@ fn events() -> impl Strategy<Value = Event> {
         8 => Just(Event::Tick),
         1 => (0..30u8).prop_map(Event::Ticks),
         6 => Just(Event::Observed),
+        1 => Just(Event::Stalled),
         6 => prop::collection::vec(-2.0..2.0f32, 2).prop_map(Event::Act),
         1 => prop::collection::vec(value, 0..4).prop_map(Event::Act),
         1 => (0..Fault::ALL.len()).prop_map(Event::Trip),
@@ -92,6 +96,117 @@ fn check_outputs(safety: &Safety<2>, before: &[Output; 2], now: &[Output; 2]) ->
     Ok(())
 }
 
+/// A controller, and the facts that bind it.
+struct Watched {
+    safety: Safety<2>,
+    deadline: u32,
+    passed: [bool; Check::ALL.len()],
+    /// The outputs of the last tick, which are those of the motors.
+    outputs: [Output; 2],
+    since_observation: u32,
+    since_action: u32,
+}
+
+impl Watched {
+    fn new(axes: [Axis; 2], deadline: u32, seed: u32) -> Self {
+        Self {
+            safety: Safety::new(axes, 1..=deadline, seed),
+            deadline,
+            passed: [false; Check::ALL.len()],
+            outputs: [Output::Coast; 2],
+            since_observation: u32::MAX,
+            since_action: 0,
+        }
+    }
+
+    fn tick(&mut self) -> Result<(), TestCaseError> {
+        self.since_observation = self.since_observation.saturating_add(1);
+        self.since_action += 1;
+        let now = self.safety.tick();
+        check_outputs(&self.safety, &self.outputs, &now)?;
+        self.outputs = now;
+        if self.safety.state() == State::Armed {
+            prop_assert!(self.since_observation <= self.deadline && self.since_action <= self.deadline);
+        }
+        Ok(())
+    }
+
+    /// Applies an event, and checks all that holds after it.
+    fn apply(&mut self, event: &Event) -> Result<(), TestCaseError> {
+        let Self { safety, passed, .. } = self;
+        let (state, token, fault) = (safety.state(), safety.token(), safety.fault());
+        match event {
+            Event::Tick => self.tick()?,
+            Event::Ticks(n) => (0..*n).try_for_each(|_| self.tick())?,
+            Event::Observed => {
+                safety.observed();
+                self.since_observation = 0;
+            }
+            Event::Stalled => {
+                safety.stalled();
+                if state != State::Armed {
+                    self.since_observation = u32::MAX;
+                }
+            }
+            Event::Act(action) => {
+                let good = action.len() == 2 && action.iter().all(|value| value.is_finite());
+                prop_assert_eq!(safety.act(action).is_ok(), good);
+                if good {
+                    self.since_action = 0;
+                }
+            }
+            Event::Trip(fault) => safety.trip(Fault::ALL[*fault]),
+            Event::Check(check, outcome) => {
+                safety.check(Check::ALL[*check], *outcome);
+                passed[*check] = *outcome;
+            }
+            Event::Arm { right_token } => {
+                let (refusal, may_stall) = (safety.refusal(), safety.may_stall());
+                let armed = safety.arm(if *right_token { token } else { token ^ 0x10 });
+                let hardware = matches!(fault, Some(Fault::Break | Fault::Overrun));
+                let passed = *passed == [true; 5] && !(state == State::Latched && hardware);
+                let is_ready = state != State::Armed && passed && self.since_observation <= self.deadline;
+                let may = *right_token && is_ready && may_stall != Err(Refusal::Busy);
+                prop_assert_eq!(armed.is_ok(), may);
+                if *right_token && may_stall != Err(Refusal::Busy) {
+                    prop_assert_eq!(armed.err(), refusal, "the status names the refusal of arming");
+                }
+                if may {
+                    self.since_action = 0;
+                }
+            }
+            Event::Disarm => safety.disarm(),
+        }
+        let Self { safety, passed, outputs, .. } = self;
+        let now = safety.state();
+        if now == State::Armed {
+            prop_assert_eq!(*passed, [true; 5]);
+        }
+        let off = now == State::Disarmed && *outputs == [Output::Coast; 2];
+        prop_assert!(off || safety.may_stall().is_err());
+        if now != state {
+            prop_assert_ne!(safety.token(), token);
+            prop_assert!((state, now) != (State::Disarmed, State::Latched));
+            let asked = matches!(event, Event::Arm { right_token: true });
+            prop_assert!(now != State::Armed || asked);
+        }
+        match event {
+            Event::Trip(i) if state == State::Armed => prop_assert_eq!(safety.fault(), Some(Fault::ALL[*i])),
+            _ => prop_assert!(safety.fault() == fault || state == State::Armed, "the first fault stays"),
+        }
+        Ok(())
+    }
+
+    /// Returns the whole state of the controller, without its clock and token, and with ages that are all too old as one.
+    fn key(&self) -> (String, u32) {
+        let text = format!("{:?}", self.safety);
+        let (_, state) = text.split_once("health: ").expect("a field");
+        let (state, rest) = state.split_once(", since_observation: ").expect("a field");
+        let age: u32 = rest.split_once(',').and_then(|(age, _)| age.parse().ok()).expect("a number");
+        (state.to_owned(), age.min(self.deadline + 1))
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
@@ -100,64 +215,58 @@ proptest! {
         first in axes(), second in axes(), deadline in 1..10u32, seed: u32,
         events in prop::collection::vec(events(), 1..200),
     ) {
-        let mut safety = Safety::new([first, second], 1..=deadline, seed);
-        let mut passed = [false; Check::ALL.len()];
-        let (mut outputs, mut since_observation, mut since_action) = ([Output::Coast; 2], u32::MAX, 0u32);
-        for event in events {
-            let (state, token) = (safety.state(), safety.token());
-            let ticks = match event { Event::Tick => 1, Event::Ticks(n) => n, _ => 0 };
-            for _ in 0..ticks {
-                since_observation = since_observation.saturating_add(1);
-                since_action += 1;
-                let now = safety.tick();
-                check_outputs(&safety, &outputs, &now)?;
-                outputs = now;
-                if safety.state() == State::Armed {
-                    prop_assert!(since_observation <= deadline && since_action <= deadline);
+        let mut watched = Watched::new([first, second], deadline, seed);
+        events.iter().try_for_each(|event| watched.apply(event))?;
+    }
+}
+
+/// Applies every event in every state that any sequence of events reaches, breadth first, with two axes and a deadline
+/// of two ticks. Changes are halves, so outputs are few and exact. Three of the checks change; all are treated alike.
+#[test]
+fn invariants_hold_in_every_reachable_state() {
+    let actions = [&[1.0, -1.0][..], &[-9.0, 0.25], &[f32::NAN, 0.0], &[0.0]];
+    let mut events = vec![Event::Tick, Event::Observed, Event::Stalled, Event::Disarm];
+    events.extend([true, false].map(|right_token| Event::Arm { right_token }));
+    events.extend(actions.map(|action| Event::Act(action.to_vec())));
+    events.extend((0..Fault::ALL.len()).map(Event::Trip));
+    let changing = |check: &usize| [Check::Image, Check::Clock, Check::Hardware].contains(&Check::ALL[*check]);
+    let changes =
+        (0..Check::ALL.len()).filter(changing).flat_map(|i| [true, false].map(|passed| Event::Check(i, passed)));
+    events.extend(changes);
+    for (safe, expected) in [
+        ([SafeAction::Hold, SafeAction::Ramp { step: 0.75 }], (13_001, 29)),
+        ([SafeAction::Brake, SafeAction::Coast], (11_977, 29)),
+    ] {
+        let axes = safe.map(|safe| Axis::new(-1.0, 1.0, 0.5, 0.5, safe).expect("the axis is valid"));
+        let named = |path: &[u8]| path.iter().map(|i| &events[usize::from(*i)]).collect::<Vec<_>>();
+        let replay = |path: &[u8]| {
+            let mut watched = Watched::new(axes, 2, 0);
+            let passed = (0..Check::ALL.len()).filter(|check| !changing(check)).map(|i| Event::Check(i, true));
+            passed.for_each(|event| watched.apply(&event).expect("the controller is new"));
+            named(path).into_iter().try_for_each(|event| watched.apply(event)).expect("applied before");
+            watched
+        };
+        let (mut seen, mut next) = (HashSet::from([replay(&[]).key()]), VecDeque::from([Vec::new()]));
+        let mut longest = 0;
+        while let Some(path) = next.pop_front() {
+            longest = path.len();
+            let mut watched = replay(&path);
+            let before = watched.key();
+            for (i, event) in events.iter().enumerate() {
+                let outcome = watched.apply(event);
+                outcome.unwrap_or_else(|error| panic!("{error} at {event:?} after {:?}", named(&path)));
+                let key = watched.key();
+                // Most events change nothing.
+                if key == before {
+                    continue;
                 }
-            }
-            match &event {
-                Event::Tick | Event::Ticks(_) => {}
-                Event::Observed => {
-                    safety.observed();
-                    since_observation = 0;
+                if seen.insert(key) {
+                    next.push_back([&path[..], &[i as u8]].concat());
                 }
-                Event::Act(action) => {
-                    let good = action.len() == 2 && action.iter().all(|value| value.is_finite());
-                    prop_assert_eq!(safety.act(action).is_ok(), good);
-                    if good { since_action = 0; }
-                }
-                Event::Trip(fault) => safety.trip(Fault::ALL[*fault]),
-                Event::Check(check, outcome) => {
-                    safety.check(Check::ALL[*check], *outcome);
-                    passed[*check] = *outcome;
-                }
-                Event::Arm { right_token } => {
-                    let refusal = safety.refusal();
-                    let armed = safety.arm(if *right_token { token } else { token ^ 0x10 });
-                    let hardware = matches!(safety.fault(), Some(Fault::Break | Fault::Overrun));
-                    let passed = passed == [true; 5] && !(state == State::Latched && hardware);
-                    let may = *right_token && state != State::Armed && passed && since_observation <= deadline;
-                    prop_assert_eq!(armed.is_ok(), may);
-                    if *right_token { prop_assert_eq!(armed.err(), refusal, "the status names the refusal of arming"); }
-                    if may { since_action = 0; }
-                }
-                Event::Disarm => {
-                    safety.disarm();
-                    outputs = [Output::Coast; 2];
-                }
-            }
-            let now = safety.state();
-            if now == State::Armed {
-                prop_assert_eq!(passed, [true; 5]);
-            }
-            if now != state {
-                prop_assert_ne!(safety.token(), token);
-                prop_assert!((state, now) != (State::Disarmed, State::Latched));
-                let asked = matches!(event, Event::Arm { right_token: true });
-                prop_assert!(now != State::Armed || asked);
+                watched = replay(&path);
             }
         }
+        assert_eq!((seen.len(), longest), expected, "states, and events to the farthest");
     }
 }
 

@@ -121,6 +121,8 @@ fn a_break_or_an_overrun_latches_until_disarmed() {
         let expected = if needs_a_disarm { Err(Refusal::Hardware) } else { Ok(()) };
         assert_eq!(safety.arm(safety.token()), expected, "{fault:?}");
         safety.disarm();
+        assert_eq!(safety.arm(safety.token()), Err(Refusal::Busy), "the outputs do not coast yet");
+        safety.tick();
         assert_eq!(safety.arm(safety.token()), Ok(()), "{fault:?}");
     }
 }
