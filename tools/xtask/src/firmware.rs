@@ -21,7 +21,7 @@ const OPTIONAL: [&str; 2] = ["around", "attention"];
 #[derive(Args, Debug, Default)]
 pub(crate) struct Options {
     /// Show the boards; fails for a --board that is not among them
-    #[arg(long, conflicts_with_all = ["image", "limits", "features", "key", "out"])]
+    #[arg(long, conflicts_with_all = ["image", "limits", "features", "key", "reproduce", "out"])]
     pub(crate) list: bool,
     /// The board; --list shows them
     #[arg(long, value_name = "NAME", value_parser = board, required_unless_present = "list")]
@@ -40,6 +40,9 @@ pub(crate) struct Options {
     /// The public key, as `actq keygen` prints it, that signs images; others are refused (feature signed)
     #[arg(long, value_name = "HEX", value_parser = key)]
     pub(crate) key: Option<String>,
+    /// Build the last commit in two new folders, with two names of cargo's folder; fails if the ELF files differ
+    #[arg(long)]
+    pub(crate) reproduce: bool,
     /// The ELF file, written whole or not at all
     #[arg(long, value_name = "FILE.elf", required_unless_present = "list")]
     pub(crate) out: Option<PathBuf>,
@@ -58,7 +61,7 @@ fn key(text: &str) -> Result<String, &'static str> {
 
 impl Options {
     pub(crate) fn run(self) -> Result<()> {
-        let Self { board: Some(target), image, limits, features, key, out: Some(out), .. } = self else {
+        let Self { board: Some(target), image, limits, features, key, reproduce, out: Some(out), .. } = self else {
             for (target, application) in boards() {
                 println!("{:12} {:27} {}", target.board().name, target.triple(), application.about);
             }
@@ -73,7 +76,8 @@ impl Options {
         setup::rust_target(target.triple())?;
         let (image, needed) = given.map_or_else(|| check(&example()?), Ok)?;
         let features = [features.as_deref(), needed.as_deref()];
-        let elf = build(target, &image, &limits, &features, key.as_deref())?;
+        let build = |checkout: &Checkout| build(checkout, target, &image, &limits, &features, key.as_deref());
+        let elf = if reproduce { reproduced(build)? } else { build(&Checkout::here()?)? };
         write(&out, &elf)?;
         println!("{}: {} with {}", out.display(), target.board().name, image.display());
         Ok(())
@@ -160,8 +164,70 @@ fn example() -> Result<PathBuf> {
     Ok(path)
 }
 
+/// The folders of a build. None of their names is in an ELF file.
+struct Checkout {
+    root: PathBuf,
+    target: PathBuf,
+    /// Cargo's own folder, with the sources of dependencies.
+    home: PathBuf,
+}
+
+impl Checkout {
+    fn here() -> Result<Self> {
+        let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+        let home =
+            home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("cargo's folder is not known")?;
+        Ok(Self { root: root().to_owned(), target: target_dir(), home })
+    }
+
+    /// Returns flags of rustc that replace the folders in paths of debug information and panics.
+    fn remapped(&self) -> Vec<String> {
+        // Of two that match, rustc takes the last.
+        let map = [(&self.home, "/cargo"), (&self.root, "."), (&self.target, "./target")];
+        map.iter().map(|(from, to)| format!("--remap-path-prefix={}={to}", from.display())).collect()
+    }
+}
+
+/// Builds the last commit twice, and returns the bytes of the ELF file if both are equal.
+fn reproduced(build: impl Fn(&Checkout) -> Result<Vec<u8>>) -> Result<Vec<u8>> {
+    let here = Checkout::here()?;
+    let git = |arguments: &[&str]| -> Result<String> {
+        let output =
+            Command::new("git").current_dir(&here.root).args(arguments).output().context("cannot start git")?;
+        ensure!(output.status.success(), "git {}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr));
+        Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let changed = git(&["status", "--porcelain", "--untracked-files=no"])?;
+    ensure!(changed.is_empty(), "only a commit can be reproduced; commit these changes first:\n{changed}");
+    let folder = std::env::temp_dir().join(format!("actq-reproduce-{}", std::process::id()));
+    let mut files = Vec::new();
+    for name in ["a", "another/with a longer name"] {
+        let root = folder.join(name);
+        fs::create_dir_all(&root).with_context(|| root.display().to_string())?;
+        let home = root.join("cargo");
+        link(&here.home, &home)?;
+        let checkout = Checkout { target: root.join("target"), root: root.join("actq"), home };
+        git(&["clone", "--quiet", &here.root.to_string_lossy(), &checkout.root.to_string_lossy()])?;
+        files.push(build(&checkout)?);
+    }
+    ensure!(files[0] == files[1], "the ELF files differ; both builds are in {}", folder.display());
+    fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    println!("two builds of {} are equal: {} bytes", git(&["rev-parse", "HEAD"])?, files[0].len());
+    Ok(files.swap_remove(0))
+}
+
+/// Gives a folder a second name.
+fn link(folder: &Path, name: &Path) -> Result<()> {
+    #[cfg(unix)]
+    let linked = std::os::unix::fs::symlink(folder, name);
+    #[cfg(windows)]
+    let linked = std::os::windows::fs::symlink_dir(folder, name);
+    linked.with_context(|| format!("cannot link {} to {}", name.display(), folder.display()))
+}
+
 /// Builds the application, and returns the bytes of the ELF file.
 fn build(
+    checkout: &Checkout,
     target: Target,
     image: &Path,
     limits: &[Limits],
@@ -171,26 +237,34 @@ fn build(
     let name = target.board().name;
     // A folder of its own: cargo uses the same names for all boards of a triple, and two builds may run at a time. A
     // cargo that knows the variable (1.91) shares the intermediate files.
-    let folder = target_dir().join("boards").join(name);
+    let folder = checkout.target.join("boards").join(name);
     let features = [Some(name), key.map(|_| "signed")].iter().chain(features).flatten().copied().collect::<Vec<_>>();
     let features = features.join(",");
     let mut command = cargo();
     if let Some(key) = key {
         command.env("ACTQ_PUBLIC_KEY", key);
     }
-    command.current_dir(root()).args(["build", "--package", "actq-firmware-demo", "--bin", "controller"]);
+    command.current_dir(&checkout.root).args(["build", "--package", "actq-firmware-demo", "--bin", "controller"]);
     command.args(["--profile", target.profile(), "--target", target.triple(), "--features", &features]);
-    command.envs(target.rustflags());
+    let mut flags = checkout.remapped();
+    match target.rustflags() {
+        // The variable replaces the flags of all configurations.
+        Some((variable, given)) => {
+            flags.extend(given.split(' ').map(str::to_owned));
+            command.env(format!("CARGO_ENCODED_{variable}"), flags.join("\x1f"));
+        }
+        None => _ = command.args(["--config", &format!("target.{}.rustflags={flags:?}", target.triple())]),
+    }
     // defmt's own default logs only errors.
     if std::env::var_os("DEFMT_LOG").is_none() {
         command.env("DEFMT_LOG", "info");
     }
-    command.arg("--target-dir").arg(&folder).env("ACTQ_IMAGE", image);
+    command.arg("--target-dir").arg(&folder).env("CARGO_HOME", &checkout.home).env("ACTQ_IMAGE", image);
     match limits {
         [] => command.env_remove("ACTQ_LIMITS"),
         _ => command.env("ACTQ_LIMITS", limits.iter().map(Limits::to_string).collect::<Vec<_>>().join(",")),
     };
-    let status = command.env("CARGO_BUILD_BUILD_DIR", target_dir()).status();
+    let status = command.env("CARGO_BUILD_BUILD_DIR", &checkout.target).status();
     if !status.context("cannot start cargo")?.success() {
         let memory = target.board().memory;
         bail!(
