@@ -147,6 +147,7 @@ fn has_bytes<const LEN: usize>(queue: &Producer<'_, u8>) -> bool {
 #[cfg(test)]
 mod tests {
     use std::collections::VecDeque;
+    use std::vec;
     use std::vec::Vec;
 
     use super::*;
@@ -199,6 +200,50 @@ mod tests {
             assert!(bytes[..ROOM].iter().copied().eq(good));
             assert_eq!(port.read(&mut []), Ok(0));
         }
+    }
+
+    /// Applies all sequences of six calls to ports of this length, and compares them with queues that have no length.
+    fn sequences_keep_order<const LEN: usize>() {
+        for case in 0..7usize.pow(6) {
+            let (mut mock, mut buffers) = (Mock::default(), Buffers::<LEN>::new());
+            let (mut wire, mut port) = buffers.split(&mut mock, || ());
+            let (mut input, mut output, mut sent) = (VecDeque::new(), VecDeque::<u8>::new(), Vec::new());
+            for (i, call) in (0..6).map(|i| case / 7usize.pow(i) % 7).enumerate() {
+                let bytes: Vec<u8> = (0..LEN).map(|k| (LEN * i + k) as u8).collect();
+                match call {
+                    frame @ 0..=2 => {
+                        let frame = &bytes[..[1, LEN - 1, LEN][frame]];
+                        let fits = output.len() + frame.len() < LEN;
+                        assert_eq!(port.send(frame), fits);
+                        output.extend(frame.iter().filter(|_| fits));
+                    }
+                    count @ 3..=4 => {
+                        let count = [1, LEN][count - 3];
+                        wire.uart.room += count;
+                        wire.uart.line.extend(bytes[..count].iter().map(|byte| Ok(*byte)));
+                        wire.on_interrupt();
+                        sent.extend(output.drain(..output.len().min(wire.uart.room - sent.len())));
+                        input.extend(&bytes[..count.min(LEN - 1 - input.len())]);
+                        assert_eq!((&wire.uart.sent, wire.uart.asked), (&sent, !output.is_empty()));
+                    }
+                    count => {
+                        let mut found = vec![0; [1, LEN][count - 5]];
+                        let ready = !input.is_empty();
+                        assert_eq!(port.read_ready(), Ok(ready));
+                        // It waits for a byte.
+                        let read = if ready { port.read(&mut found).unwrap_or_default() } else { 0 };
+                        let expected: Vec<u8> = input.drain(..input.len().min(found.len())).collect();
+                        assert_eq!(&found[..read], &expected[..]);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn short_queues_keep_every_sequence_of_calls_in_order() {
+        sequences_keep_order::<2>();
+        sequences_keep_order::<4>();
     }
 
     #[test]

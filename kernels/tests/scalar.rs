@@ -57,3 +57,40 @@ fn sums_are_those_of_the_reference() {
         check(&mut random, BlockShape { width, lanes: LANES[case / 2 % LANES.len()], rows, cols, group }, case);
     }
 }
+
+/// The largest sum of every block of up to three columns, for activations at the ends of their range, is the proven one.
+#[test]
+fn the_worst_case_of_every_small_block_is_reached() {
+    const X_MAX: i16 = 127;
+    for (width, lanes, group) in Width::ALL.into_iter().flat_map(|width| {
+        [Lanes::Single, Lanes::Paired, Lanes::Scalar, Lanes::Helium]
+            .into_iter()
+            .flat_map(move |lanes| [0, 32].map(|group| (width, lanes, group)))
+    }) {
+        let whole = [0x80, 0x81, 0xff, 0, 1, 0x7f];
+        let codes: Vec<u8> = if width == Width::W8 { whole.to_vec() } else { (0..1 << width.bits()).collect() };
+        for cols in 1..=3 {
+            let shape = BlockShape { width, lanes, rows: 1, cols, group };
+            if !shape.is_valid() {
+                continue;
+            }
+            for (case, scale) in (0..codes.len().pow(cols as u32)).zip([255, 1, 77].into_iter().cycle()) {
+                let of_case: Vec<u8> =
+                    (0..cols as u32).map(|col| codes[case / codes.len().pow(col) % codes.len()]).collect();
+                let mut words = vec![0; shape.words()];
+                pack(shape, &of_case, &vec![scale; shape.groups()], &mut words).expect("the codes fit the shape");
+                let block = Block::new(shape, &words).expect("the words fit the shape");
+                let plan = Plan::of(&block);
+                let (mut prepared, mut sums) = (vec![0; plan.words()], vec![0; shape.padded_rows()]);
+                let mut largest = 0;
+                for signs in 0..1 << cols {
+                    let x: Vec<i16> = (0..cols).map(|col| if signs >> col & 1 == 0 { X_MAX } else { -X_MAX }).collect();
+                    let x = prepare(&x, &plan, &mut prepared).expect("there is room");
+                    reference::gemv(Product::new(&block, &x, 0, &mut sums).expect("they fit"));
+                    largest = largest.max(sums[0].unsigned_abs());
+                }
+                assert_eq!(worst_case(&block, X_MAX as u16), i64::from(largest), "{shape:?}, {of_case:?}");
+            }
+        }
+    }
+}

@@ -43,3 +43,34 @@ impl Scale {
         self.scale
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Scale, TINY};
+    use crate::math::real::Real as _;
+
+    /// No larger value saturates, because products and rounding keep the order. All mantissas, and all exponents.
+    #[test]
+    fn the_largest_magnitude_becomes_the_largest_integer() {
+        let mantissas = (0..1 << 23).map(|mantissa| 0x3f80_0000 | mantissa);
+        let ends =
+            (TINY.to_bits() >> 23..255).flat_map(|exponent| [0, 1, 0x40_0001, 0x7f_ffff].map(|m| exponent << 23 | m));
+        for bits in mantissas.chain(ends) {
+            for x_max in [1, 127, 2047, 32767] {
+                let (x, scale) = (f32::from_bits(bits), Scale::of_magnitude(bits, x_max).expect("finite"));
+                let found = [x, -x].map(|x| x.rounded(scale.inverse()) as i16);
+                assert_eq!(found, [1, -1].map(|sign| sign * x_max as i16), "{bits:#x}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_tie_goes_to_the_even_integer() {
+        for q in i16::MIN..i16::MAX {
+            let tie = f32::from(q) + 0.5;
+            let even = q + (q & 1);
+            let found = [f32::from(q), tie.next_down(), tie, tie.next_up()].map(|x| x.rounded(1.0) as i16);
+            assert_eq!(found, [q, q, even, q + 1]);
+        }
+    }
+}

@@ -828,6 +828,26 @@ mod tests {
         scaling_is_exact::<true>();
     }
 
+    /// Adds all sums of 16 bits, and those around each power of two, times every mantissa of a row scale.
+    fn scaling_of_every_sum_is_exact<const NARROW: bool>() {
+        let powers = (15..32).flat_map(|k| [-1, 0, 1].map(|d| (1i32 << k).wrapping_add(d)));
+        for sum in (-0x8000..=0x7fff).chain(powers.clone()).chain(powers.map(i32::wrapping_neg)) {
+            for mantissa in 0..0x80 {
+                let scale = f32::from_bits(0x3c00_0000 | mantissa << 16);
+                let (mut found, mut expected) = (-1.5, -1.5);
+                Soft::<NARROW>::add_scaled(&mut found, sum, scale, 0.012_345);
+                f32::add_scaled(&mut expected, sum, scale, 0.012_345);
+                assert_same(found, expected, (sum, scale));
+            }
+        }
+    }
+
+    #[test]
+    fn every_sum_of_16_bits_has_the_bits_of_f32() {
+        scaling_of_every_sum_is_exact::<false>();
+        scaling_of_every_sum_is_exact::<true>();
+    }
+
     fn gates_are_exact<const NARROW: bool>() {
         pairs(|a, b| {
             let [gate, x] = [a, b].map(f32::from_bits);

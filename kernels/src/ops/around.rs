@@ -177,7 +177,47 @@ fn part_of<'r>(region: &'r [u32], range: &Range<usize>) -> &'r [u32] {
 
 #[cfg(test)]
 mod tests {
-    use super::clip;
+    use super::{History, clip};
+
+    /// Frame `t` since a reset.
+    fn frame<const N: usize>(t: usize) -> [u32; N] {
+        core::array::from_fn(|i| (100 * t + i + 1) as u32)
+    }
+
+    /// Compares a history, in two runs of its units, with its definition, until its ring has wrapped three times.
+    fn is_kept<const N: usize>(history: History, cut: usize) {
+        let len = N * history.length;
+        let (mut ring, mut dst) = ([0; 3 * 16], [0; 3 * 4]);
+        let mut step = 0;
+        for t in 0..3 * history.slots + 2 {
+            let now = History { step, ..history };
+            // The last units keep the new frame.
+            for part in [0..cut, cut..len + N] {
+                now.run(&part, &frame::<N>(t), &mut ring[..N * history.slots], &mut dst[..len]);
+            }
+            step = now.next() as usize;
+            for (k, found) in dst[..len].chunks(N).enumerate() {
+                let back = if history.newest_first { k } else { history.length - 1 - k };
+                let at = t.checked_sub(back * history.stride + history.newest);
+                let missing = if history.first_fills { frame(0) } else { [0; N] };
+                assert_eq!(found, at.map_or(missing, frame::<N>), "frame {k} in step {t}");
+            }
+        }
+    }
+
+    /// All that the check of images accepts, up to these sizes.
+    #[test]
+    fn histories_of_every_small_size_keep_their_frames() {
+        for (length, stride, newest) in (0..4 * 4 * 2).map(|i| (1 + i % 4, 1 + i / 4 % 4, i / 16)) {
+            let slots = ((length - 1) * stride + newest).max(1);
+            for flags in 0..4 {
+                let (newest_first, first_fills) = (flags & 1 != 0, flags & 2 != 0);
+                let of = |frame| History { frame, slots, length, stride, newest, newest_first, first_fills, step: 0 };
+                (0..=length + 1).for_each(|cut| is_kept::<1>(of(1), cut));
+                (0..=3 * length + 3).for_each(|cut| is_kept::<3>(of(3), cut));
+            }
+        }
+    }
 
     #[test]
     fn what_is_not_finite_stays_visible() {

@@ -149,3 +149,55 @@ fn noise_gives_no_message() {
     }
     assert!(receiver.counters().damaged > 10_000);
 }
+
+/// Returns the frame of a chunk with these bytes.
+fn chunk(number: u32, bytes: &[u8]) -> Vec<u8> {
+    let mut buffer = [0; 1024];
+    let message = Message::Chunk { offset: 0, bytes };
+    Sender::new(number).frame(&message, 0, &mut buffer).expect("the buffer is large enough").to_vec()
+}
+
+/// All payloads of up to five bytes from four, which have the zero and the shortest and longest runs: from their frames every
+/// piece is cut out, and only frames that are whole arrive.
+#[test]
+fn no_piece_of_a_short_frame_is_missed_unseen() {
+    let (next, third) = (chunk(2, &[]), chunk(3, &[]));
+    for case in 0..4 * 4usize.pow(5) {
+        let (length, case) = (2 + case % 4, case / 4);
+        let bytes: Vec<u8> = (0..length as u32).map(|i| [0, 1, 2, 255][case / 4usize.pow(i) % 4]).collect();
+        if case >= 4usize.pow(length as u32) {
+            continue;
+        }
+        let wire = chunk(1, &bytes);
+        for (start, end) in (0..wire.len()).flat_map(|start| (start..=wire.len()).map(move |end| (start, end))) {
+            let line = [&wire[..start], &wire[end..], &next, &third].concat();
+            let mut receiver = Receiver::<LONGEST>::new();
+            let arrived = line.iter().filter_map(|byte| receiver.push(*byte).map(|received| received.sequence));
+            // Without its end, a frame runs into the next.
+            let expected: &[u32] = match (start, end) {
+                _ if start == end => &[1, 2, 3],
+                (1.., end) if end == wire.len() => &[3],
+                _ => &[2, 3],
+            };
+            assert!(arrived.eq(expected.iter().copied()), "{bytes:?} without {start}..{end}");
+        }
+    }
+}
+
+/// Stuffing begins a new run after 254 bytes: all lengths around one and two of them, with a zero at every place.
+#[test]
+fn long_runs_arrive_with_a_zero_anywhere() {
+    for length in 225..525 {
+        for zero in 0..=length {
+            let mut bytes = vec![7; length];
+            if let Some(byte) = bytes.get_mut(zero) {
+                *byte = 0;
+            }
+            let (wire, mut receiver) = (chunk(1, &bytes), Receiver::<LONGEST>::new());
+            let (end, start) = wire.split_last().expect("a frame is not empty");
+            assert!(start.iter().all(|byte| *byte != 0 && receiver.push(*byte).is_none()));
+            let received = receiver.push(*end).map(|received| received.message);
+            assert_eq!(received, Some(Message::Chunk { offset: 0, bytes: &bytes }));
+        }
+    }
+}
