@@ -40,7 +40,7 @@ pub(crate) struct Options {
     /// The public key, as `actq keygen` prints it, that signs images; others are refused (feature signed)
     #[arg(long, value_name = "HEX", value_parser = key)]
     pub(crate) key: Option<String>,
-    /// Build the last commit in two new folders, with two names of cargo's folder; fails if the ELF files differ
+    /// Build the last commit in two new folders, with two of cargo's; fails if the flashed bytes differ
     #[arg(long)]
     pub(crate) reproduce: bool,
     /// The ELF file, written whole or not at all
@@ -177,6 +177,8 @@ impl Checkout {
         let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
         let home =
             home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).context("cargo's folder is not known")?;
+        // rustc sees the real name of a folder.
+        let home = fs::canonicalize(&home).with_context(|| home.display().to_string())?;
         Ok(Self { root: root().to_owned(), target: target_dir(), home })
     }
 
@@ -188,7 +190,7 @@ impl Checkout {
     }
 }
 
-/// Builds the last commit twice, and returns the bytes of the ELF file if both are equal.
+/// Builds the last commit twice, and returns the bytes of an ELF file if the flashed bytes of both are equal.
 fn reproduced(build: impl Fn(&Checkout) -> Result<Vec<u8>>) -> Result<Vec<u8>> {
     let here = Checkout::here()?;
     let git = |arguments: &[&str]| -> Result<String> {
@@ -200,20 +202,37 @@ fn reproduced(build: impl Fn(&Checkout) -> Result<Vec<u8>>) -> Result<Vec<u8>> {
     let changed = git(&["status", "--porcelain", "--untracked-files=no"])?;
     ensure!(changed.is_empty(), "only a commit can be reproduced; commit these changes first:\n{changed}");
     let folder = std::env::temp_dir().join(format!("actq-reproduce-{}", std::process::id()));
-    let mut files = Vec::new();
-    for name in ["a", "another/with a longer name"] {
+    let checkouts = ["a", "another/with a longer name"].map(|name| {
         let root = folder.join(name);
-        fs::create_dir_all(&root).with_context(|| root.display().to_string())?;
-        let home = root.join("cargo");
-        link(&here.home, &home)?;
-        let checkout = Checkout { target: root.join("target"), root: root.join("actq"), home };
-        git(&["clone", "--quiet", &here.root.to_string_lossy(), &checkout.root.to_string_lossy()])?;
-        files.push(build(&checkout)?);
+        Checkout { root: root.join("actq"), target: root.join("target"), home: root.join("cargo") }
+    });
+    for Checkout { root, home, .. } in &checkouts {
+        fs::create_dir_all(home).with_context(|| home.display().to_string())?;
+        link(&here.home.join("registry"), &home.join("registry"))?;
+        git(&["clone", "--quiet", &here.root.to_string_lossy(), &root.to_string_lossy()])?;
     }
-    ensure!(files[0] == files[1], "the ELF files differ; both builds are in {}", folder.display());
+    let [elf, other] = [build(&checkouts[0])?, build(&checkouts[1])?];
+    let [bytes, others] = [&elf, &other].map(|elf| flashed(elf).context("not a whole ELF file"));
+    let bytes = bytes?;
+    ensure!(bytes == others?, "the flashed bytes differ; both builds are in {}", folder.display());
     fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
-    println!("two builds of {} are equal: {} bytes", git(&["rev-parse", "HEAD"])?, files[0].len());
-    Ok(files.swap_remove(0))
+    let whole = if elf == other { "the ELF files too" } else { "the ELF files differ in symbols or debug information" };
+    let count: usize = bytes.iter().map(|part| part.len()).sum();
+    println!("commit {}: two builds have the same {count} flashed bytes; {whole}", git(&["rev-parse", "HEAD"])?);
+    Ok(elf)
+}
+
+/// Returns the segments of an ELF file of 32 bits that are loaded into memory; `None` if it is truncated.
+fn flashed(elf: &[u8]) -> Option<Vec<&[u8]>> {
+    let word = |at: usize| Some(u32::from_le_bytes(elf.get(at..)?.first_chunk().copied()?) as usize);
+    let (first, sizes) = (word(28)?, word(42)?);
+    let (size, count) = (sizes & 0xffff, sizes >> 16);
+    let segments = (0..count).map(|i| {
+        let at = first + i * size;
+        let (kind, offset, length) = (word(at)?, word(at + 4)?, word(at + 16)?);
+        Some((kind == 1).then_some(elf.get(offset..offset + length)?))
+    });
+    Some(segments.collect::<Option<Vec<_>>>()?.into_iter().flatten().collect())
 }
 
 /// Gives a folder a second name.
