@@ -1,12 +1,15 @@
 //! What the documents show in C, Python and TOML parses.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::process::Command;
 
 use actq_bench::command::{actq, run, succeeded};
+use actq_bench::firmware::cargo;
 use actq_bench::{root, skipped};
 use actq_deploy::Answers;
 use anyhow::{Context, Result, bail, ensure};
+use serde_json::Value;
 use tempfile::TempDir;
 
 fn read(path: &str) -> Result<String> {
@@ -29,6 +32,29 @@ fn shipped_packages_hold_their_licences() -> Result<()> {
     for (folder, name) in shipped.iter().flat_map(|folder| [(folder, "LICENSE-MIT"), (folder, "LICENSE-APACHE")]) {
         ensure!(read(&format!("{folder}/{name}"))? == read(name)?, "{folder}/{name} is not the project's");
     }
+    Ok(())
+}
+
+/// Every direct dependency of the workspace and of the fuzz targets has its reason in RELEASING, and no other crate.
+#[test]
+fn each_dependency_has_its_reason() -> Result<()> {
+    let text = read("RELEASING.md")?;
+    let (_, table) = text.split_once("## Dependencies\n").context("RELEASING.md has no section Dependencies")?;
+    let crates = table.lines().filter_map(|row| row.strip_prefix("| `")?.split('|').next());
+    let listed: BTreeSet<&str> =
+        crates.flat_map(|cell| cell.split(['`', ',', ' '])).filter(|name| !name.is_empty()).collect();
+    let mut used = BTreeSet::new();
+    for manifest in ["Cargo.toml", "fuzz/Cargo.toml"] {
+        let metadata = ["metadata", "--no-deps", "--offline", "--format-version", "1", "--manifest-path", manifest];
+        let metadata: Value = serde_json::from_str(&cargo("the list of dependencies", &metadata, &[])?)?;
+        let packages = metadata["packages"].as_array().into_iter().flatten();
+        let of_all = packages.flat_map(|package| package["dependencies"].as_array().into_iter().flatten());
+        let others = of_all.filter(|dependency| dependency["path"].is_null());
+        used.extend(others.filter_map(|dependency| Some(dependency["name"].as_str()?.to_owned())));
+    }
+    let used: BTreeSet<&str> = used.iter().map(String::as_str).collect();
+    let differing: Vec<_> = used.symmetric_difference(&listed).collect();
+    ensure!(differing.is_empty(), "RELEASING.md lacks, or lists without need, {differing:?}");
     Ok(())
 }
 
