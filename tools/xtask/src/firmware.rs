@@ -164,7 +164,7 @@ fn example() -> Result<PathBuf> {
     Ok(path)
 }
 
-/// The folders of a build. None of their names is in an ELF file.
+/// The folders of a build. None of their names is in the flashed bytes.
 struct Checkout {
     root: PathBuf,
     target: PathBuf,
@@ -199,6 +199,7 @@ fn reproduced(build: impl Fn(&Checkout) -> Result<Vec<u8>>) -> Result<Vec<u8>> {
         ensure!(output.status.success(), "git {}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr));
         Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
+    let commit = git(&["rev-parse", "HEAD"])?;
     let changed = git(&["status", "--porcelain", "--untracked-files=no"])?;
     ensure!(changed.is_empty(), "only a commit can be reproduced; commit these changes first:\n{changed}");
     let folder = std::env::temp_dir().join(format!("actq-reproduce-{}", std::process::id()));
@@ -218,7 +219,7 @@ fn reproduced(build: impl Fn(&Checkout) -> Result<Vec<u8>>) -> Result<Vec<u8>> {
     fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let whole = if elf == other { "the ELF files too" } else { "the ELF files differ in symbols or debug information" };
     let count: usize = bytes.iter().map(|part| part.len()).sum();
-    println!("commit {}: two builds have the same {count} flashed bytes; {whole}", git(&["rev-parse", "HEAD"])?);
+    println!("commit {commit}: two builds have the same {count} flashed bytes; {whole}");
     Ok(elf)
 }
 
