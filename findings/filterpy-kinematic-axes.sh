@@ -1,5 +1,5 @@
 #!/bin/sh
-# filterpy 2.0.0, bayesian-filters 1.4.5, filterpy 1.4.5: kinematic_kf() makes a Kalman filter of positions and velocities for several axes. In filterpy 2.0.0 and in bayesian-filters, its successor under another name, each
+# filterpy 2.0.0, bayesian-filters 1.4.5, filterpy 1.4.5: kinematic_kf() makes a Kalman filter of positions and velocities for several axes. In filterpy 2.0.0 and in bayesian-filters, a fork of it, each
 # row of the measurement matrix H adds all axes: the filter of two axes takes each measured coordinate for x + y, with no error. With dim_z left at its default of 1 there is one row, and with dim_z = 2 two equal rows.
 # Neither axis can be observed: a point at rest at (1, -3) is estimated at (-0.5, -0.5). In 1.4.5 of filterpy, H has one row for each axis, whatever dim_z is, and the estimate is right.
 # Seen on 2026-11-30:  filterpy 2.0.0 and bayesian-filters: H [[1, 0, 1, 0], [1, 0, 1, 0]], estimate (-0.50, -0.50)   filterpy 1.4.5: H [[1, 0, 0, 0], [0, 0, 1, 0]], estimate (1.00, -3.00)

@@ -1,7 +1,7 @@
 #!/bin/sh
 # robstride 0.1.0, cybergeardriver 0.2.0, robstride-dynamics 0.0.1: the motors of CyberGear and RobStride put mode and faults in the identifier of each feedback frame, the mode in bits 22 and 23, the faults in bits 16 to 21.
 # robstride masks one of the mode's two bits: a motor that runs (2) is reported as Reset (0), as if it were switched off. cybergeardriver takes the bits for bytes, of which it makes 16: mode_status is 0 in each mode, and
-# none of the six faults is ever seen: of a motor with overtemperature, the event has_fault is not emitted. There is no error. robstride-dynamics and robstride read the faults right; it does not give the mode.
+# none of the six faults is ever seen: of a motor with overtemperature, the event has_fault is not emitted. There is no error. robstride and robstride-dynamics read the faults right; robstride-dynamics does not give the mode.
 # Seen on 2026-11-30:  a motor that runs and is too hot: robstride: Reset, Overtemp   cybergeardriver: mode 0, no fault, no event   robstride-dynamics: overtemperature
 set -eu
 dir=$(mktemp -d); trap 'rm -rf "$dir"' EXIT; cd "$dir"
