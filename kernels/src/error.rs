@@ -164,7 +164,7 @@ macro_rules! errors {
 
 errors! {
     /// Why [`crate::Head::new`] refused the scratch memory.
-    HeadError, "64 to 69" {
+    HeadError, "64" {
         /// The scratch memory has fewer words than the image needs.
         ScratchTooSmall {
             /// Words needed.
@@ -172,6 +172,25 @@ errors! {
             /// Words given.
             given: usize,
         } = 64, "scratch memory has {given} words; the image needs {needed}";
+    }
+}
+
+errors! {
+    /// Why a head did not take a prefix, or a cache of it no keys and values. The head keeps its prefix.
+    PrefixError, "65 to 69" {
+        /// The length differs from that of the image's prefix, or keys and values are not whole tokens of the cache.
+        Length {
+            /// Bytes needed ([`crate::Image::prefix_bytes`]), or values of the keys that have room.
+            needed: usize,
+            /// Bytes or values given.
+            given: usize,
+        } = 65, "prefix has the length {given}; the image's has {needed}";
+        /// A cache has no token, or more than its slots.
+        Tokens = 66, "a cache of the prefix has no token, or more tokens than slots";
+        /// A key, a value or a scale is not finite, or a scale is negative.
+        NotFinite = 67, "a value or a scale of the prefix is not finite, or a scale is negative";
+        /// A step has begun and is not ready: poll it to its end, or reset.
+        Begun = 68, "a step is being polled; poll it to its end, or reset, before it gets another prefix";
     }
 }
 
@@ -254,6 +273,8 @@ errors! {
         } = 90, "observation value {index} is outside the range of its raw input";
         /// A quaternion of the observation is not an orientation: its length is not near 1 (`docs/DEPLOY.md`).
         Orientation = 91, "a quaternion's length is not near 1, so it is not an orientation";
+        /// The image reads a prefix, and the head has none ([`crate::Head`]'s `set_prefix`, with the feature `attention`).
+        NoPrefix = 92, "the policy reads a prefix, keys and values from a host, and none was set";
     }
 }
 
@@ -296,6 +317,8 @@ pub enum Error {
     Image(ImageError),
     /// See [`HeadError`].
     Head(HeadError),
+    /// See [`PrefixError`].
+    Prefix(PrefixError),
     /// See [`SavedError`].
     Saved(SavedError),
     /// See [`StepError`].
@@ -308,6 +331,7 @@ impl Error {
         match self {
             Self::Image(error) => error as u8,
             Self::Head(error) => error.code(),
+            Self::Prefix(error) => error.code(),
             Self::Saved(error) => error.code(),
             Self::Step(error) => error.code(),
         }
@@ -319,6 +343,7 @@ impl fmt::Display for Error {
         match self {
             Self::Image(error) => error.fmt(f),
             Self::Head(error) => error.fmt(f),
+            Self::Prefix(error) => error.fmt(f),
             Self::Saved(error) => error.fmt(f),
             Self::Step(error) => error.fmt(f),
         }
@@ -337,7 +362,7 @@ macro_rules! any_error {
     };
 }
 
-any_error! { Image ImageError Head HeadError Saved SavedError Step StepError }
+any_error! { Image ImageError Head HeadError Prefix PrefixError Saved SavedError Step StepError }
 
 #[cfg(test)]
 mod tests {
@@ -399,8 +424,16 @@ mod tests {
             StepError::Stale,
             StepError::ObservationRange { index: 0 },
             StepError::Orientation,
+            StepError::NoPrefix,
         ];
-        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86, 87, 88, 89, 90, 91]);
+        assert_eq!(steps.map(StepError::code), [80, 81, 82, 83, 84, 85, 86, 87, 88, 89, 90, 91, 92]);
+        let prefix = [
+            PrefixError::Length { needed: 1, given: 0 },
+            PrefixError::Tokens,
+            PrefixError::NotFinite,
+            PrefixError::Begun,
+        ];
+        assert_eq!(prefix.map(PrefixError::code), [65, 66, 67, 68]);
         let saved = [
             SavedError::Length { needed: 1, given: 0 },
             SavedError::Version,

@@ -105,10 +105,12 @@ mod round;
 
 pub use arch::{BACKEND, Backend};
 pub use cost::Cost;
-pub use error::{Error, HeadError, ImageError, SavedError, StepError};
+pub use error::{Error, HeadError, ImageError, PrefixError, SavedError, StepError};
 pub use head::Head;
 #[cfg(feature = "writer")]
 pub use head::Parked;
+#[cfg(feature = "attention")]
+pub use image::Cache;
 pub use image::{Image, ImageInfo, Kind, Port, PortKind};
 #[cfg(feature = "writer")]
 pub use layout::{Block, BlockShape, Width};

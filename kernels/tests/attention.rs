@@ -10,9 +10,9 @@ use std::task::Poll;
 use actq_kernels::activations::Scale;
 use actq_kernels::image::Cache;
 use actq_kernels::math::exp;
-use actq_kernels::{Head, StepError};
+use actq_kernels::{Head, Image, PrefixError, StepError};
 use actq_testkit::Random;
-use common::{Attention, on_head};
+use common::{Attention, Prefixed, on_head};
 
 /// Attentions in each test.
 const CASES: usize = if cfg!(miri) { 4 } else { 600 };
@@ -309,5 +309,195 @@ fn a_cache_of_any_content_does_not_panic() {
                 }
             }
         });
+    }
+}
+
+/// Returns the outputs of a prefix's attentions, the queries of each but the first being the outputs before it.
+fn plain_prefixed(prefixed: &Prefixed, observation: &[f32], keys_and_values: &[[Vec<f32>; 2]]) -> Vec<f32> {
+    let mut outputs = observation.to_vec();
+    for (cache, [keys, values]) in prefixed.caches.iter().zip(keys_and_values) {
+        let heads: Vec<Pair> =
+            keys.chunks(cache.dim).zip(values.chunks(cache.dim)).map(|(k, v)| (k.to_vec(), v.to_vec())).collect();
+        let of_unit = |(unit, query): (usize, &[f32])| {
+            let shared = unit % prefixed.heads / (prefixed.heads / cache.heads);
+            let seen: Vec<&Pair> = heads.iter().skip(shared).step_by(cache.heads).collect();
+            plain(prefixed.factor, query, &seen)
+        };
+        outputs = outputs.chunks(cache.dim).enumerate().flat_map(of_unit).collect();
+    }
+    outputs
+}
+
+fn drawn(random: &mut Random, len: usize) -> Vec<f32> {
+    (0..len).map(|_| random.unit()).collect()
+}
+
+#[test]
+fn a_prefix_gives_the_documented_bits() {
+    let mut random = Random::new(7);
+    for _ in 0..CASES / 10 {
+        let prefixed = Prefixed::draw(&mut random);
+        on_head(&prefixed.image(), |head| {
+            assert!(head.image().prefix_caches().eq(prefixed.caches.iter().copied()));
+            for _ in 0..3 {
+                let keys_and_values = prefixed.keys_and_values(&mut random);
+                head.set_prefix(&prefixed.bytes(&keys_and_values)).expect("it is the image's");
+                // It stays over steps, slices and a reset.
+                for _ in 0..2 {
+                    let observation = drawn(&mut random, prefixed.len());
+                    let expected = plain_prefixed(&prefixed, &observation, &keys_and_values);
+                    assert_eq!(head.step(&observation), Ok(&expected[..]), "{prefixed:?}");
+                    assert_eq!(in_polls(head, &observation).0, Ok(expected), "{prefixed:?}");
+                    head.reset();
+                }
+            }
+        });
+    }
+}
+
+/// Two caches, and the words before the second.
+fn two() -> (Prefixed, usize) {
+    let cache = Cache { heads: 2, dim: 3, slots: 5 };
+    let prefixed = Prefixed { heads: 4, caches: vec![cache, Cache { slots: 3, ..cache }], tokens: 2, factor: 0.5 };
+    (prefixed, cache.words())
+}
+
+#[test]
+fn without_a_prefix_no_step_runs() {
+    let (prefixed, _) = two();
+    let mut random = Random::new(8);
+    let bytes = prefixed.bytes(&prefixed.keys_and_values(&mut random));
+    let observation = drawn(&mut random, prefixed.len());
+    on_head(&prefixed.image(), |head| {
+        assert_eq!(head.step(&observation), Err(StepError::NoPrefix));
+        assert_eq!(head.infer(&observation), Err(StepError::NoPrefix));
+        assert_eq!(head.begin(&observation), Err(StepError::NoPrefix));
+        assert!(!head.has_prefix());
+        head.set_prefix(&bytes).expect("it is the image's");
+        let action = head.step(&observation).expect("all is finite").to_vec();
+        head.clear_prefix();
+        assert_eq!(head.step(&observation), Err(StepError::NoPrefix));
+        // The self-test has its own, which no step uses.
+        assert_eq!(head.self_test(), Ok(()));
+        assert_eq!(head.step(&observation), Err(StepError::NoPrefix));
+        head.set_prefix(&bytes).expect("it is the image's");
+        assert_eq!(head.step(&observation), Ok(&action[..]));
+        let mut saved = vec![0; head.saved_len()];
+        head.save(&mut saved).expect("no step has begun");
+        head.clear_prefix();
+        head.restore(&saved).expect("it is this head's");
+        assert_eq!(head.step(&observation), Ok(&action[..]), "a saved state has the prefix");
+        // A step that has begun keeps its prefix, or is dropped with it.
+        head.begin(&observation).expect("all is finite");
+        assert_eq!(head.set_prefix(&bytes), Err(PrefixError::Begun));
+        head.clear_prefix();
+        assert_eq!(head.poll(u32::MAX), Err(StepError::NotBegun));
+    });
+    let plain = Attention::draw(&mut random);
+    on_head(&plain.image(), |head| {
+        assert!(head.has_prefix() && head.image().prefix_bytes() == 0, "it needs none");
+        assert_eq!(head.set_prefix(&[]), Ok(()));
+        assert_eq!(head.set_prefix(&[0; 4]), Err(PrefixError::Length { needed: 0, given: 4 }));
+    });
+}
+
+#[test]
+fn a_wrong_prefix_leaves_the_one_before() {
+    let (prefixed, second) = two();
+    let mut random = Random::new(9);
+    let bytes = prefixed.bytes(&prefixed.keys_and_values(&mut random));
+    let observation = drawn(&mut random, prefixed.len());
+    on_head(&prefixed.image(), |head| {
+        head.set_prefix(&bytes).expect("it is the image's");
+        let action = head.step(&observation).expect("all is finite").to_vec();
+        let with = |at: usize, word: u32| {
+            let mut wrong = bytes.clone();
+            wrong[4 * at..4 * at + 4].copy_from_slice(&word.to_le_bytes());
+            wrong
+        };
+        let scale = |x: f32| with(second + 12, x.to_bits());
+        let cases = [
+            (bytes[4..].to_vec(), PrefixError::Length { needed: bytes.len(), given: bytes.len() - 4 }),
+            (with(0, 0), PrefixError::Tokens),
+            (with(0, 6), PrefixError::Tokens),
+            (with(second, 4), PrefixError::Tokens),
+            (with(second, u32::MAX), PrefixError::Tokens),
+            (scale(f32::NAN), PrefixError::NotFinite),
+            (scale(f32::INFINITY), PrefixError::NotFinite),
+            (scale(-1.0), PrefixError::NotFinite),
+            (with(1, (-0.0f32).to_bits()), PrefixError::NotFinite),
+        ];
+        for (wrong, error) in cases {
+            assert_eq!(head.set_prefix(&wrong), Err(error));
+            assert_eq!(head.step(&observation), Ok(&action[..]), "{error}");
+        }
+        // Integers of any bits do not panic.
+        for _ in 0..CASES {
+            let mut any = bytes.clone();
+            for (i, byte) in any.iter_mut().enumerate() {
+                let (word, first) = (i / 4, if i / 4 >= second { second } else { 0 });
+                // Not the count and the scales.
+                let scales = if first == 0 { 20 } else { 12 };
+                if word > first + scales {
+                    *byte = random.bits() as u8;
+                }
+            }
+            head.set_prefix(&any).expect("its counts and scales are as before");
+            assert!(head.step(&observation).is_ok_and(|action| action.iter().all(|y| y.is_finite())));
+        }
+    });
+}
+
+#[test]
+fn only_whole_finite_tokens_fill_a_cache() {
+    let cache = Cache { heads: 2, dim: 3, slots: 4 };
+    let mut words = vec![0; cache.words()];
+    let length = |given| Err(PrefixError::Length { needed: 24, given });
+    assert_eq!(cache.fill(&[1.0; 24], &[1.0; 24], &mut words), Ok(()));
+    assert_eq!(words[0], 4);
+    assert_eq!(cache.fill(&[1.0; 6], &[1.0; 6], &mut words), Ok(()));
+    assert_eq!(words[0], 1);
+    assert_eq!(cache.fill(&[1.0; 6], &[1.0; 6], &mut words[1..]), length(6));
+    assert_eq!(cache.fill(&[1.0; 7], &[1.0; 7], &mut words), length(7));
+    assert_eq!(cache.fill(&[1.0; 12], &[1.0; 6], &mut words), length(12));
+    assert_eq!(cache.fill(&[], &[], &mut words), Err(PrefixError::Tokens));
+    assert_eq!(cache.fill(&[1.0; 30], &[1.0; 30], &mut words), Err(PrefixError::Tokens));
+    for wrong in [f32::NAN, f32::INFINITY] {
+        assert_eq!(cache.fill(&[1.0, 1.0, wrong, 1.0, 1.0, 1.0], &[1.0; 6], &mut words), Err(PrefixError::NotFinite));
+    }
+    for cache in [Cache { heads: 0, ..cache }, Cache { dim: 0, ..cache }, Cache { slots: 0, ..cache }] {
+        assert!(cache.fill(&[1.0; 6], &[1.0; 6], &mut words).is_err(), "{cache:?}");
+    }
+}
+
+/// The integers and scales of a prefix are those that `keep` writes for the same keys and values.
+#[test]
+fn a_prefix_has_the_bits_of_keep() {
+    let mut random = Random::new(10);
+    for _ in 0..CASES / 30 {
+        let kept = Attention { is_ring: false, is_rotated: false, is_causal: false, ..Attention::draw(&mut random) };
+        let kept = Attention { tokens: kept.tokens.min(kept.cache.slots), ..kept };
+        let observation = drawn(&mut random, kept.lengths().iter().sum());
+        let (queries, rest) = observation.split_at(kept.lengths()[0]);
+        let (keys, values) = rest.split_at(kept.lengths()[1]);
+        let prefixed =
+            Prefixed { heads: kept.heads, caches: vec![kept.cache], tokens: kept.tokens, factor: kept.factor };
+        let bytes = prefixed.bytes(&[[keys.to_vec(), values.to_vec()]]);
+        let expected = on_head(&kept.image(), |head| head.step(&observation).map(<[f32]>::to_vec));
+        on_head(&prefixed.image(), |head| {
+            head.set_prefix(&bytes).expect("it is the image's");
+            assert_eq!(head.step(queries).map(<[f32]>::to_vec), expected, "{kept:?}");
+        });
+    }
+}
+
+#[test]
+fn the_self_test_has_a_prefix() {
+    let mut random = Random::new(11);
+    for _ in 0..CASES / 30 {
+        let words = Prefixed::draw(&mut random).image();
+        on_head(&words, |head| assert_eq!(head.self_test(), Ok(())));
+        let image = Image::new_checksummed(bytemuck::cast_slice(&words)).expect("it is whole");
+        assert!(image.prefix_bytes() > 0);
     }
 }

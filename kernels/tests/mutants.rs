@@ -13,7 +13,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use actq_kernels::image::{Cache, header as h, op};
 use actq_kernels::{Head, Image, StepError};
 use actq_testkit::Random;
-use attention::Attention;
+use attention::{Attention, Prefixed};
 use draft::Draft;
 
 /// Mutations in each test.
@@ -22,13 +22,15 @@ const CASES: u64 = if cfg!(miri) { 20 } else { 20_000 };
 /// An image with every kind of section. A test in `host-tests/tests` writes the same bytes.
 const VALID: &[u8] = include_bytes!("valid.actq");
 
-/// Returns the valid images: that of all sections, and attention to a ring and to all tokens of a step.
+/// Returns the valid images: that of all sections, and attention to a ring, to all tokens of a step, and to a prefix.
 fn valid() -> Vec<Draft> {
     let cache = Cache { heads: 2, dim: 6, slots: 4 };
     let ring = Attention { heads: 4, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: true, factor: 0.4 };
     let whole = Attention { tokens: 3, is_ring: false, is_causal: true, ..ring };
     let attentions = [ring, whole].map(|attention| Draft(attention.image()));
-    [Draft::of(VALID)].into_iter().chain(attentions).collect()
+    let prefixed = Prefixed { heads: 4, caches: vec![cache, Cache { slots: 2, ..cache }], tokens: 3, factor: 0.4 };
+    let images = attentions.into_iter().chain([Draft(prefixed.image())]);
+    [Draft::of(VALID)].into_iter().chain(images).collect()
 }
 
 /// Returns the words with the image's structure: header, operation, matrix and block records, sizes of attention.
@@ -104,6 +106,7 @@ fn accepted(see: impl Fn(Image<'_>, &mut Random)) -> u64 {
 fn play(image: Image<'_>, fill: u32, random: &mut Random) -> Vec<Option<Vec<u32>>> {
     let mut scratch = vec![fill; image.scratch_words()];
     let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+    head.set_test_prefix();
     let mut step = || {
         let observation: Vec<f32> = (0..image.obs_len()).map(|_| 3.0 * random.unit()).collect();
         head.step(&observation).ok().map(|action| action.iter().map(|a| a.to_bits()).collect())
@@ -143,6 +146,7 @@ fn a_reset_clears_everything() {
     accepted(|image, random| {
         let mut scratch = vec![0; image.scratch_words()];
         let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
+        head.set_test_prefix();
         let observations: Vec<Vec<f32>> =
             (0..3).map(|_| (0..image.obs_len()).map(|_| 3.0 * random.unit()).collect()).collect();
         let mut play = || {
@@ -165,6 +169,7 @@ fn damage_after_the_check_does_not_panic() {
         let mut scratch = vec![0; image.scratch_words()];
         let mut head = Head::new(image, &mut scratch).expect("the scratch memory has the image's size");
         let observation = vec![0.5; image.obs_len()];
+        head.set_test_prefix();
         let outcome = catch_unwind(AssertUnwindSafe(|| (0..3).all(|_| head.step(&observation).is_ok())));
         outcomes[usize::from(outcome.unwrap_or_else(|_| panic!("case {case}")))] += 1;
     }

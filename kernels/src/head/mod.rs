@@ -5,6 +5,8 @@ mod contract;
 #[cfg(feature = "writer")]
 mod lockstep;
 mod playback;
+#[cfg(feature = "attention")]
+mod prefix;
 mod saved;
 mod self_test;
 mod step;
@@ -95,7 +97,8 @@ impl<'a, 's> Head<'a, 's> {
     }
 
     /// Clears the recurrent state, all chunks, the last action and a step that has begun. The noise of a flow or
-    /// diffusion policy starts from the beginning: after a reset the same observations give the same actions.
+    /// diffusion policy starts from the beginning: after a reset the same observations give the same actions. A prefix
+    /// stays.
     #[inline(never)]
     pub fn reset(&mut self) {
         self.abandon();

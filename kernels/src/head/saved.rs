@@ -1,9 +1,9 @@
 //! The state of a head as bytes, for a warm restart: everything besides the image and the observations that the next
-//! actions depend on.
+//! actions depend on, a prefix among it.
 //!
 //! Words, little-endian: `ACTS`, version, checksum of the image, checksum of the words after it; seed, draws, flags
 //! (bit 0: an action has played, bit 1: the output holds a chunk), the positions of playback; then regions of the
-//! arena: the recurrent state, the output, and everything from the last action to the work area.
+//! arena: the recurrent state with the prefix after it, the output, and everything from the last action to the work area.
 
 use super::playback::Playback;
 use super::{Head, Phase};
@@ -27,7 +27,8 @@ impl Head<'_, '_> {
     }
 
     /// Writes the state into `to`, of [`Self::saved_len`] bytes: recurrent state, chunks, last action, states of
-    /// binarized values, seed and draws of the noise. A head that restores it continues with the same bits.
+    /// binarized values, seed and draws of the noise, and a prefix, however old it then is. A head that restores it
+    /// continues with the same bits.
     ///
     /// # Errors
     ///
@@ -116,6 +117,11 @@ impl Head<'_, '_> {
     pub(super) fn regions_to_save(image: &Image<'_>) -> [Region; 3] {
         let action = image.action().offset;
         let len = image.work().offset.saturating_sub(action);
-        [image.state(), image.output(), Region { offset: action, len }]
+        #[cfg(not(feature = "attention"))]
+        let state = image.state();
+        // With the prefix.
+        #[cfg(feature = "attention")]
+        let state = Region { offset: 0, len: image.observation().offset };
+        [state, image.output(), Region { offset: action, len }]
     }
 }

@@ -6,7 +6,8 @@ use crate::error::{Fault, StepError};
 use crate::ops::elementwise::copy_le;
 
 impl Head<'_, '_> {
-    /// Plays the image's self-test from a reset and compares every action bit for bit; resets again at the end.
+    /// Plays the image's self-test from a reset and compares every action bit for bit; resets again at the end, and
+    /// clears the prefix, because the test has its own.
     ///
     /// # Errors
     ///
@@ -39,7 +40,11 @@ impl Head<'_, '_> {
     fn play_self_test(&mut self, finish: impl FnMut(&mut Self) -> Result<(), Fault>) -> Result<(), StepError> {
         let seed = core::mem::take(&mut self.seed);
         self.reset();
+        #[cfg(feature = "attention")]
+        self.set_test_prefix();
         let outcome = self.compare_self_test(finish);
+        #[cfg(feature = "attention")]
+        self.clear_prefix();
         self.seed(seed);
         outcome
     }

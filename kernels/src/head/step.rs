@@ -24,7 +24,8 @@ impl Head<'_, '_> {
     /// the observation; [`StepError::NotFinite`] if a value inside the network exceeds f32's range;
     /// [`StepError::Damaged`] if the image has changed since its check, or scratch memory between two steps or during
     /// one (feature `checksums`); [`StepError::Stale`] if the action is older than its deadline;
-    /// [`StepError::Orientation`] if the image reads a quaternion whose length is not near 1.
+    /// [`StepError::Orientation`] if the image reads a quaternion whose length is not near 1; [`StepError::NoPrefix`]
+    /// if the network must run and its prefix is missing.
     ///
     /// An error resets the recurrent state and the chunk, so that no part of a failed evaluation reaches a later
     /// action. The last action stays, and `max_step` limits the next one from it.
@@ -157,6 +158,11 @@ impl Head<'_, '_> {
         self.drop_step();
         self.load(observation).inspect_err(|_| self.abandon())?;
         self.playback.turn(&self.image, self.arena);
+        #[cfg(feature = "attention")]
+        if !self.playback.ready && !self.has_prefix() {
+            self.abandon();
+            return Err(StepError::NoPrefix);
+        }
         if let Some(noise) = noise {
             self.load_noise(noise).inspect_err(|_| self.abandon())?;
         }

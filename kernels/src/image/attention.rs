@@ -1,9 +1,10 @@
-//! Sizes of a cache of keys and values, and where its parts are. `docs/FORMAT.md` has its content.
+//! Sizes of a cache of keys and values, where its parts are, and the caches of a prefix. `docs/FORMAT.md` has their content.
 
 use super::header::MAX_SCRATCH;
 use super::op::OpKind;
 use super::record::Op;
 use super::region::Region;
+use super::view::Image;
 
 /// Largest dimension of a head: 256 times a sum of products of int8 fits int32, `256 * 127 * 127 * 512 < 2^31`.
 pub const MAX_DIM: usize = 512;
@@ -31,6 +32,11 @@ impl Cache {
         let keys = self.slots.saturating_mul(2 + self.key_words());
         let values = self.value_rows().saturating_mul(self.row_words());
         1 + product([self.heads, keys.saturating_add(values), 1])
+    }
+
+    /// Returns the words of the scales, which follow the count.
+    pub(crate) const fn scales(self) -> usize {
+        self.slots.saturating_mul(self.heads).saturating_mul(2)
     }
 
     /// Returns the words of the work area that a head of a query needs: its scores and its integers.
@@ -80,7 +86,37 @@ pub(super) const fn product(sizes: [usize; 3]) -> usize {
     if product > MAX_SCRATCH { MAX_SCRATCH + 1 } else { product }
 }
 
+impl Image<'_> {
+    /// Returns the arena region of the prefix: keys and values that come from the head's caller
+    /// ([`crate::Head::set_prefix`]). It is between the state and the observation; empty if the image needs none.
+    pub(crate) fn prefix(&self) -> Region {
+        let offset = self.state().end();
+        Region { offset, len: self.observation().offset.saturating_sub(offset) }
+    }
+
+    /// Returns the bytes of the prefix that [`crate::Head::set_prefix`] takes; 0 if the image needs none.
+    pub fn prefix_bytes(&self) -> usize {
+        4 * self.prefix().len
+    }
+
+    /// Returns the caches of the prefix, in their order: one for each attention that reads it.
+    pub fn prefix_caches(&self) -> impl Iterator<Item = Cache> {
+        let prefix = self.prefix();
+        let mut at = prefix.offset;
+        (0..self.op_count()).filter_map(move |i| {
+            let op = self.op(i).ok().filter(|op| op.reads_prefix(prefix) && op.third().offset == at)?;
+            at = op.third().end();
+            Some(op.cache())
+        })
+    }
+}
+
 impl Op<'_> {
+    /// Returns `true` if the operation is an attention to a cache that begins in the prefix.
+    pub(super) fn reads_prefix(&self, prefix: Region) -> bool {
+        self.kind == OpKind::Attend && prefix.range().contains(&self.third().offset)
+    }
+
     /// Returns the cache of an operation of attention.
     pub fn cache(&self) -> Cache {
         let first = usize::from(self.kind == OpKind::Attend);

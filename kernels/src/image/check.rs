@@ -123,7 +123,8 @@ impl<'a> Image<'a> {
         // gaps. (`check_sections` checks the middle.)
         let work = self.work();
         if self.state().offset != 0
-            || self.observation().offset != self.state().end()
+            || cfg!(not(feature = "attention")) && self.observation().offset != self.state().end()
+            || self.observation().offset < self.state().end()
             || self.output().offset < self.observation().end()
             || work.offset != self.kept().end()
             || work.end() != self.scratch_words()
@@ -143,7 +144,13 @@ impl<'a> Image<'a> {
 
     /// Checks the sections, in their order in the image, and their content.
     fn check_sections(&self) -> Result<(), ImageError> {
-        let front = &mut Front { words: self.words, at: h::WORDS, finite: h::WORDS };
+        let front = &mut Front {
+            words: self.words,
+            at: h::WORDS,
+            finite: h::WORDS,
+            #[cfg(feature = "attention")]
+            prefix: self.prefix().offset,
+        };
         for i in 0..self.matrix_count() {
             check_matrix(self.matrix_at(i), front, self.work().len)?;
         }
@@ -156,6 +163,10 @@ impl<'a> Image<'a> {
             return Err(ImageError::Unwritten);
         }
         if written != self.action().offset {
+            return Err(ImageError::Arena);
+        }
+        #[cfg(feature = "attention")]
+        if front.prefix != self.prefix().end() {
             return Err(ImageError::Arena);
         }
         front.take(self.header.ops(), self.op_count() * h::OP_WORDS)?;
@@ -280,6 +291,8 @@ impl<'a> Image<'a> {
             }
             front.take_finite(op.data() + constants, arrays * n)?;
         }
+        #[cfg(feature = "attention")]
+        self.check_prefix(op, front)?;
         let [dst, src, third] = op.regions;
         if dst.overlaps(src) || dst.overlaps(third) || src.overlaps(third) {
             return Err(ImageError::Overlap);
@@ -295,6 +308,21 @@ impl<'a> Image<'a> {
             return Err(ImageError::Arena);
         }
         Ok(written.max(dst.end()))
+    }
+
+    /// Checks that an operation has no word of the prefix, or that it is an attention to the next cache of it.
+    #[cfg(feature = "attention")]
+    #[inline(never)]
+    fn check_prefix(&self, op: &Op<'_>, front: &mut Front<'a>) -> Result<(), ImageError> {
+        let (prefix, [dst, src, third]) = (self.prefix(), op.regions);
+        let is_next = op.reads_prefix(prefix) && third.offset == front.prefix;
+        if dst.overlaps(prefix) || src.overlaps(prefix) || !is_next && third.overlaps(prefix) {
+            return Err(ImageError::Overlap);
+        }
+        if is_next {
+            front.prefix = third.end();
+        }
+        Ok(())
     }
 
     /// Checks an operation of attention: its sizes, and that the work area has room for a head.

@@ -11,6 +11,9 @@ pub(super) struct Front<'a> {
     pub(super) at: usize,
     /// From here to that end all words are finite constants.
     pub(super) finite: usize,
+    /// End of the caches of the prefix that operations have read.
+    #[cfg(feature = "attention")]
+    pub(super) prefix: usize,
 }
 
 impl<'a> Front<'a> {

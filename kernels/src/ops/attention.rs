@@ -17,7 +17,7 @@ use core::ops::Range;
 use crate::activations::Scale;
 use crate::arch::{query_keys, weigh_values};
 use crate::arena::{part, regions};
-use crate::error::Fault;
+use crate::error::{Fault, PrefixError};
 use crate::image::{Cache, Op, OpKind, Region};
 use crate::math::{Native, Real, exp};
 
@@ -51,19 +51,9 @@ fn keep(op: &Op<'_>, units: &Range<usize>, cache: &mut [u32], keys: &[f32], valu
     for unit in units.clone() {
         let token = unit.checked_div(shape.heads).ok_or(Fault::Damaged)?;
         let slot = if op.is_ring() { (count as usize).checked_rem(shape.slots) } else { Some(token) };
-        let (scales_and_keys, values_part) = shape.parts(unit - token * shape.heads);
-        let [key_scales, value_scales, kept_keys, kept_values] = regions(cache, &scales_and_keys, values_part);
-        let slot = slot.ok_or(Fault::Damaged)?;
-        let key = Integers::of(vector(keys, unit, shape.dim)?, key_scales.get_mut(slot))?;
-        let words = slot * shape.key_words()..(slot + 1) * shape.key_words();
-        for (i, word) in kept_keys.get_mut(words).ok_or(Fault::Damaged)?.iter_mut().enumerate() {
-            *word = key.pair(2 * i) | key.pair(2 * i + 1) << 16;
-        }
-        let value = Integers::of(vector(values, unit, shape.dim)?, value_scales.get_mut(slot))?;
-        for (i, row) in kept_values.chunks_mut(shape.row_words().max(1)).enumerate() {
-            let (word, shift) = (row.get_mut(slot / 2).ok_or(Fault::Damaged)?, 16 * (slot % 2));
-            *word = *word & !(0xffff << shift) | value.pair(i) << shift;
-        }
+        let (head, slot) = (unit - token * shape.heads, slot.ok_or(Fault::Damaged)?);
+        let [key, value] = [vector(keys, unit, shape.dim)?, vector(values, unit, shape.dim)?];
+        keep_head(shape, cache, [head, slot], key, value)?;
     }
     if units.end == op.units() {
         // A ring counts on from the slots when it reaches twice as many. A caller may have written any count.
@@ -72,6 +62,60 @@ fn keep(op: &Op<'_>, units: &Range<usize>, cache: &mut [u32], keys: &[f32], valu
         *cache.first_mut().ok_or(Fault::Damaged)? = next;
     }
     Ok(())
+}
+
+/// Writes a head of a token to a slot.
+#[inline(always)]
+fn keep_head(
+    shape: Cache,
+    cache: &mut [u32],
+    [head, slot]: [usize; 2],
+    key: &[f32],
+    value: &[f32],
+) -> Result<(), Fault> {
+    let (scales_and_keys, values_part) = shape.parts(head);
+    let [key_scales, value_scales, kept_keys, kept_values] = regions(cache, &scales_and_keys, values_part);
+    let key = Integers::of(key, key_scales.get_mut(slot))?;
+    let words = slot * shape.key_words()..(slot + 1) * shape.key_words();
+    for (i, word) in kept_keys.get_mut(words).ok_or(Fault::Damaged)?.iter_mut().enumerate() {
+        *word = key.pair(2 * i) | key.pair(2 * i + 1) << 16;
+    }
+    let value = Integers::of(value, value_scales.get_mut(slot))?;
+    for (i, row) in kept_values.chunks_mut(shape.row_words().max(1)).enumerate() {
+        let (word, shift) = (row.get_mut(slot / 2).ok_or(Fault::Damaged)?, 16 * (slot % 2));
+        *word = *word & !(0xffff << shift) | value.pair(i) << shift;
+    }
+    Ok(())
+}
+
+impl Cache {
+    /// Writes keys and values, each [token, head, column], to the first words of `to`, as the image's own: a cache of a
+    /// prefix ([`crate::Head::set_prefix`]). Slots after the last token stay empty.
+    ///
+    /// # Errors
+    ///
+    /// [`PrefixError::Length`] if `to` has fewer words than the cache, if keys and values are not equally many, or not whole
+    /// tokens; [`PrefixError::Tokens`] without a token, or with more than slots; [`PrefixError::NotFinite`] for a value.
+    pub fn fill(self, keys: &[f32], values: &[f32], to: &mut [u32]) -> Result<(), PrefixError> {
+        let (token, given) = (self.heads.saturating_mul(self.dim), keys.len());
+        let tokens = given.checked_div(token).unwrap_or(0);
+        let wrong = PrefixError::Length { needed: self.slots.saturating_mul(token), given };
+        let cache = to.get_mut(..self.words()).ok_or(wrong)?;
+        if values.len() != given || tokens.saturating_mul(token) != given {
+            return Err(wrong);
+        }
+        if !(1..=self.slots).contains(&tokens) {
+            return Err(PrefixError::Tokens);
+        }
+        cache.fill(0);
+        let heads = keys.chunks_exact(self.dim.max(1)).zip(values.chunks_exact(self.dim.max(1)));
+        for (unit, (key, value)) in heads.enumerate() {
+            let place = [unit % self.heads.max(1), unit / self.heads.max(1)];
+            keep_head(self, cache, place, key, value).map_err(|_| PrefixError::NotFinite)?;
+        }
+        cache.iter_mut().take(1).for_each(|count| *count = tokens as u32);
+        Ok(())
+    }
 }
 
 fn rotate(op: &Op<'_>, units: &Range<usize>, x: &mut [f32]) -> Result<(), Fault> {

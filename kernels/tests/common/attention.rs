@@ -22,6 +22,151 @@ pub(crate) struct Attention {
     pub(crate) factor: f32,
 }
 
+/// Attention to a prefix: the observation is the queries.
+#[derive(Clone, Debug)]
+pub(crate) struct Prefixed {
+    /// Heads of the queries, a multiple of each cache's.
+    pub(crate) heads: usize,
+    /// The caches of the prefix, all of one dimension. The queries of each but the first are the outputs before it.
+    pub(crate) caches: Vec<Cache>,
+    /// Tokens of the queries.
+    pub(crate) tokens: usize,
+    pub(crate) factor: f32,
+}
+
+impl Prefixed {
+    /// Draws a small one.
+    pub(crate) fn draw(random: &mut Random) -> Self {
+        let (dim, groups) = (1 + random.below(20), 1 + random.below(3));
+        let slots = (0..1 + random.below(3)).map(|_| 1 + random.below(24));
+        let caches = slots.map(|slots| Cache { heads: groups, dim, slots }).collect();
+        let factor = 1.0 / (dim as f32).sqrt();
+        Self { heads: groups * (1 + random.below(3)), caches, tokens: 1 + random.below(4), factor }
+    }
+
+    /// Returns the values of an observation and of an action.
+    pub(crate) fn len(&self) -> usize {
+        self.tokens * self.heads * self.caches[0].dim
+    }
+
+    /// Draws keys and values of each cache, of up to all its slots.
+    pub(crate) fn keys_and_values(&self, random: &mut Random) -> Vec<[Vec<f32>; 2]> {
+        let of = |cache: &Cache| {
+            let len = (1 + random.below(cache.slots)) * cache.heads * cache.dim;
+            [0; 2].map(|_| (0..len).map(|_| random.unit()).collect())
+        };
+        self.caches.iter().map(of).collect()
+    }
+
+    /// Returns the bytes of a prefix.
+    pub(crate) fn bytes(&self, keys_and_values: &[[Vec<f32>; 2]]) -> Vec<u8> {
+        let mut words = Vec::new();
+        for (cache, [keys, values]) in self.caches.iter().zip(keys_and_values) {
+            let mut of_cache = vec![0; cache.words()];
+            cache.fill(keys, values, &mut of_cache).expect("they fit");
+            words.extend(of_cache);
+        }
+        words.iter().flat_map(|word| word.to_le_bytes()).collect()
+    }
+
+    /// Returns the image.
+    pub(crate) fn image(&self) -> Vec<u32> {
+        let pair = |low: usize, high: usize| (low | high << 16) as u32;
+        let (len, prefix) = (self.len(), self.caches.iter().map(|cache| cache.words()).sum::<usize>());
+        let mut words = vec![0; h::WORDS];
+        let mut records = Vec::new();
+        let (mut at, mut queries) = (0, prefix);
+        for Cache { heads, dim, slots } in &self.caches {
+            let data = words.len() as u32;
+            words.extend([pair(self.heads, *heads), pair(*dim, *slots), 0, self.factor.to_bits()]);
+            let dst = Region { offset: queries + len, len };
+            records.push(OpRecord { kind: OpKind::Attend, dst, src: queries, third: at, bias: 0, data });
+            (at, queries) = (at + Cache { heads: *heads, dim: *dim, slots: *slots }.words(), queries + len);
+        }
+        let ops = Records { offset: words.len() as u32, count: records.len() };
+        for record in records {
+            words.extend(record.emit().expect("small sizes"));
+        }
+        // Limits, without which no controller arms.
+        let contract = words.len() as u32;
+        words.extend([-1000f32, 1000.0].into_iter().flat_map(|limit| vec![limit.to_bits(); len]));
+        let action = queries + len;
+        let work_words = self.caches.iter().map(|cache| cache.work_words()).max().expect("a cache");
+        let header = Header {
+            obs_len: len,
+            act_len: len,
+            scratch: action + len + work_words,
+            observation: prefix,
+            output: queries,
+            action,
+            work: Region { offset: action + len, len: work_words },
+            ops,
+            contract,
+            contract_flags: 0b1100,
+            ..header(words.len(), 1)
+        };
+        finish(words, header, |head| head.set_test_prefix())
+    }
+}
+
+/// Returns the header of an image whose name begins at this word, with a self-test of `steps` after it. All else is empty.
+fn header(name: usize, steps: usize) -> Header {
+    let end = name as u32;
+    Header {
+        kind: Kind::Step,
+        has_ports: false,
+        obs_len: 0,
+        act_len: 0,
+        chunk: 1,
+        execute: 1,
+        horizon: 0,
+        overlap: 0,
+        deadline: 0,
+        rate_hz: 50.0,
+        scratch: 0,
+        state: Region::default(),
+        observation: 0,
+        output: 0,
+        action: 0,
+        work: Region::default(),
+        matrices: Records { offset: h::WORDS as u32, count: 0 },
+        ops: Records { offset: 0, count: 0 },
+        first_denoising_op: 0,
+        denoising_steps: 0,
+        contract: end,
+        contract_flags: 0,
+        name: Records { offset: end, count: 4 },
+        self_test: Records { offset: end + 1, count: steps },
+        weights: 0,
+        digest: [0; 32],
+    }
+}
+
+/// Appends name and self-test to the words of an image, and writes its header. `prepare` prepares a head for a step.
+fn finish(mut words: Vec<u32>, header: Header, prepare: impl Fn(&mut Head<'_, '_>)) -> Vec<u32> {
+    let (steps, each) = (header.self_test.count, header.obs_len + header.act_len);
+    words.push(u32::from_le_bytes(*b"heed"));
+    let first = words.len();
+    words.extend(vec![0; steps * each]);
+    words[..h::WORDS].copy_from_slice(&header.emit().expect("small sizes"));
+    words.iter_mut().for_each(|word| *word = word.to_le());
+    let mut random = Random::new(5);
+    let observations: Vec<Vec<f32>> =
+        (0..steps).map(|_| (0..header.obs_len).map(|_| random.unit()).collect()).collect();
+    seal(bytemuck::cast_slice_mut(&mut words)).expect("the length fits");
+    let step = |head: &mut Head<'_, '_>, x: &[f32]| head.step(x).expect("all is finite").to_vec();
+    let actions: Vec<_> = on_head(&words, |head| {
+        prepare(head);
+        observations.iter().map(|x| step(head, x)).collect()
+    });
+    let values = observations.iter().zip(&actions).flat_map(|(observation, action)| observation.iter().chain(action));
+    for (word, x) in words[first..].iter_mut().zip(values) {
+        *word = x.to_bits().to_le();
+    }
+    seal(bytemuck::cast_slice_mut(&mut words)).expect("the length fits");
+    words
+}
+
 impl Attention {
     /// Draws a small attention.
     pub(crate) fn draw(random: &mut Random) -> Self {
@@ -102,52 +247,19 @@ impl Attention {
         for record in records {
             words.extend(record.emit().expect("small sizes"));
         }
-        let (end, step) = (words.len() as u32, observed - state + queries);
-        words.push(u32::from_le_bytes(*b"heed"));
-        words.extend(vec![0; self.steps() * step]);
         let header = Header {
-            kind: Kind::Step,
-            has_ports: false,
             obs_len: observed - state,
             act_len: queries,
-            chunk: 1,
-            execute: 1,
-            horizon: 0,
-            overlap: 0,
-            deadline: 0,
-            rate_hz: 50.0,
             scratch: work.offset + work.len,
             state: Region { offset: 0, len: state },
             observation: state,
             output: output.offset,
             action,
             work,
-            matrices: Records { offset: h::WORDS as u32, count: 0 },
             ops: Records { offset: ops as u32, count: records.len() },
-            first_denoising_op: 0,
-            denoising_steps: 0,
-            contract: end,
-            contract_flags: 0,
-            name: Records { offset: end, count: 4 },
-            self_test: Records { offset: end + 1, count: self.steps() },
-            weights: 0,
-            digest: [0; 32],
+            ..header(words.len(), self.steps())
         };
-        words[..h::WORDS].copy_from_slice(&header.emit().expect("small sizes"));
-        words.iter_mut().for_each(|word| *word = word.to_le());
-        let mut random = Random::new(5);
-        let observations: Vec<Vec<f32>> =
-            (0..self.steps()).map(|_| (0..header.obs_len).map(|_| random.unit()).collect()).collect();
-        seal(bytemuck::cast_slice_mut(&mut words)).expect("the length fits");
-        let step = |head: &mut Head<'_, '_>, x: &[f32]| head.step(x).expect("all is finite").to_vec();
-        let actions: Vec<_> = on_head(&words, |head| observations.iter().map(|x| step(head, x)).collect());
-        let values =
-            observations.iter().zip(&actions).flat_map(|(observation, action)| observation.iter().chain(action));
-        for (word, x) in words[end as usize + 1..].iter_mut().zip(values) {
-            *word = x.to_bits().to_le();
-        }
-        seal(bytemuck::cast_slice_mut(&mut words)).expect("the length fits");
-        words
+        finish(words, header, |_| ())
     }
 }
 

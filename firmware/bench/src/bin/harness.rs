@@ -64,6 +64,8 @@ mod firmware {
         // Now, and not within the first counted step.
         head.least_budget();
         head.self_test().map_err(|e| message("self-test", e))?;
+        #[cfg(feature = "attention")]
+        head.set_test_prefix();
         let arguments = host::arguments();
         let number = arguments.split_once(' ').and_then(|(_, n)| n.parse().ok());
         match (arguments.split(' ').next(), number) {

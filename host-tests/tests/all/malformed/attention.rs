@@ -5,7 +5,7 @@ use actq_kernels::image::{Cache, header as h, op};
 use actq_testkit::Random;
 
 use super::draft::{Case, NAN, refused_of};
-use crate::attention::Attention;
+use crate::attention::{Attention, Prefixed};
 use crate::draft::Draft;
 
 const KEEP: (u8, usize) = (op::KEEP, 0);
@@ -90,7 +90,7 @@ fn impossible_attentions_are_refused() {
         &draft(ring()),
         &[
             ("a ring that takes all slots at a time", E::Overlap, |d| d.set_high(d.data(KEEP) + 1, 0)),
-            ("a ring outside the state", E::Arena, |d| d.set_high(h::W_STATE, d.high(h::W_STATE) - 1)),
+            ("a ring outside the state", E::Unwritten, |d| d.set_high(h::W_STATE, d.high(h::W_STATE) - 1)),
         ],
     );
 }
@@ -115,10 +115,45 @@ fn impossible_rotary_positions_are_refused() {
     );
 }
 
+/// The first attention that reads a prefix, and the second.
+const FIRST: (u8, usize) = (op::ATTEND, 0);
+const SECOND: (u8, usize) = (op::ATTEND, 1);
+
+#[test]
+fn impossible_prefixes_are_refused() {
+    let cache = Cache { heads: 2, dim: 6, slots: 4 };
+    let prefixed = Prefixed { heads: 4, caches: vec![cache, Cache { slots: 3, ..cache }], tokens: 2, factor: 0.4 };
+    let draft = Draft(prefixed.image());
+    assert!(draft.check().is_ok());
+    refused_of(
+        &draft,
+        &[
+            ("a cache that the first attention leaves out", E::Overlap, |d| {
+                d.map_high(d.op(FIRST) + THIRD, |at| at + 1)
+            }),
+            ("a cache read twice", E::Overlap, |d| d.set_high(d.op(SECOND) + THIRD, d.high(d.op(FIRST) + THIRD))),
+            ("caches in another order", E::Overlap, |d| d.set_high(d.op(FIRST) + THIRD, d.high(d.op(SECOND) + THIRD))),
+            ("a gap between caches", E::Overlap, |d| d.map_high(d.op(SECOND) + THIRD, |at| at + 1)),
+            ("a longer cache than its place", E::Overlap, |d| d.map_high(d.data(FIRST) + 1, |slots| slots + 4)),
+            ("a last cache that ends after the prefix", E::Arena, |d| {
+                d.map_high(d.data(SECOND) + 1, |slots| slots - 1)
+            }),
+            ("a last cache that ends before the observation", E::Arena, |d| {
+                d.map_high(d.data(SECOND) + 1, |slots| slots + 1);
+            }),
+            ("queries in the prefix", E::Overlap, |d| d.set_high(d.op(FIRST) + 1, 1)),
+            ("outputs in the prefix", E::Overlap, |d| d.set_low(d.op(SECOND) + 1, 1)),
+            ("a state in the prefix", E::Overlap, |d| d.set_high(h::W_STATE, 1)),
+            ("an observation in the state", E::Arena, |d| d.set_high(h::W_STATE, d.low(h::W_OBS_OUT) + 1)),
+        ],
+    );
+}
+
 #[test]
 fn every_drawn_attention_is_accepted() {
     let mut random = Random::new(8);
     for _ in 0..200 {
         draft(Attention::draw(&mut random));
+        assert!(Draft(Prefixed::draw(&mut random).image()).check().is_ok());
     }
 }

@@ -8,7 +8,7 @@ use actq_kernels::image::Cache;
 use actq_testkit::Random;
 use anyhow::{Result, ensure};
 
-use crate::attention::Attention;
+use crate::attention::{Attention, Prefixed};
 use crate::draft::Draft;
 
 /// Largest relative error of a predicted step, of which attention is the most.
@@ -53,6 +53,35 @@ fn every_core_has_the_hosts_bits() -> Result<()> {
                     let expected = bits(head.step(observation)?);
                     ensure!(bits(action) == expected, "{target:?}: {attention:?}");
                     ensure!(bits(sliced) == expected, "{target:?}, in polls: {attention:?}");
+                }
+                Ok(())
+            })?;
+        }
+    }
+    Ok(())
+}
+
+/// Every core runs the self-test at its start, and the harness keeps its prefix.
+#[test]
+fn every_core_has_the_hosts_bits_of_a_prefix() -> Result<()> {
+    for target in [Target::Fpu, Target::NoFpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M55] {
+        let harness = harness(target)?;
+        let mut random = Random::new(14);
+        for _ in 0..4 {
+            let prefixed = Prefixed::draw(&mut random);
+            let observations: Vec<Vec<f32>> =
+                (0..3).map(|_| (0..prefixed.len()).map(|_| random.unit()).collect()).collect();
+            let image = Draft(prefixed.image());
+            let (_, actions) = harness.regions(image.bytes(), "serve", &observations)?;
+            let (_, in_polls) = harness.regions(image.bytes(), "poll 20000", &observations)?;
+            let (_, restarted) = harness.regions(image.bytes(), "restart", &observations)?;
+            let buffer = ImageBuffer::new(image.bytes());
+            with_head::<_, anyhow::Error>(buffer.image("prefix".as_ref())?, |head| {
+                head.set_test_prefix();
+                for (i, observation) in observations.iter().enumerate() {
+                    let expected = bits(head.step(observation)?);
+                    let found = [&actions, &in_polls, &restarted].map(|run| bits(&run[i]));
+                    ensure!(found.iter().all(|bits| *bits == expected), "{target:?}: {prefixed:?}");
                 }
                 Ok(())
             })?;
