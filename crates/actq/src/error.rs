@@ -5,7 +5,7 @@ use std::{fmt, io};
 
 use actq_kernels::image::TooLarge;
 use actq_kernels::layout::PackError;
-use actq_kernels::{HeadError, ImageError, StepError};
+use actq_kernels::{HeadError, ImageError, PrefixError, StepError};
 
 use crate::budget::BudgetTooSmall;
 pub use crate::{bail, ensure};
@@ -92,6 +92,7 @@ from! {
     ImageError => Cause::Image,
     io::Error => Cause::Io,
     HeadError => Self::other,
+    PrefixError => Self::other,
     PackError => Self::other,
     StepError => Self::other,
     TooLarge => Self::other,

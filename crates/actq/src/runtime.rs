@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use actq_kernels::image::Cache;
 use actq_kernels::image::header::MAGIC;
 use actq_kernels::{Head, HeadError, Image};
 
@@ -40,6 +41,65 @@ impl ImageBuffer {
         ensure!(self.bytes().starts_with(&magic), "{}: not an actq image", path.display());
         Image::new_checked(self.bytes()).with_context(|| path.display().to_string())
     }
+}
+
+/// Returns the values of an image's prefix in a recording's row, which follow the observation: for each cache its keys, then
+/// its values, of all slots.
+pub fn prefix_len(image: &Image<'_>) -> usize {
+    image.prefix_caches().map(|cache| 2 * cache.slots * cache.heads * cache.dim).sum()
+}
+
+/// Splits the [`prefix_len`] values of a row into keys and values of each cache.
+pub fn keys_and_values<'r>(image: &Image<'_>, mut values: &'r [f32]) -> Vec<(Cache, [&'r [f32]; 2])> {
+    let mut part = |len: usize| {
+        let (part, rest) = values.split_at_checked(len).unwrap_or((values, &[]));
+        values = rest;
+        part
+    };
+    let of_cache = |cache: Cache| {
+        let len = cache.slots * cache.heads * cache.dim;
+        (cache, [part(len), part(len)])
+    };
+    image.prefix_caches().map(of_cache).collect()
+}
+
+/// Returns the bytes of a prefix ([`Head::set_prefix`]): keys and values of each cache of the image, each [token, head,
+/// element], of one token up to all slots.
+///
+/// # Errors
+///
+/// Names the cache whose keys and values are not as above, or if their number is not that of the caches.
+pub fn prefix_bytes(image: &Image<'_>, keys_and_values: &[[&[f32]; 2]]) -> Result<Vec<u8>> {
+    let caches: Vec<Cache> = image.prefix_caches().collect();
+    ensure!(
+        caches.len() == keys_and_values.len(),
+        "the image's prefix has {} caches; keys and values of {} were given",
+        caches.len(),
+        keys_and_values.len()
+    );
+    let mut bytes = Vec::new();
+    for (i, (cache, [keys, values])) in caches.into_iter().zip(keys_and_values).enumerate() {
+        let mut words = vec![0; cache.words()];
+        cache.fill(keys, values, &mut words).with_context(|| format!("cache {i} of the prefix"))?;
+        bytes.extend(words.into_iter().flat_map(u32::to_le_bytes));
+    }
+    Ok(bytes)
+}
+
+/// Gives a head the prefix in a recording's row of [observation, prefix, noise], and returns observation and noise.
+///
+/// # Errors
+///
+/// If the row is too short, or a key or a value is not finite.
+pub fn take_prefix<'r>(head: &mut Head<'_, '_>, row: &'r [f32]) -> Result<(&'r [f32], &'r [f32])> {
+    let image = *head.image();
+    let (observation, rest) = row.split_at_checked(image.obs_len()).context("the row is no observation")?;
+    let (prefix, noise) = rest.split_at_checked(prefix_len(&image)).context("the observation has no prefix")?;
+    if !prefix.is_empty() {
+        let parts: Vec<_> = keys_and_values(&image, prefix).into_iter().map(|(_, part)| part).collect();
+        head.set_prefix(&prefix_bytes(&image, &parts)?)?;
+    }
+    Ok((observation, noise))
 }
 
 /// Runs `work` with a head over `image` in fresh scratch memory; returns the errors of `work`.

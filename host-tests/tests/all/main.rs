@@ -28,6 +28,7 @@ mod ops;
 mod outputs;
 mod parity;
 mod playback;
+mod prefix;
 mod recordings;
 mod slices;
 mod smoke;

@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read, Write};
 use actq::runtime::with_head;
 use actq_kernels::Image;
 use actq_link::{NO_ACTION, RESET, STEP};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 
 /// A request of the simulator, and its outcome.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +25,11 @@ pub(crate) fn serve(
     mut output: impl Write,
     mut seen: impl FnMut(Seen<'_>),
 ) -> Result<()> {
+    ensure!(
+        image.prefix_bytes() == 0,
+        "the image reads a prefix, keys and values from a host, which a simulator cannot send; only a controller on the \
+         link and `Head::set_prefix` take one"
+    );
     let mut bytes = vec![0u8; 4 * image.obs_len()];
     let no_action = vec![NO_ACTION; image.act_len()];
     with_head(image, |head| {

@@ -6,11 +6,12 @@ use actq_kernels::image::{Op, OpKind};
 #[cfg(doc)]
 use crate::graph::Graph;
 use crate::policy::Policy;
+use crate::runtime::prefix_len;
 
 /// Sizes that a recording's arrays must fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Sizes {
-    /// Values of an observation.
+    /// Values of an observation, with those of a prefix.
     pub obs: usize,
     /// Values of noise that an evaluation takes ([`Graph::noise_len`]).
     pub noise: usize,
@@ -37,6 +38,6 @@ impl Sizes {
     pub fn of_image(image: &Image<'_>) -> Self {
         let is_kept = |op: Op<'_>| op.kind == OpKind::Keep && image.state().range().contains(&op.dst().offset);
         let state = if image.ops().any(is_kept) { 0 } else { image.state().len };
-        Self { obs: image.obs_len(), noise: image.noise_len(), out: image.output().len, state }
+        Self { obs: image.obs_len() + prefix_len(image), noise: image.noise_len(), out: image.output().len, state }
     }
 }

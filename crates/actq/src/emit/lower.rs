@@ -24,7 +24,7 @@ pub struct Program {
     pub steps: Vec<Step<Region>>,
     /// Recurrent state; zeroed by a reset.
     pub state: Region,
-    /// Observation.
+    /// Observation. The caches of a prefix are between the state and it.
     pub observation: Region,
     /// First operation of the denoising steps. Earlier ones run once per evaluation; 0 if all run every time.
     pub first_denoising_op: usize,
@@ -41,6 +41,10 @@ pub struct Program {
 /// Lowers the policy's graph for weights with scale groups of `group` columns, and what is `around` it.
 pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<Program> {
     let graph = &policy.graph;
+    ensure!(
+        around.is_none() || graph.prefix_len == 0,
+        "a network that reads a prefix cannot have operations around it; quantize it from its own folder"
+    );
     let mut readers = readers(graph);
     let mut lowering = match around {
         Some(around) => {
@@ -50,7 +54,7 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
             readers[0] += usize::from(around.after.iter().any(read));
             Lowering::inside(around.before.clone(), around.buffers.clone(), around.observation, readers)
         }
-        None => Lowering::new(graph.obs_len, readers),
+        None => Lowering::new(graph.own_len(), readers),
     };
     let work_len = graph.matrices.iter().map(|m| max_prepared_words(m.cols, group)).max().unwrap_or(0);
     let (contract, act_len) = (&policy.contract, policy.act_len);
@@ -146,6 +150,13 @@ impl Arena {
     ) -> Result<Program> {
         self.lowering.buffers[output.buffer].lifetime = Lifetime::Output;
         let buffers = &self.lowering.buffers;
+        let outside = |slice: Slice| buffers[slice.buffer].lifetime == Lifetime::Outside;
+        for step in &self.lowering.steps {
+            ensure!(
+                !step.operands().into_iter().flatten().any(outside),
+                "keys and values of a prefix come from the host; only attention can read them"
+            );
+        }
         let (steps, placement) = self.placed(first_denoising_op);
         let state_len = placement.state_len;
         let action = Region { offset: placement.end, len: act_len };
@@ -208,7 +219,7 @@ const MAX_TRIES: usize = 16;
 /// Finds an operation that writes after a gap, or a gap at the end: the image's check refuses both. Returns the buffer
 /// in which it is, if there is one.
 fn gap(steps: &Steps<'_>, placement: &Placement) -> Option<Option<BufferId>> {
-    let fixed = |lifetime| matches!(lifetime, Lifetime::Observation | Lifetime::State);
+    let fixed = |lifetime| matches!(lifetime, Lifetime::Observation | Lifetime::State | Lifetime::Prefix);
     let before = steps.buffers.iter().zip(&placement.offsets).filter(|(buffer, _)| fixed(buffer.lifetime));
     let mut written = before.map(|(buffer, offset)| offset + buffer.len).max().unwrap_or(0);
     let mut begun = Vec::new();
@@ -229,13 +240,13 @@ fn gap(steps: &Steps<'_>, placement: &Placement) -> Option<Option<BufferId>> {
     None
 }
 
-/// Places the buffers: first the state, then the observation, then the values by their lifetimes.
+/// Places the buffers: first the state, then the prefix and the observation, then the values by their lifetimes.
 fn place(steps: &Steps<'_>) -> Placement {
     let buffers = steps.buffers;
     let mut offsets = vec![0; buffers.len()];
     let mut top = 0;
     let mut state_len = 0;
-    for lifetime in [Lifetime::State, Lifetime::Observation] {
+    for lifetime in [Lifetime::State, Lifetime::Prefix, Lifetime::Observation] {
         for (offset, buffer) in offsets.iter_mut().zip(buffers).filter(|(_, b)| b.lifetime == lifetime) {
             *offset = top;
             top += buffer.len;
@@ -274,7 +285,7 @@ fn lifetimes(steps: &Steps<'_>) -> Vec<(usize, (usize, usize))> {
             let last = match steps.buffers[slice.buffer].lifetime {
                 Lifetime::Step => at,
                 Lifetime::Output => usize::MAX,
-                Lifetime::Observation | Lifetime::State => continue,
+                Lifetime::Observation | Lifetime::State | Lifetime::Prefix | Lifetime::Outside => continue,
             };
             match lives.iter_mut().find(|(buffer, _)| *buffer == slice.buffer) {
                 Some((_, life)) => life.1 = last,

@@ -82,7 +82,7 @@ pub fn bytes_beside_blocks(policy: &Policy) -> Result<usize> {
 }
 
 fn obs_len(policy: &Policy, around: Option<&Around>) -> usize {
-    around.map_or(policy.graph.obs_len, Around::raw_len)
+    around.map_or(policy.graph.own_len(), Around::raw_len)
 }
 
 /// An image without the actions of its self-test, its length and its checksum.
@@ -124,7 +124,7 @@ fn self_test_observations(graph: &Graph, steps: usize) -> Vec<Vec<f32>> {
         Some(norm) if norm.scale[i].abs() > 1e-6 => norm.mean[i] + 2.0 * random.unit() / norm.scale[i],
         _ => random.unit(),
     };
-    (0..steps).map(|_| (0..graph.obs_len).map(&mut value).collect()).collect()
+    (0..steps).map(|_| (0..graph.own_len()).map(&mut value).collect()).collect()
 }
 
 /// Returns the actions of a new image from its start; if it is not valid, the error begins with `unfit`.
@@ -132,6 +132,7 @@ pub(super) fn self_test_actions(bytes: &[u8], observations: &[Vec<f32>], unfit: 
     let buffer = ImageBuffer::new(bytes);
     let image = buffer.image(Path::new("the new image")).context(unfit)?;
     with_head(image, |head| {
+        head.set_test_prefix();
         observations.iter().map(|obs| Ok(head.step(obs).context("self-test of the new image")?.to_vec())).collect()
     })
 }

@@ -59,7 +59,7 @@ pub fn iterative(flat: &Graph, obs_len: usize, times: &[Vec<f32>], steps: Denois
         spans: [0..obs_len, obs_len..obs_len + time_len, obs_len + time_len..flat.obs_len],
         needs,
         tables: pass.values,
-        graph: Graph::new(obs_len),
+        graph: Graph { prefix_len: flat.prefix_len, ..Graph::new(obs_len) },
         places: vec![None; flat.nodes.len() + 1],
         condition: vec![None; flat.nodes.len() + 1],
         iterate: 0,

@@ -79,6 +79,10 @@ pub enum Lifetime {
     Observation,
     /// At an offset of its own; kept over steps and zeroed by a reset.
     State,
+    /// At an offset of its own; a cache of the prefix, which the head's caller writes.
+    Prefix,
+    /// Nowhere: keys or values of the prefix, which only attention reads.
+    Outside,
 }
 
 /// A run of values in the arena.

@@ -26,8 +26,10 @@ impl Node {
 /// A network.
 #[derive(Clone, Debug)]
 pub struct Graph {
-    /// Length of an observation.
+    /// Length of an observation, with the values of its prefix.
     pub obs_len: usize,
+    /// Values at the end of an observation that are its prefix: keys and values of attentions, which an image gets apart.
+    pub prefix_len: usize,
     /// Weight matrices; each is quantized once, however many nodes use it.
     pub matrices: Vec<WeightMatrix>,
     /// Nodes in the order of evaluation; the last one's output is the network's.
@@ -39,7 +41,12 @@ pub struct Graph {
 impl Graph {
     /// Makes a network without nodes.
     pub fn new(obs_len: usize) -> Self {
-        Self { obs_len, matrices: Vec::new(), nodes: Vec::new(), denoising: None }
+        Self { obs_len, prefix_len: 0, matrices: Vec::new(), nodes: Vec::new(), denoising: None }
+    }
+
+    /// Returns the length of an observation without its prefix: that of an image.
+    pub fn own_len(&self) -> usize {
+        self.obs_len - self.prefix_len
     }
 
     /// Returns the noise values that an evaluation takes after the observation.

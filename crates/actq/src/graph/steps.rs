@@ -24,7 +24,7 @@ pub fn lower_nodes(nodes: &[Node], lowering: &mut Lowering) {
 /// Returns the operations of a network that does not denoise, its buffers, of which the first is the observation, and
 /// the place of its output.
 pub fn operations(graph: &Graph) -> (Vec<Step<Slice>>, Vec<Buffer>, Slice) {
-    let mut lowering = Lowering::new(graph.obs_len, readers(graph));
+    let mut lowering = Lowering::new(graph.own_len(), readers(graph));
     lower_nodes(&graph.nodes, &mut lowering);
     let output = lowering.place(graph.output());
     (lowering.steps, lowering.buffers, output)

@@ -44,6 +44,9 @@ pub trait Keys {
     /// Appends the value that the key names to the inputs of the operation.
     fn add_input(&mut self, key: &str) -> Result<()>;
 
+    /// Appends the next `len` values of the prefix to the inputs of the operation.
+    fn add_prefix(&mut self, len: usize) -> Result<()>;
+
     /// Reads the tensor that the key names, or returns zeros.
     fn bias(&self, key: &str, len: usize) -> Result<Vec<f32>> {
         Ok(self.vector(key, len)?.unwrap_or_else(|| vec![0.0; len]))

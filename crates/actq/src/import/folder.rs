@@ -158,16 +158,18 @@ fn build(dir: &Path, json: &PolicyJson, weights: Weights<'_>, digest: [u8; 32]) 
         }
         Ok(())
     };
+    let prefix_len = json.prefix_len();
+    ensure!(prefix_len <= usize::from(u16::MAX), "the prefix has {prefix_len} values; at most 65535 are supported");
     let (graph, (weights, parameters)) = if kind.is_iterative() {
         let len = chunk * json.act_dim;
         let by = &json.denoising;
         let schedule = by.schedule(kind, len)?;
-        let (mut builder, times) = Builder::iterative(json.obs_dim, by, &schedule, weights)?;
+        let (mut builder, times) = Builder::iterative([json.obs_dim, prefix_len], by, &schedule, weights)?;
         add(&mut builder)?;
         let trained = (builder.graph.weights(), builder.graph.parameters());
-        (hoist::iterative(&builder.graph, json.obs_dim, &times, schedule.denoising)?, trained)
+        (hoist::iterative(&builder.graph, json.obs_dim + prefix_len, &times, schedule.denoising)?, trained)
     } else {
-        let mut builder = Builder::new(json.obs_dim, weights);
+        let mut builder = Builder::new(json.obs_dim, prefix_len, weights)?;
         add(&mut builder)?;
         let trained = (builder.graph.weights(), builder.graph.parameters());
         (builder.graph, trained)

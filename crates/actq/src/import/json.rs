@@ -151,6 +151,17 @@ impl PolicyJson {
         kind(self.kind.as_deref())
     }
 
+    /// Returns the values of the prefix: keys and values of every token of the ops that read one. (The ops refuse keys
+    /// of another type.)
+    pub(super) fn prefix_len(&self) -> usize {
+        let count = |op: &JsonOp, key: &str| op.get(key).and_then(Value::as_u64).unwrap_or(0) as usize;
+        let of_op = |op: &JsonOp| {
+            let kv_heads = if op.get("kv_heads").is_some() { count(op, "kv_heads") } else { count(op, "heads") };
+            [count(op, "prefix"), kv_heads, count(op, "dim")].into_iter().fold(2usize, usize::saturating_mul)
+        };
+        self.ops.iter().map(of_op).fold(0, usize::saturating_add)
+    }
+
     /// Returns the action contract. Without the key `action`, chunked policies are limited to -1..1, as in the format's
     /// reference runtime.
     pub fn contract(&self, kind: Kind) -> Result<ActionContract> {

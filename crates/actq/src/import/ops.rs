@@ -68,18 +68,22 @@ pub(super) struct Builder<'a> {
     /// Network so far.
     pub(super) graph: Graph,
     slots: HashMap<String, ValueId>,
+    /// The next value of the prefix, which follows the observation.
+    prefix_at: usize,
 }
 
 impl<'a> Builder<'a> {
-    /// Begins with the observation alone.
-    pub(super) fn new(obs_len: usize, weights: Weights<'a>) -> Self {
-        Self { weights, graph: Graph::new(obs_len), slots: HashMap::from([("obs".to_owned(), 0)]) }
+    /// Begins with the observation alone, and with a prefix of `prefix_len` values for attentions.
+    pub(super) fn new(obs_len: usize, prefix_len: usize, weights: Weights<'a>) -> Result<Self> {
+        let mut graph = Graph { prefix_len, ..Graph::new(obs_len + prefix_len) };
+        let obs = if prefix_len > 0 { graph.add(Concat(vec![Span { from: 0, len: obs_len }]), &[0])? } else { 0 };
+        Ok(Self { weights, graph, slots: HashMap::from([("obs".to_owned(), obs)]), prefix_at: obs_len })
     }
 
     /// Begins the network of a flow or a diffusion policy over observation, time and iterate (slots `obs`, `tfeat` and
     /// `x`). Returns it with its time input in each step.
     pub(super) fn iterative(
-        obs_len: usize,
+        [obs_len, prefix_len]: [usize; 2],
         by: &JsonDenoising,
         schedule: &Schedule,
         weights: Weights<'a>,
@@ -90,12 +94,13 @@ impl<'a> Builder<'a> {
         let freq = if time.is_plain() { Vec::new() } else { weights.read(time.freq())?.1 };
         let times = schedule.times.iter().map(|t| time.features(*t, &freq)).collect::<Result<Vec<_>>>()?;
         let lens = [obs_len, times.first().map_or(0, Vec::len), schedule.denoising.len];
-        let mut graph = Graph::new(lens.iter().sum());
+        let mut graph = Graph { prefix_len, ..Graph::new(prefix_len + lens.iter().sum::<usize>()) };
         let mut slots = HashMap::new();
         let mut from = 0;
         for (name, len) in ["obs", "tfeat", "x"].into_iter().zip(lens) {
             slots.insert(name.to_owned(), graph.add(Concat(vec![Span { from, len }]), &[0])?);
-            from += len;
+            // The prefix follows the observation.
+            from += len + if from == 0 { prefix_len } else { 0 };
         }
         // The format's first exporter names the tensors, but writes no key.
         let file = JsonNorm { mean: "obs_norm.mean".to_owned(), scale: "obs_norm.scale".to_owned(), clip: Some(5.0) };
@@ -122,7 +127,7 @@ impl<'a> Builder<'a> {
             let limited = graph.add(limited, &[slots["x"]])?;
             slots.insert("x".to_owned(), limited);
         }
-        Ok((Self { weights, graph, slots }, times))
+        Ok((Self { weights, graph, slots, prefix_at: obs_len }, times))
     }
 
     /// Appends an op.
@@ -234,6 +239,13 @@ impl Keys for OpKeys<'_, '_> {
     fn add_input(&mut self, key: &str) -> Result<()> {
         let value = self.builder.slot(required(self.text(key)?, key)?)?;
         self.inputs.push(value);
+        Ok(())
+    }
+
+    fn add_prefix(&mut self, len: usize) -> Result<()> {
+        let part = Concat(vec![Span { from: self.builder.prefix_at, len }]);
+        self.inputs.push(self.builder.graph.add(part, &[0])?);
+        self.builder.prefix_at += len;
         Ok(())
     }
 }

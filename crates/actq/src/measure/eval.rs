@@ -14,7 +14,7 @@ use crate::error::{Context, Result, ensure};
 use crate::graph::{Evaluator, Graph};
 use crate::numbers::square;
 use crate::policy::Policy;
-use crate::runtime::with_head;
+use crate::runtime::{take_prefix, with_head};
 use crate::text::count;
 
 /// Errors of the raw network output against recorded f32 actions.
@@ -87,11 +87,13 @@ impl Runner for Head<'_, '_> {
 
     fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
         let image = *self.image();
+        if image.noise_len() + image.prefix_bytes() == 0 {
+            return Ok(Head::infer(self, observation)?);
+        }
+        let (observation, noise) = take_prefix(self, observation)?;
         if image.noise_len() == 0 {
             return Ok(Head::infer(self, observation)?);
         }
-        let (observation, noise) =
-            observation.split_at_checked(image.obs_len()).context("the observation has no noise")?;
         Ok(self.infer_with_noise(observation, noise)?)
     }
 }

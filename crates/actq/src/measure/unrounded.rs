@@ -10,6 +10,7 @@ use ndarray::{Array2, ArrayView1};
 use crate::error::{Context as _, Result};
 use crate::graph::Graph;
 use crate::graph::ops::Attention;
+use crate::runtime::{keys_and_values, prefix_len};
 
 /// Keys and values in f32 of the tokens in each cache, by its arena offset.
 type Caches = BTreeMap<usize, [Vec<f32>; 2]>;
@@ -58,10 +59,16 @@ impl<'a> Unrounded<'a> {
         bytemuck::cast_slice_mut(&mut self.arena[self.image.state().range()])
     }
 
-    /// Returns the network's raw output for an observation of the image's length, with its noise.
+    /// Returns the network's raw output for an observation of the image's length, with its prefix and its noise.
     pub fn infer(&mut self, observation: &[f32]) -> Result<&[f32]> {
         let arena = &mut self.arena;
-        let (observation, noise) = observation.split_at(self.image.obs_len());
+        let (observation, rest) = observation.split_at(self.image.obs_len());
+        let (prefix, noise) = rest.split_at(prefix_len(&self.image));
+        let mut at = self.image.state().range().end;
+        for (cache, part) in keys_and_values(&self.image, prefix) {
+            self.caches.insert(at, part.map(<[f32]>::to_vec));
+            at += cache.words();
+        }
         arena[self.image.observation().range()].copy_from_slice(bytemuck::cast_slice(observation));
         if let [Op { kind: OpKind::Noise, .. }, ..] = &self.ops[..] {
             arena[self.ops[0].dst().range()].copy_from_slice(bytemuck::cast_slice(noise));

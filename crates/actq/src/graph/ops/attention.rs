@@ -160,6 +160,11 @@ impl Attention {
         if let Some(cache) = to.cache(of) {
             return (cache, sizes);
         }
+        if to.buffers[keys.buffer].lifetime == Lifetime::Outside {
+            let cache = to.buffer(sizes.words(), Lifetime::Prefix);
+            to.add_cache(of, cache);
+            return (cache, sizes);
+        }
         // An operation's regions do not overlap.
         let values = if inputs[1] == inputs[2] {
             let copy = to.buffer(values.len, Lifetime::Step);
@@ -279,21 +284,26 @@ impl Operation for Attention {
 
     fn syntax() -> Vec<Syntax<Self>> {
         let read = |op: &mut dyn Keys| {
-            op.add_input("keys")?;
-            op.add_input("values")?;
             let heads = required(op.count("heads")?, "heads")?;
             let dim = required(op.count("dim")?, "dim")?;
+            let kv_heads = op.count("kv_heads")?.unwrap_or(heads);
+            let (causal, context) = (op.truth("causal")?.unwrap_or(false), op.count("context")?.unwrap_or(0));
+            if let Some(tokens) = op.count("prefix")? {
+                ensure!(
+                    op.text("keys")?.is_none() && op.text("values")?.is_none() && !causal && context == 0,
+                    "reads a prefix, whose keys and values come from the host; leave keys, values, causal and context out"
+                );
+                let len = tokens.saturating_mul(kv_heads).saturating_mul(dim);
+                op.add_prefix(len)?;
+                op.add_prefix(len)?;
+            } else {
+                op.add_input("keys")?;
+                op.add_input("values")?;
+            }
             let factor = op.number("factor")?.map_or(1.0 / (dim as f32).sqrt(), |factor| factor as f32);
-            Ok(Self {
-                heads,
-                kv_heads: op.count("kv_heads")?.unwrap_or(heads),
-                dim,
-                factor,
-                causal: op.truth("causal")?.unwrap_or(false),
-                context: op.count("context")?.unwrap_or(0),
-            })
+            Ok(Self { heads, kv_heads, dim, factor, causal, context })
         };
-        let keys = &["keys", "values", "heads", "kv_heads", "dim", "factor", "causal", "context"];
+        let keys = &["keys", "values", "prefix", "heads", "kv_heads", "dim", "factor", "causal", "context"];
         vec![Syntax { name: "attention", keys, read }]
     }
 
@@ -380,7 +390,9 @@ impl Operation for Attention {
             return inputs.to_vec();
         }
         let (cache, _) = self.cache(to, inputs, Lifetime::Output);
-        to.buffers[cache].lifetime = Lifetime::Output;
+        if to.buffers[cache].lifetime == Lifetime::Step {
+            to.buffers[cache].lifetime = Lifetime::Output;
+        }
         vec![inputs[0]]
     }
 
@@ -424,14 +436,14 @@ mod tests {
     use super::*;
     use crate::budget::{Budget, Rate};
     use crate::emit;
-    use crate::graph::ops::{Iterate, Linear};
+    use crate::graph::ops::{Add, Concat, Iterate, Linear, Span};
     use crate::graph::run::tests::attentive;
     use crate::graph::weights::zero_state;
     use crate::graph::{Denoising, Graph, Network, Weights};
     use crate::methods::{Activations, Method, Options, quantize};
     use crate::policy::Policy;
     use crate::random::Random;
-    use crate::runtime::{ImageBuffer, with_head};
+    use crate::runtime::{ImageBuffer, take_prefix, with_head};
 
     /// Returns the largest difference between the steps of an image and of its rounded network, and the largest output.
     fn off_image(graph: &Graph, policy: impl Fn(Graph) -> Policy) -> (f32, f32) {
@@ -451,7 +463,7 @@ mod tests {
             for _ in 0..5 {
                 let obs: Vec<f32> = (0..graph.input_len()).map(|_| random.unit()).collect();
                 let expected = network.forward_one(&weights, &obs, &mut state);
-                let (obs, noise) = obs.split_at(graph.obs_len);
+                let (obs, noise) = take_prefix(head, &obs)?;
                 let output = if noise.is_empty() { head.infer(obs)? } else { head.infer_with_noise(obs, noise)? };
                 for (a, b) in output.iter().zip(&expected) {
                     (off, most) = (off.max((a - b).abs()), most.max(b.abs()));
@@ -498,6 +510,76 @@ mod tests {
         assert!(keep.is_some_and(|keep| keep < program.first_denoising_op), "{keep:?}");
         let (off, most) = off_image(&graph, policy);
         assert!(off < 1e-5 * most, "{off} of {most}");
+    }
+
+    /// Makes a network of three values and a prefix of four tokens for each of two attentions; with `is_iterative`, they
+    /// are in the denoising steps of a flow.
+    fn prefixed(is_iterative: bool) -> Graph {
+        let mut random = Random::new(9);
+        let of = Attention { heads: 4, kv_heads: 2, dim: 2, factor: 0.7, causal: false, context: 0 };
+        let mut graph = Graph { prefix_len: 4 * 16, ..Graph::new(3 + 4 * 16) };
+        let mut linear = |graph: &mut Graph, rows: usize, input: ValueId| {
+            let cols = graph.len_of(input);
+            let data = (0..rows * cols).map(|_| random.unit()).collect();
+            let matrix = WeightMatrix { name: "m".into(), rows, cols, data };
+            let matrix = graph.add_matrix(matrix).expect("a matrix");
+            graph.add(Linear { matrix, bias: vec![0.1; rows] }, &[input]).expect("it fits")
+        };
+        let part = |graph: &mut Graph, from: usize, len: usize| {
+            graph.add(Concat(vec![Span { from, len }]), &[0]).expect("it fits")
+        };
+        let obs = part(&mut graph, 0, 3);
+        let prefix = [0, 1, 2, 3].map(|i| part(&mut graph, 3 + 16 * i, 16));
+        let condition = linear(&mut graph, 16, obs);
+        let first = graph.nodes.len();
+        let mut queries = condition;
+        if is_iterative {
+            let x = graph.add(Iterate { len: 2 }, &[]).expect("it fits");
+            let x = linear(&mut graph, 16, x);
+            queries = graph.add(Add, &[x, condition]).expect("it fits");
+        }
+        for [keys, values] in [[prefix[0], prefix[1]], [prefix[2], prefix[3]]] {
+            let attended = graph.add(of, &[queries, keys, values]).expect("it fits");
+            queries = linear(&mut graph, 16, attended);
+        }
+        linear(&mut graph, 2, queries);
+        if is_iterative {
+            let step = actq_kernels::ops::denoise::Coefficients::from_array([0.0, 0.0, 1.0, 0.5, 0.0, 0.0, 0.0]);
+            graph.denoising = Some(Denoising { first, len: 2, limit: 10.0, steps: vec![step; 2] });
+        }
+        graph
+    }
+
+    #[test]
+    fn a_prefix_comes_from_the_host() {
+        for is_iterative in [false, true] {
+            let graph = prefixed(is_iterative);
+            let policy = |graph: Graph| match is_iterative {
+                false => Policy::of("prefix", graph),
+                true => {
+                    let kind = actq_kernels::image::Kind::Flow;
+                    Policy { kind, chunk: 1, execute: 1, act_len: 2, ..Policy::of("prefix", graph) }
+                }
+            };
+            let program = emit::lower(&policy(graph.clone()), 32, None).expect("a program");
+            assert!(program.steps.iter().all(|step| step.kind != OpKind::Keep));
+            let cache = Cache { heads: 2, dim: 2, slots: 4 };
+            assert_eq!(program.observation.offset, 2 * cache.words());
+            assert_eq!(program.observation.len, 3);
+            let (off, most) = off_image(&graph, policy);
+            assert!(off < 1e-5 * most, "{off} of {most}");
+        }
+    }
+
+    #[test]
+    fn only_attention_reads_a_prefix() {
+        let mut graph = Graph { prefix_len: 2, ..Graph::new(5) };
+        graph.add(Concat(vec![Span { from: 3, len: 2 }]), &[0]).expect("it fits");
+        let matrix = WeightMatrix { name: "m".into(), rows: 1, cols: 2, data: vec![1.0; 2] };
+        let matrix = graph.add_matrix(matrix).expect("a matrix");
+        graph.add(Linear { matrix, bias: vec![0.0] }, &[1]).expect("it fits");
+        let error = emit::lower(&Policy::of("wrong", graph), 32, None).expect_err("it has no keys").to_string();
+        assert!(error.contains("only attention can read them"), "{error}");
     }
 
     #[test]

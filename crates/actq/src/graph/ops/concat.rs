@@ -53,6 +53,10 @@ impl Operation for Concat {
     }
 
     fn lower(&self, to: &mut Lowering, inputs: &[ValueId], len: usize) -> BufferId {
+        // The observation's buffer ends before its prefix.
+        if self.0.iter().zip(inputs).all(|(span, &input)| input == 0 && span.from >= to.place(0).len) {
+            return to.buffer(len, Lifetime::Outside);
+        }
         let dst = to.buffer(len, Lifetime::Step);
         let mut offset = 0;
         for (span, &input) in self.0.iter().zip(inputs) {

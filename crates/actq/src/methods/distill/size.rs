@@ -180,7 +180,7 @@ impl<'a> Size<'a> {
 
 /// Returns the modelled cycles of the elements of all operations without a matrix in a step, and of the units of cells.
 pub(super) fn cycles_of_elements(graph: &Graph, core: Core) -> f64 {
-    let mut lowering = Lowering::new(graph.obs_len, readers(graph));
+    let mut lowering = Lowering::new(graph.own_len(), readers(graph));
     let first = graph.denoising.as_ref().map_or(graph.nodes.len(), |denoising| denoising.first);
     let (once, repeated) = graph.nodes.split_at(first);
     lower_nodes(once, &mut lowering);
