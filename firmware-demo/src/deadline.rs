@@ -17,6 +17,11 @@ pub const fn allowed(tick_hz: u32) -> RangeInclusive<u32> {
     tick_hz / 100..=tick_hz / 2
 }
 
+/// Returns the most ticks for which a host may let the head use a prefix: 10 s at `tick_hz` ticks per second.
+pub const fn prefix_lifetime(tick_hz: u32) -> u32 {
+    10 * tick_hz
+}
+
 #[cfg(test)]
 mod tests {
     extern crate std;

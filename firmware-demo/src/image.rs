@@ -14,7 +14,8 @@ const RANGES_PER_SECOND: f32 = 10.0;
 
 /// Opens an image: checks it and its lengths, and runs its self-test, which must match bit for bit. It feeds the
 /// watchdog before the check, whose time grows with the image, and before each slice of the self-test, which is at most
-/// [`MAX_SLICE`]. A self-test of more than [`MAX_TEST`] slices ends there.
+/// [`MAX_SLICE`]. A self-test of more than [`MAX_TEST`] slices ends there. Returns the head, and the memory for the next
+/// prefix: as many words as the image's prefix has, none without the feature `attention`.
 ///
 /// # Errors
 ///
@@ -24,12 +25,13 @@ pub fn open<'i, 's>(
     scratch: &'s mut [u32],
     lengths: [usize; 2],
     watchdog: &mut impl Watchdog,
-) -> Result<Head<'i, 's>, Refusal> {
+) -> Result<(Head<'i, 's>, &'s mut [u32]), Refusal> {
     watchdog.feed();
     let image = Image::new_checked(bytes).map_err(|_| Refusal::Unfit)?;
     if [image.obs_len(), image.act_len()] != lengths {
         return Err(Refusal::Unfit);
     }
+    let (scratch, memory) = split(&image, scratch).ok_or(Refusal::Unfit)?;
     let mut head = Head::new(image, scratch).map_err(|_| Refusal::Unfit)?;
     if head.least_budget() > MAX_SLICE {
         return Err(Refusal::Unfit);
@@ -41,7 +43,19 @@ pub fn open<'i, 's>(
         slices <= MAX_TEST
     });
     passed.map_err(|_| if slices > MAX_TEST { Refusal::Unfit } else { Refusal::SelfTest })?;
-    Ok(head)
+    Ok((head, memory))
+}
+
+/// Splits scratch memory into that of the head and that of the next prefix.
+#[cfg(feature = "attention")]
+fn split<'s>(image: &Image<'_>, scratch: &'s mut [u32]) -> Option<(&'s mut [u32], &'s mut [u32])> {
+    let (scratch, rest) = scratch.split_at_mut_checked(image.scratch_words())?;
+    Some((scratch, rest.get_mut(..image.prefix_bytes() / 4)?))
+}
+
+#[cfg(not(feature = "attention"))]
+fn split<'s>(_: &Image<'_>, scratch: &'s mut [u32]) -> Option<(&'s mut [u32], &'s mut [u32])> {
+    Some((scratch, &mut []))
 }
 
 /// Returns an axis for each value of an image's actions, at `hz` ticks per second. It has the stricter of the

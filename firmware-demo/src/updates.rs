@@ -1,10 +1,15 @@
 //! Image updates, on boards with memory for them.
 
 use actq_boards::hal::Watchdog;
+#[cfg(feature = "attention")]
+use actq_controller::prefix::Transfer;
 use actq_controller::slots::{Authority, Candidate, Layout, Slot, Slots, Updater, Work};
 use actq_controller::update::{NoUpdate, Plan, Update};
 use actq_link::code::Refusal;
 use embedded_storage::nor_flash::NorFlash;
+
+#[cfg(feature = "attention")]
+use crate::running::Running;
 
 /// Two image slots, if the board has them.
 pub struct Updates<F, A: Authority>(Option<Updater<F, A>>);
@@ -82,5 +87,43 @@ impl<F: NorFlash, A: Authority> Update for Updates<F, A> {
 
     fn is_busy(&self) -> bool {
         self.0.as_ref().is_some_and(Update::is_busy)
+    }
+}
+
+/// Image updates, and the prefix of the running image.
+#[cfg(feature = "attention")]
+pub(crate) struct Both<'w, 'i, 's, F, A: Authority> {
+    pub(crate) updates: &'w mut Updates<F, A>,
+    pub(crate) running: &'w mut Option<Running<'i, 's>>,
+}
+
+#[cfg(feature = "attention")]
+impl<F: NorFlash, A: Authority> Update for Both<'_, '_, '_, F, A> {
+    fn begin(&mut self, plan: Plan) -> Result<(), Refusal> {
+        self.updates.begin(plan)
+    }
+
+    fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
+        self.updates.chunk(offset, bytes)
+    }
+
+    fn commit(&mut self, signature: Option<&[u8; 64]>) -> Result<(), Refusal> {
+        self.updates.commit(signature)
+    }
+
+    fn abort(&mut self) -> Result<(), Refusal> {
+        self.updates.abort()
+    }
+
+    fn written(&self) -> u32 {
+        self.updates.written()
+    }
+
+    fn is_busy(&self) -> bool {
+        self.updates.is_busy()
+    }
+
+    fn with_prefix<T>(&mut self, run: impl FnOnce(&mut Transfer<'_>) -> T) -> Option<T> {
+        self.running.as_mut().map(|running| run(&mut running.transfer))
     }
 }

@@ -13,6 +13,8 @@ use crate::faults::{Faults, Request};
 use crate::running::Running;
 use crate::timeouts::TIMEOUTS;
 use crate::timing::{Rates, Timing};
+#[cfg(feature = "attention")]
+use crate::updates::Both;
 use crate::updates::Updates;
 
 /// Largest number of bytes taken from the port per turn.
@@ -82,7 +84,7 @@ where
         if self.port.read_ready() == Ok(true) {
             let mut bytes = [0; TURN_BYTES];
             let Ok(len) = self.port.read(&mut bytes);
-            bytes.iter().take(len).for_each(|byte| self.take(*byte, micros));
+            bytes.iter().take(len).for_each(|byte| self.take(*byte, micros, running));
         }
         self.state.progress.link = true;
         if let Some(frame) = self.endpoint.report(micros, &mut self.safety, self.out) {
@@ -90,6 +92,8 @@ where
         }
         if let Some(running) = running {
             running.scrub(&mut self.safety);
+            #[cfg(feature = "attention")]
+            running.refresh(&mut self.safety);
             if let Some(frame) = running.slice(&mut self.endpoint, micros, &mut self.safety, self.out) {
                 let _ = self.port.send(frame);
             }
@@ -131,7 +135,8 @@ where
         }
     }
 
-    fn take(&mut self, byte: u8, micros: u32) {
+    #[cfg_attr(not(feature = "attention"), allow(unused_variables, reason = "only a prefix is for the running image"))]
+    fn take(&mut self, byte: u8, micros: u32, running: &mut Option<Running<'_, '_>>) {
         #[cfg(feature = "faults")]
         match self.state.faults.push(byte) {
             Some(Request::Hide(parts)) => self.state.hidden_parts = parts,
@@ -142,7 +147,11 @@ where
             Some(Request::Panic) => panic!("asked for"),
             _ => {}
         }
-        let answer = self.endpoint.receive(byte, micros, &mut self.safety, &mut self.updates, self.out);
+        #[cfg(not(feature = "attention"))]
+        let updates = &mut self.updates;
+        #[cfg(feature = "attention")]
+        let updates = &mut Both { updates: &mut self.updates, running };
+        let answer = self.endpoint.receive(byte, micros, &mut self.safety, updates, self.out);
         if let Some(frame) = answer {
             let _ = self.port.send(frame);
         }

@@ -104,6 +104,11 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         let received = self.receiver.push(byte)?;
         self.heard_at = safety.with(|safety| safety.ticks());
         let (of, is_arm) = (received.sequence, matches!(received.message, Message::Arm { .. }));
+        #[cfg(feature = "prefix")]
+        let is_prefix = matches!(
+            received.message,
+            Message::BeginPrefix { .. } | Message::PrefixChunk { .. } | Message::CommitPrefix
+        );
         let (guard, settings) = (&mut self.guard, &mut self.settings);
         let answer = match received.message {
             Message::Observation(values) => {
@@ -135,6 +140,11 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         let message = match answer {
             Answer::Message(message) => message,
             Answer::Report(report) => self.report_message(report, safety),
+            #[cfg(feature = "prefix")]
+            Answer::Done(outcome) if is_prefix => {
+                let written = update.with_prefix(|transfer| transfer.written()).unwrap_or(0);
+                Message::Ack { of, refusal: outcome.err(), written }
+            }
             Answer::Done(outcome) => Message::Ack { of, refusal: outcome.err(), written: update.written() },
         };
         self.sender.frame(&message, micros, out)

@@ -15,11 +15,18 @@ pub enum Check {
     Watchdog,
     /// The break input is not active, and the outputs are as they should be.
     Hardware,
+    /// The head has the prefix that its image reads, within its lifetime. An image without a prefix needs no check.
+    #[cfg(feature = "prefix")]
+    Prefix,
 }
 
 impl Check {
     /// All checks, in the order in which refusals name them.
+    #[cfg(not(feature = "prefix"))]
     pub const ALL: [Self; 5] = [Self::Image, Self::SelfTest, Self::Clock, Self::Watchdog, Self::Hardware];
+    /// All checks, in the order in which refusals name them.
+    #[cfg(feature = "prefix")]
+    pub const ALL: [Self; 6] = [Self::Image, Self::SelfTest, Self::Clock, Self::Watchdog, Self::Hardware, Self::Prefix];
 
     /// Returns the refusal to arm while this check fails.
     const fn refusal(self) -> Refusal {
@@ -29,6 +36,8 @@ impl Check {
             Self::Clock => Refusal::Clock,
             Self::Watchdog => Refusal::Watchdog,
             Self::Hardware => Refusal::Hardware,
+            #[cfg(feature = "prefix")]
+            Self::Prefix => Refusal::Prefix,
         }
     }
 
@@ -39,14 +48,26 @@ impl Check {
             Self::Clock => Fault::Clock,
             Self::Watchdog => Fault::Watchdog,
             Self::Hardware => Fault::Break,
+            #[cfg(feature = "prefix")]
+            Self::Prefix => Fault::Prefix,
         }
     }
 }
 
-/// Outcomes of all checks. A check that was not made counts as failed.
-#[derive(Clone, Copy, Debug, Default)]
+/// Outcomes of all checks. A check that was not made counts as failed, except that of a prefix.
+#[derive(Clone, Copy, Debug)]
 pub struct Health {
     passed: [bool; Check::ALL.len()],
+}
+
+impl Default for Health {
+    fn default() -> Self {
+        #[cfg(feature = "prefix")]
+        let passed = Check::ALL.map(|check| check == Check::Prefix);
+        #[cfg(not(feature = "prefix"))]
+        let passed = [false; Check::ALL.len()];
+        Self { passed }
+    }
 }
 
 impl Health {

@@ -19,6 +19,8 @@ pub mod guard;
 pub mod health;
 pub mod limits;
 mod parameters;
+#[cfg(feature = "prefix")]
+pub mod prefix;
 pub mod progress;
 mod requests;
 pub mod safety;

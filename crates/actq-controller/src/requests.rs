@@ -5,6 +5,8 @@ use actq_link::code::{Parameter, Refusal, State};
 
 use crate::guard::Guard;
 use crate::parameters::whole;
+#[cfg(feature = "prefix")]
+use crate::prefix::{self, Transfer};
 use crate::safety::{Safety, Shared};
 use crate::update::{Plan, Update};
 
@@ -72,7 +74,31 @@ pub(crate) fn request<const OBS: usize, const AXES: usize>(
         Message::Commit { .. } if safety.with(|safety| safety.state()) != State::Disarmed => Err(Refusal::Armed),
         Message::Commit { signature } => settings.may_write(safety).and_then(|()| update.commit(signature)),
         Message::Abort => update.abort(),
+        // In every state. Of an old request, nobody knows for how long the prefix may still be used.
+        #[cfg(feature = "prefix")]
+        Message::BeginPrefix { token, image, length, crc, lifetime } => {
+            let (may, now) = safety.with(|safety| (safety.may_change(token), safety.ticks()));
+            let plan = prefix::Plan { image, length, crc, lifetime };
+            match may {
+                Err(Refusal::Token) => Err(Refusal::Token),
+                _ if guard.date(sent, came).is_err() => Err(Refusal::Stale),
+                _ => of_prefix(update, |transfer| transfer.begin(plan, now)),
+            }
+        }
+        #[cfg(feature = "prefix")]
+        Message::PrefixChunk { offset, bytes } => of_prefix(update, |transfer| transfer.chunk(offset, bytes)),
+        #[cfg(feature = "prefix")]
+        Message::CommitPrefix => of_prefix(update, |transfer| transfer.commit()),
         _ => return None,
     };
     Some(outcome)
+}
+
+/// Carries out a request of a prefix.
+#[cfg(feature = "prefix")]
+fn of_prefix(
+    update: &mut impl Update,
+    run: impl FnOnce(&mut Transfer<'_>) -> Result<(), Refusal>,
+) -> Result<(), Refusal> {
+    update.with_prefix(run).unwrap_or(Err(Refusal::Unsupported))
 }

@@ -2,6 +2,9 @@
 
 use actq_link::code::Refusal;
 
+#[cfg(feature = "prefix")]
+use crate::prefix::Transfer;
+
 /// Announcement of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
@@ -49,6 +52,12 @@ pub trait Update {
 
     /// Returns `true` while a slot is being erased, or an image checked or tested.
     fn is_busy(&self) -> bool;
+
+    /// Calls `run` with the transfer of the running image's prefix; `None` without an image.
+    #[cfg(feature = "prefix")]
+    fn with_prefix<T>(&mut self, _run: impl FnOnce(&mut Transfer<'_>) -> T) -> Option<T> {
+        None
+    }
 }
 
 /// A controller whose image is built in.

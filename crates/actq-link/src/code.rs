@@ -85,6 +85,8 @@ codes! {
         Break = 10, "the break input switched the outputs off";
         /// A bit of the controller's state or limits in memory changed: a restart is necessary.
         Memory = 11, "the controller's state or limits in memory changed; restart it";
+        /// The image reads a prefix, and it is missing or its lifetime is over.
+        Prefix = 12, "the policy's prefix is missing, or its lifetime is over";
     }
 }
 
@@ -138,6 +140,8 @@ codes! {
         /// An axis has no finite limits, neither from the built-in image nor from the build, or too small a rate.
         Limits = 21, "an axis has no limits or too small a rate, so no output may move; build the firmware with --limits LOW:HIGH, or with an image \
             whose actions have low and high";
+        /// The image reads a prefix, and it is missing or its lifetime is over.
+        Prefix = 22, "the policy's prefix is missing, or its lifetime is over; send a prefix before arming";
     }
 }
 

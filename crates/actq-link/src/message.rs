@@ -63,6 +63,31 @@ pub enum Message<'a> {
     },
     /// Cancels an update.
     Abort,
+    /// Begins the transfer of a prefix, the keys and values that the running image's attentions read.
+    #[cfg(feature = "prefix")]
+    BeginPrefix {
+        /// [`Status::token`] of the last status.
+        token: u32,
+        /// [`Status::image`]: CRC-32 of the header of the image that reads it.
+        image: u32,
+        /// Bytes of the prefix.
+        length: u32,
+        /// CRC-32 (ISO-HDLC) of all bytes of the prefix.
+        crc: u32,
+        /// Control ticks, from the arrival of this request, for which the prefix may be used; at least 1.
+        lifetime: u32,
+    },
+    /// Some of the prefix's bytes.
+    #[cfg(feature = "prefix")]
+    PrefixChunk {
+        /// Offset of the bytes in the prefix.
+        offset: u32,
+        /// The bytes.
+        bytes: &'a [u8],
+    },
+    /// Ends the transfer of a prefix: the head uses it from its next evaluation on.
+    #[cfg(feature = "prefix")]
+    CommitPrefix,
     /// The head's action for an observation.
     Action {
         /// Sequence number of the observation's frame.
@@ -100,18 +125,18 @@ pub enum Message<'a> {
 
 /// Declares each message's kind number and, in the order of the payload, its fields.
 macro_rules! messages {
-    ($($message:ident $(($value:ident))? $({ $($field:ident),* })? = $kind:literal;)*) => {
+    ($($(#[$attribute:meta])? $message:ident $(($value:ident))? $({ $($field:ident),* })? = $kind:literal;)*) => {
         impl<'a> Message<'a> {
             /// The number of the message's kind in a frame.
             pub const fn kind(&self) -> u8 {
                 match self {
-                    $(Self::$message { .. } => $kind,)*
+                    $($(#[$attribute])? Self::$message { .. } => $kind,)*
                 }
             }
 
             pub(crate) fn write(&self, w: &mut Writer<'_>) {
                 match self {
-                    $(Self::$message $(($value))? $({ $($field),* })? => {
+                    $($(#[$attribute])? Self::$message $(($value))? $({ $($field),* })? => {
                         $($value.write(w);)?
                         $($($field.write(w);)*)?
                     })*
@@ -122,7 +147,7 @@ macro_rules! messages {
             pub(crate) fn parse(kind: u8, payload: &'a [u8]) -> Option<Self> {
                 let r = &mut Reader(payload);
                 let message = match kind {
-                    $($kind => {
+                    $($(#[$attribute])? $kind => {
                         $(let $value = r.field()?;)?
                         Self::$message $(($value))? $({ $($field: r.field()?),* })?
                     })*
@@ -145,6 +170,12 @@ messages! {
     Chunk { offset, bytes } = 8;
     Commit { signature } = 9;
     Abort = 10;
+    #[cfg(feature = "prefix")]
+    BeginPrefix { token, image, length, crc, lifetime } = 11;
+    #[cfg(feature = "prefix")]
+    PrefixChunk { offset, bytes } = 12;
+    #[cfg(feature = "prefix")]
+    CommitPrefix = 13;
     Action { of, applied, values } = 128;
     Status(status) = 129;
     Timing(timing) = 130;

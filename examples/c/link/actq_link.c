@@ -98,6 +98,32 @@ size_t actq_link_ask_status(actq_link *link, uint32_t micros, uint8_t *wire) {
     return send(link, ACTQ_LINK_ASK, micros, &status, 1, wire);
 }
 
+size_t actq_link_begin_prefix(actq_link *link, uint32_t micros, uint32_t token, const actq_link_prefix *prefix, uint8_t *wire) {
+    const uint32_t fields[5] = {token, prefix->image, prefix->length, crc32(prefix->bytes, prefix->length), prefix->lifetime};
+    uint8_t payload[20];
+    for (int i = 0; i < 5; i++) {
+        put32(payload + 4 * i, fields[i]);
+    }
+    return send(link, ACTQ_LINK_BEGIN_PREFIX, micros, payload, sizeof payload, wire);
+}
+
+size_t actq_link_prefix_chunk(actq_link *link, uint32_t micros, const actq_link_prefix *prefix, uint32_t offset,
+                              size_t payload, uint8_t *wire) {
+    uint8_t chunk[ACTQ_LINK_PAYLOAD];
+    size_t room = payload < sizeof chunk ? payload : sizeof chunk;
+    if (room <= 4 || offset >= prefix->length) {
+        return 0;
+    }
+    room = room - 4 < prefix->length - offset ? room - 4 : prefix->length - offset;
+    put32(chunk, offset);
+    memcpy(chunk + 4, prefix->bytes + offset, room);
+    return send(link, ACTQ_LINK_PREFIX_CHUNK, micros, chunk, 4 + room, wire);
+}
+
+size_t actq_link_commit_prefix(actq_link *link, uint32_t micros, uint8_t *wire) {
+    return send(link, ACTQ_LINK_COMMIT_PREFIX, micros, NULL, 0, wire);
+}
+
 static void append(actq_link *link, uint8_t byte) {
     if (link->length < sizeof link->received) {
         link->received[link->length++] = byte;
@@ -159,6 +185,10 @@ int actq_link_read_acknowledgement(const actq_link_message *message, uint32_t *o
     *of = get32(message->payload);
     *refusal = message->payload[4];
     return 1;
+}
+
+uint32_t actq_link_written(const actq_link_message *acknowledgement) {
+    return acknowledgement->length == 9 ? get32(acknowledgement->payload + 5) : 0;
 }
 
 int actq_link_read_action(const actq_link_message *message, uint32_t *of, int *applied, float *values, size_t room,

@@ -18,10 +18,16 @@ enum actq_link_kind {
     ACTQ_LINK_ARM = 2,
     ACTQ_LINK_DISARM = 3,
     ACTQ_LINK_ASK = 6,
+    ACTQ_LINK_BEGIN_PREFIX = 11,
+    ACTQ_LINK_PREFIX_CHUNK = 12,
+    ACTQ_LINK_COMMIT_PREFIX = 13,
     ACTQ_LINK_ACTION = 128,
     ACTQ_LINK_STATUS = 129,
     ACTQ_LINK_ACKNOWLEDGEMENT = 133
 };
+
+/* Refusals that a host answers by itself: with the token of another status, from the written bytes on, or again. */
+enum actq_link_refusal { ACTQ_LINK_TOKEN = 1, ACTQ_LINK_OFFSET = 10, ACTQ_LINK_BUSY = 13 };
 
 enum actq_link_state { ACTQ_LINK_DISARMED = 0, ACTQ_LINK_ARMED = 1, ACTQ_LINK_LATCHED = 2 };
 
@@ -63,6 +69,21 @@ size_t actq_link_arm(actq_link *link, uint32_t micros, uint32_t token, uint8_t *
 size_t actq_link_disarm(actq_link *link, uint32_t micros, uint8_t *wire);
 size_t actq_link_ask_status(actq_link *link, uint32_t micros, uint8_t *wire);
 
+/* A prefix, of the bytes that `actq_set_prefix` takes: for how many control ticks the head may use it, and the image that
+ * reads it, from the status. */
+typedef struct {
+    const uint8_t *bytes;
+    uint32_t length, lifetime, image;
+} actq_link_prefix;
+
+/* The requests of a prefix, one after the acknowledgement of the other: begin, then chunks until all bytes are written, then
+ * commit until its refusal is not ACTQ_LINK_BUSY. A chunk begins at `offset`, and its payload has at most `payload` bytes
+ * (that of the status) and ACTQ_LINK_PAYLOAD. */
+size_t actq_link_begin_prefix(actq_link *link, uint32_t micros, uint32_t token, const actq_link_prefix *prefix, uint8_t *wire);
+size_t actq_link_prefix_chunk(actq_link *link, uint32_t micros, const actq_link_prefix *prefix, uint32_t offset,
+                              size_t payload, uint8_t *wire);
+size_t actq_link_commit_prefix(actq_link *link, uint32_t micros, uint8_t *wire);
+
 /* Takes a byte; returns 1 if it ends a frame that holds a message. */
 int actq_link_push(actq_link *link, uint8_t byte, actq_link_message *message);
 
@@ -70,6 +91,8 @@ int actq_link_push(actq_link *link, uint8_t byte, actq_link_message *message);
  * `room` values of the action are written; `count` gets their number. */
 int actq_link_read_status(const actq_link_message *message, actq_link_status *status);
 int actq_link_read_acknowledgement(const actq_link_message *message, uint32_t *of, uint8_t *refusal);
+/* The bytes that the controller has written of the prefix, of an acknowledgement of one of its requests. */
+uint32_t actq_link_written(const actq_link_message *acknowledgement);
 int actq_link_read_action(const actq_link_message *message, uint32_t *of, int *applied, float *values, size_t room,
                           size_t *count);
 

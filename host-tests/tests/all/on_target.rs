@@ -19,6 +19,7 @@ mod linked;
 mod logs;
 mod packages;
 mod portable;
+mod prefix;
 pub(crate) mod qemu;
 mod repacked;
 mod start;

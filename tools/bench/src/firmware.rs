@@ -78,9 +78,13 @@ pub fn harness_of(target: Target, feature: &'static str) -> Result<PathBuf> {
 
 /// Builds the harness with `image` built in, and with attention if the image needs it.
 pub fn harness_with(target: Target, image: &Path) -> Result<PathBuf> {
+    Ok(harness_in_folder(target, attention_of(image)?, image)?.join(HARNESS))
+}
+
+/// Returns the feature of attention if the image needs it; else nothing.
+fn attention_of(image: &Path) -> Result<&'static str> {
     let buffer = ImageBuffer::read(image)?;
-    let feature = buffer.image(image)?.features().find(|feature| *feature == ATTENTION).unwrap_or_default();
-    Ok(harness_in_folder(target, feature, image)?.join(HARNESS))
+    Ok(buffer.image(image)?.features().find(|feature| *feature == ATTENTION).unwrap_or_default())
 }
 
 fn harness_in_folder(target: Target, feature: &str, image: &Path) -> Result<PathBuf> {
@@ -103,9 +107,9 @@ pub fn controller_of_key(target: Target, features: &'static str, key: &str) -> R
     Ok(build_once((APPLICATION, CONTROLLER, features, target), build)?.join(CONTROLLER))
 }
 
-/// Builds the application with `image` built in.
+/// Builds the application with `image` built in, and with attention if the image needs it.
 pub fn controller_with(target: Target, image: &Path) -> Result<PathBuf> {
-    Ok(controller_in_folder(target, "", "", image)?.join(CONTROLLER))
+    Ok(controller_in_folder(target, attention_of(image)?, "", image)?.join(CONTROLLER))
 }
 
 fn controller_in_folder(target: Target, features: &str, key: &str, image: &Path) -> Result<PathBuf> {

@@ -120,7 +120,8 @@ fn check(
     aligned.copy_from_slice(&bytes);
     let image = Image::new_checked(aligned)
         .with_context(|| format!("{}: not a valid image; make one with `actq quantize`", path.display()))?;
-    let (needed, given) = (image.scratch_words(), application.scratch);
+    // A prefix arrives beside the one in use.
+    let (needed, given) = (image.scratch_words() + image.prefix_bytes() / 4, application.scratch);
     let name = target.board().name;
     ensure!(
         needed <= given,

@@ -63,6 +63,7 @@ fn a_change_of_any_field_ends_the_outputs_until_a_restart() {
         safety.observed();
         assert_eq!(safety.arm(safety.token()), Err(Refusal::Hardware), "{name}");
         safety.disarm();
+        safety.tick();
         assert_eq!(safety.arm(safety.token()), Err(Refusal::Hardware), "{name}");
     }
 }

@@ -10,11 +10,14 @@ use std::time::{Duration, Instant, SystemTime};
 
 use actq_controller::breadcrumb::Record;
 use actq_controller::endpoint::Facts;
-use actq_controller::update::NoUpdate;
 use actq_controller::{Axis, Check, Endpoint, Guard, SafeAction, Safety, Settings};
+#[cfg(feature = "prefix")]
+use actq_link::code::Refusal;
 use actq_link::code::{Fault, ResetCause, State};
 use actq_link::report::{BUILT_IN, Timing};
 use actq_link::{Message, Receiver, frame};
+
+use crate::receives::Receives;
 
 const FRAME: usize = frame::bytes(512);
 const ACTIONS: u32 = 20;
@@ -46,11 +49,16 @@ impl Client {
 
     /// Runs the program on a controller in this state, which has a fault after `faults_after` actions.
     fn run(&self, state: State, faults_after: Option<u32>) -> (Output, Controller) {
-        let (socket, mut controller) = (self.path("socket"), Controller::new(state, faults_after));
+        self.run_with(Controller::new(state, faults_after), &[])
+    }
+
+    /// Runs the program with more arguments.
+    fn run_with(&self, mut controller: Controller, more: &[&str]) -> (Output, Controller) {
+        let socket = self.path("socket");
         let _ = fs::remove_file(&socket);
         let listener = UnixListener::bind(&socket).expect("a socket");
         let mut client = Command::new(self.path("client"));
-        client.arg(&socket).arg(ACTIONS.to_string()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        client.arg(&socket).arg(ACTIONS.to_string()).args(more).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut client = client.spawn().expect("the client runs");
         let (mut line, _) = listener.accept().expect("the client connects");
         line.set_nonblocking(true).expect("the socket has options");
@@ -81,6 +89,7 @@ struct Controller {
     frames: Vec<[u32; 2]>,
     /// Requests to arm.
     arms: u32,
+    update: Receives,
 }
 
 impl Controller {
@@ -98,7 +107,7 @@ impl Controller {
         let settings = Settings { status_period: 100, flash_while_armed: false, quiet: 1000 };
         let endpoint = Endpoint::new(Guard::full(&[], u32::MAX), facts, settings);
         let (heard, frames, begun) = (Receiver::new(), Vec::new(), Instant::now());
-        Self { safety, endpoint, begun, faults_after, applied: 0, heard, frames, arms: 0 }
+        Self { safety, endpoint, begun, faults_after, applied: 0, heard, frames, arms: 0, update: Receives::default() }
     }
 
     fn turn(&mut self, line: &mut UnixStream) {
@@ -110,10 +119,12 @@ impl Controller {
                 self.frames.push([received.sequence, received.micros]);
                 self.arms += u32::from(matches!(received.message, Message::Arm { .. }));
             }
-            let answer = self.endpoint.receive(*byte, micros, &mut self.safety, &mut NoUpdate, &mut out);
+            let answer = self.endpoint.receive(*byte, micros, &mut self.safety, &mut self.update, &mut out);
             sent.extend(answer.unwrap_or_default());
         }
         sent.extend(self.endpoint.report(micros, &mut self.safety, &mut out).unwrap_or_default());
+        #[cfg(feature = "prefix")]
+        self.refresh();
         if let Some(of) = self.endpoint.step(&mut self.safety).map(|step| step.of) {
             let action = Ok::<_, ()>(&[0.5][..]);
             sent.extend(self.endpoint.acted(of, action, micros, &mut self.safety, &mut out).unwrap_or_default());
@@ -126,6 +137,57 @@ impl Controller {
         // The client may have ended.
         let _ = line.write_all(&sent);
     }
+}
+
+#[cfg(feature = "prefix")]
+impl Controller {
+    /// Creates a controller of an image with a prefix of `len` bytes.
+    fn with_prefix(len: usize) -> Self {
+        let memory = Box::leak(vec![0; len].into_boxed_slice());
+        let mut controller = Self::new(State::Disarmed, None);
+        controller.safety.check(Check::Prefix, false);
+        controller.update.transfer = Some(actq_controller::prefix::Transfer::new(memory, 0xabcd, 60_000));
+        controller
+    }
+
+    /// Does what the firmware does, with a head that takes a prefix whose first byte is 0.
+    fn refresh(&mut self) {
+        let Some(transfer) = &mut self.update.transfer else { return };
+        if let Some(prefix) = transfer.whole() {
+            let outcome = if prefix.first() == Some(&0) { Ok(()) } else { Err(Refusal::Range) };
+            transfer.installed(outcome);
+        }
+        let is_fresh = transfer.is_fresh(self.safety.ticks());
+        self.safety.check(Check::Prefix, is_fresh);
+    }
+}
+
+#[cfg(feature = "prefix")]
+#[test]
+fn the_c_client_sends_a_prefix_before_it_arms() {
+    let Some(client) = Client::build("c-prefix") else { return };
+    let file = client.path("prefix");
+    let name = file.to_str().expect("a name");
+    let bytes: Vec<u8> = (0..5000).map(|i| (i % 251) as u8).collect();
+    fs::write(&file, &bytes).expect("a file");
+    let (output, controller) = client.run_with(Controller::with_prefix(bytes.len()), &[name, "60000"]);
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!((controller.arms, controller.safety.state()), (1, State::Disarmed));
+    assert!(controller.applied >= ACTIONS);
+    let transfer = controller.update.transfer.expect("a transfer");
+    assert_eq!(transfer.written() as usize, bytes.len());
+    // A prefix of another length, and one that the head does not take.
+    let (output, controller) = client.run_with(Controller::with_prefix(bytes.len() - 4), &[name, "60000"]);
+    assert_eq!(error(&output), "the controller refuses the prefix: refusal 11\n");
+    assert_eq!(controller.arms, 0);
+    let (output, _) = client.run_with(Controller::with_prefix(bytes.len()), &[name, "60001"]);
+    assert_eq!(error(&output), "the controller refuses the prefix: refusal 9\n");
+    fs::write(&file, vec![1; bytes.len()]).expect("a file");
+    let (output, _) = client.run_with(Controller::with_prefix(bytes.len()), &[name, "60000"]);
+    assert_eq!(error(&output), "the controller refuses the prefix: refusal 9\n");
+    // An image without a prefix.
+    let (output, _) = client.run_with(Controller::new(State::Disarmed, None), &[name, "60000"]);
+    assert_eq!(error(&output), "the controller refuses the prefix: refusal 18\n");
 }
 
 fn error(output: &Output) -> &str {

@@ -259,6 +259,70 @@ fn old_requests_and_unsupported_updates_are_refused() {
     assert_eq!(bench.ask(&Message::Commit { signature: None }), Err(Refusal::Armed));
 }
 
+/// In every state, with the token of the present one, and not if it was held up.
+#[cfg(feature = "prefix")]
+#[test]
+fn a_prefix_arrives_in_every_state() {
+    let bytes: [u8; 8] = std::array::from_fn(|i| i as u8);
+    let memory = Box::leak(Box::new([0; 8]));
+    let transfer = Some(actq_controller::prefix::Transfer::new(memory, 0xabcd, 100));
+    let settings = Settings { status_period: 0, flash_while_armed: false, quiet: QUIET };
+    let mut bench = Bench::of(settings, crate::receives::Receives { transfer });
+    let begin =
+        |token| Message::BeginPrefix { token, image: 0xabcd, length: 8, crc: CRC.checksum(&bytes), lifetime: 10 };
+    for state in [State::Disarmed, State::Armed, State::Latched] {
+        match state {
+            State::Disarmed => bench.observe(),
+            State::Armed => bench.arm(),
+            State::Latched => bench.safety.trip(Fault::Head),
+        }
+        assert_eq!(bench.safety.state(), state);
+        let token = bench.status().token;
+        assert_eq!(bench.ask(&begin(token ^ 1)), Err(Refusal::Token));
+        let wire = bench.frame(&begin(token));
+        bench.micros += 100_000;
+        let answer = bench.bytes(&wire);
+        let late = bench.parse(&answer, |answer| matches!(answer, Message::Ack { refusal: Some(Refusal::Stale), .. }));
+        assert_eq!(late, Some(true), "{state:?}");
+        assert_eq!(bench.ask(&begin(token)), Ok(()), "{state:?}");
+        assert_eq!(bench.ask(&Message::PrefixChunk { offset: 5, bytes: &bytes[5..] }), Err(Refusal::Offset));
+        let written = bench.send(&Message::PrefixChunk { offset: 0, bytes: &bytes }, |answer| match answer {
+            Message::Ack { refusal: None, written, .. } => written,
+            other => panic!("{other:?}"),
+        });
+        assert_eq!(written, Some(8));
+        assert_eq!(bench.ask(&Message::CommitPrefix), Err(Refusal::Busy));
+        let transfer = bench.update.transfer.as_mut().expect("a transfer");
+        assert_eq!(transfer.whole(), Some(&bytes[..]));
+        transfer.installed(Ok(()));
+        assert_eq!(bench.ask(&Message::CommitPrefix), Ok(()));
+    }
+}
+
+/// A prefix whose lifetime is over latches with its own fault, and nothing arms without one.
+#[cfg(feature = "prefix")]
+#[test]
+fn without_a_prefix_nothing_arms() {
+    let mut bench = Bench::new();
+    bench.arm();
+    bench.safety.check(Check::Prefix, false);
+    let status = bench.status();
+    assert_eq!(
+        (status.state, status.fault, status.refusal),
+        (State::Latched, Some(Fault::Prefix), Some(Refusal::Prefix))
+    );
+    assert_eq!(bench.ask(&Message::Disarm), Ok(()));
+    bench.observe();
+    let token = bench.status().token;
+    assert_eq!(bench.ask(&Message::Arm { token }), Err(Refusal::Prefix));
+    bench.safety.check(Check::Prefix, true);
+    assert_eq!(bench.ask(&Message::Arm { token }), Ok(()));
+    // No image, no prefix.
+    let begin = Message::BeginPrefix { token: bench.status().token, image: 0xabcd, length: 0, crc: 0, lifetime: 1 };
+    assert_eq!(bench.ask(&begin), Err(Refusal::Unsupported));
+    assert_eq!(bench.ask(&Message::CommitPrefix), Err(Refusal::Unsupported));
+}
+
 /// The age of an arm request is the last reason, after those of the state, and counts for the clocks all the same.
 #[test]
 fn an_old_arm_request_is_refused_for_the_first_reason() {

@@ -8,6 +8,9 @@ mod foc;
 mod guard;
 mod limits;
 mod memory;
+#[cfg(feature = "prefix")]
+mod prefix;
+mod receives;
 mod replays;
 mod safety;
 mod slots;

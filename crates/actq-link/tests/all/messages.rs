@@ -52,7 +52,7 @@ pub(super) fn all<'a>(content: &'a Content, n: &[u32; 6], pick: usize) -> Vec<Me
         counters: Counters { good: a, damaged: b, malformed: c, repeated: d, lost: e },
     };
     let crash = Crash::ALL.get(pick % (Crash::ALL.len() + 1)).copied();
-    vec![
+    let mut messages = vec![
         Message::Observation(values),
         Message::Arm { token },
         Message::Disarm,
@@ -69,7 +69,14 @@ pub(super) fn all<'a>(content: &'a Content, n: &[u32; 6], pick: usize) -> Vec<Me
         Message::Breadcrumb(Breadcrumb { reset, crash, pc: a, detail: b, ticks: c, count: d }),
         Message::Value { parameter, axis, value },
         Message::Ack { of: a, refusal, written: b },
-    ]
+    ];
+    #[cfg(feature = "prefix")]
+    messages.extend([
+        Message::BeginPrefix { token, image: a, length: b, crc: c, lifetime: d },
+        Message::PrefixChunk { offset: a, bytes: &content.bytes },
+        Message::CommitPrefix,
+    ]);
+    messages
 }
 
 /// Compares bit for bit, because a NaN differs from itself.

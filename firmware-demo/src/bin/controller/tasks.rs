@@ -158,7 +158,7 @@ impl Loop {
             let sum = scrub::checksum(bytes);
             let head = image::open(bytes, scratch, start::LENGTHS, work.watchdog);
             let refusal = head.as_ref().err().copied();
-            let image = head.as_ref().map_or(0, |head| head.image().crc());
+            let image = head.as_ref().map_or(0, |(head, _)| head.image().crc());
             let mut running = head.ok().map(|head| Running::new(head, bytes, sum));
             let watched = work.watchdog.start(TIMEOUTS.turn);
             work.safety.with(|safety| {
@@ -166,6 +166,10 @@ impl Loop {
                 safety.check(Check::Image, matches!(refusal, None | Some(Refusal::SelfTest)));
                 safety.check(Check::SelfTest, refusal.is_none());
             });
+            #[cfg(feature = "attention")]
+            if let Some(running) = &mut running {
+                running.refresh(&mut work.safety);
+            }
             work.endpoint.facts.image = image;
             work.endpoint.facts.slot = work.updates.running().map_or(BUILT_IN, |slot| slot as u8);
             info!(
