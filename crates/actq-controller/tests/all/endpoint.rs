@@ -312,6 +312,8 @@ fn without_a_prefix_nothing_arms() {
         (State::Latched, Some(Fault::Prefix), Some(Refusal::Prefix))
     );
     assert_eq!(bench.ask(&Message::Disarm), Ok(()));
+    // The outputs coast.
+    bench.safety.tick();
     bench.observe();
     let token = bench.status().token;
     assert_eq!(bench.ask(&Message::Arm { token }), Err(Refusal::Prefix));

@@ -232,14 +232,16 @@ fn invariants_hold_in_every_reachable_state() {
     let mut events = vec![Event::Tick, Event::Observed, Event::Stalled, Event::Disarm];
     events.extend([true, false].map(|right_token| Event::Arm { right_token }));
     events.extend(actions.map(|action| Event::Act(action.to_vec())));
-    events.extend((0..Fault::ALL.len()).map(Event::Trip));
+    // Of the faults, one that only a disarm ends and one that an arm ends; all others are treated alike.
+    let tripped = |fault: &usize| [Fault::Head, Fault::Break].contains(&Fault::ALL[*fault]);
+    events.extend((0..Fault::ALL.len()).filter(tripped).map(Event::Trip));
     let changing = |check: &usize| [Check::Image, Check::Clock, Check::Hardware].contains(&Check::ALL[*check]);
     let changes =
         (0..Check::ALL.len()).filter(changing).flat_map(|i| [true, false].map(|passed| Event::Check(i, passed)));
     events.extend(changes);
     for (safe, expected) in [
-        ([SafeAction::Hold, SafeAction::Ramp { step: 0.75 }], (13_001, 29)),
-        ([SafeAction::Brake, SafeAction::Coast], (11_977, 29)),
+        ([SafeAction::Hold, SafeAction::Ramp { step: 0.75 }], (9_510, 29)),
+        ([SafeAction::Brake, SafeAction::Coast], (8_056, 30)),
     ] {
         let axes = safe.map(|safe| Axis::new(-1.0, 1.0, 0.5, 0.5, safe).expect("the axis is valid"));
         let named = |path: &[u8]| path.iter().map(|i| &events[usize::from(*i)]).collect::<Vec<_>>();

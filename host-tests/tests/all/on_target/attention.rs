@@ -72,10 +72,11 @@ fn every_core_has_the_hosts_bits_of_a_prefix() -> Result<()> {
             let observations: Vec<Vec<f32>> =
                 (0..3).map(|_| (0..prefixed.len()).map(|_| random.unit()).collect()).collect();
             let image = Draft(prefixed.image());
-            let (_, actions) = harness.regions(image.bytes(), "serve", &observations)?;
-            let (_, in_polls) = harness.regions(image.bytes(), "poll 20000", &observations)?;
-            let (_, restarted) = harness.regions(image.bytes(), "restart", &observations)?;
             let buffer = ImageBuffer::new(image.bytes());
+            let least = buffer.image("prefix".as_ref())?.least_budget();
+            let (_, actions) = harness.regions(image.bytes(), "serve", &observations)?;
+            let (_, in_polls) = harness.regions(image.bytes(), &format!("poll {least}"), &observations)?;
+            let (_, restarted) = harness.regions(image.bytes(), "restart", &observations)?;
             with_head::<_, anyhow::Error>(buffer.image("prefix".as_ref())?, |head| {
                 head.set_test_prefix();
                 for (i, observation) in observations.iter().enumerate() {

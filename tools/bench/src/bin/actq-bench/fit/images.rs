@@ -270,6 +270,10 @@ impl Keys for Filled<'_> {
         bail!("{} has the matrix {key:?}; measure it with shapes of its own", self.op)
     }
 
+    fn add_prefix(&mut self, _: usize) -> actq::error::Result<()> {
+        bail!("{} has a prefix; measure it with shapes of its own", self.op)
+    }
+
     fn add_input(&mut self, _: &str) -> actq::error::Result<()> {
         let part = Concat(vec![Span { from: 0, len: self.len }]);
         self.inputs.push(self.builder.graph.add(part, &[0])?);
