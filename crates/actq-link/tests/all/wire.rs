@@ -68,9 +68,11 @@ fn the_documentation_lists_every_code() {
 #[test]
 fn the_documentation_lists_every_message() {
     for message in all(&Content::default(), &[0; 6], 0) {
-        let name = format!("{message:?}").to_lowercase();
+        let name = format!("{message:?}");
         let name = name.split(|c: char| !c.is_alphabetic()).next().expect("a message has a name");
-        let row = format!("| {} | {name}", message.kind());
+        // Each word of it begins with a capital.
+        let words = name.chars().flat_map(|c| c.is_uppercase().then_some(' ').into_iter().chain(c.to_lowercase()));
+        let row = format!("| {} |{}", message.kind(), words.collect::<String>());
         assert!(DOCUMENTATION.contains(&row), "docs/LINK.md has no row {row}");
     }
 }
