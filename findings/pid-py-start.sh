@@ -1,8 +1,8 @@
 #!/bin/sh
 # pid-py 1.2.2: the controller starts as if the setpoint, the measurement and the error had been 0 before its second call. A joint that rests at its setpoint of 1 rad gets -100 from the derivative "on measurement", of which the
-# documentation says that it avoids bumps (kd 0.1, 1 kHz). With a setpoint ramp of 1 rad/s, it is first driven to 0, since the ramp starts there, whatever the joint's place is; it has its setpoint back after 1 s.
+# documentation says that it avoids bumps (kd 0.1, 1 kHz). With a setpoint ramp of 1 rad/s, it is first driven toward 0, since the ramp starts there, whatever the place of the joint is.
 # And the class documents compute(processValue, setpoint); the function takes the setpoint first: who follows it has positive feedback. There is no error.
-# Seen on 2026-11-30:  at rest at the setpoint, second call: derivative on measurement -100, on error 0   ramp: setpoint 0.001 at the second call, joint driven to 0.40 before it returns   by the documented order: output -1 for an error of +1
+# Seen on 2026-11-30:  at rest at the setpoint, second call: derivative on measurement -100, on error 0   ramp: setpoint 0.001 at the second call, joint driven from 1 to 0.24 before it returns   by the documented order: output -1 for an error of +1
 set -eu
 dir=$(mktemp -d); trap 'rm -rf "$dir"' EXIT; cd "$dir"
 python3 -m venv v && v/bin/pip install -q --no-deps pid-py==1.2.2 && v/bin/pip install -q numpy==2.4.6
