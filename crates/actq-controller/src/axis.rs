@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::safety::mix;
+
 /// Action of an axis after the controller latched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SafeAction {
@@ -30,12 +32,13 @@ pub enum Output {
 }
 
 impl Output {
-    /// Returns its content, for a checksum.
-    pub(crate) const fn words(&self) -> [u32; 2] {
+    /// Continues a checksum with its content.
+    #[inline(always)]
+    pub(crate) const fn sum(&self, sum: u32) -> u32 {
         match self {
-            Self::Drive(value) => [0, value.to_bits()],
-            Self::Brake => [1, 0],
-            Self::Coast => [2, 0],
+            Self::Drive(value) => mix(mix(sum, 0), value.to_bits()),
+            Self::Brake => mix(mix(sum, 1), 0),
+            Self::Coast => mix(mix(sum, 2), 0),
         }
     }
 
@@ -145,16 +148,17 @@ impl Axis {
         self.safe
     }
 
-    /// Returns its content, for a checksum.
-    pub(crate) const fn words(&self) -> [u32; 6] {
+    /// Continues a checksum with its content.
+    #[inline(always)]
+    pub(crate) const fn sum(&self, sum: u32) -> u32 {
         let Self { low, high, rate, start, safe } = self;
-        let (safe, step) = match safe {
-            SafeAction::Hold => (0, 0),
-            SafeAction::Brake => (1, 0),
-            SafeAction::Coast => (2, 0),
-            SafeAction::Ramp { step } => (3, step.to_bits()),
-        };
-        [low.to_bits(), high.to_bits(), rate.to_bits(), start.to_bits(), safe, step]
+        let sum = mix(mix(mix(mix(sum, low.to_bits()), high.to_bits()), rate.to_bits()), start.to_bits());
+        match safe {
+            SafeAction::Hold => mix(mix(sum, 0), 0),
+            SafeAction::Brake => mix(mix(sum, 1), 0),
+            SafeAction::Coast => mix(mix(sum, 2), 0),
+            SafeAction::Ramp { step } => mix(mix(sum, 3), step.to_bits()),
+        }
     }
 
     /// Limits a finite value. It compares, because a Cortex-M4 has no instruction for `f32::max` and would call a

@@ -45,7 +45,7 @@ impl<const AXES: usize> Safety<AXES> {
     /// range.
     pub fn set(&mut self, token: u32, parameter: Parameter, axis: u8, value: f32) -> Result<(), Refusal> {
         self.may_change(token)?;
-        self.change(|safety| safety.replace(parameter, axis, value))
+        self.change_limits(|safety| safety.replace(parameter, axis, value))
     }
 
     fn replace(&mut self, parameter: Parameter, axis: u8, value: f32) -> Result<(), Refusal> {

@@ -52,8 +52,8 @@ pub struct Safety<const AXES: usize> {
     token: u32,
     /// The memory was changed by something else.
     is_lost: bool,
-    /// [`Self::sum`] after the last change.
-    sum: u32,
+    /// [`Self::limits_sum`] and [`Self::sum`] after the last change.
+    sums: [u32; 2],
 }
 
 impl<const AXES: usize> Safety<AXES> {
@@ -75,17 +75,18 @@ impl<const AXES: usize> Safety<AXES> {
             ticks: 0,
             token: next_token(seed),
             is_lost: false,
-            sum: 0,
+            sums: [0; 2],
         };
-        safety.sum = safety.sum();
+        safety.sums = [safety.limits_sum(), safety.sum()];
         safety
     }
 
     /// Makes a change. If anything else has changed the memory since the last one, the limits and the last outputs
     /// mean nothing any more: then outputs that brake brake, all others coast, and nothing arms again.
     pub(crate) fn change<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
-        if self.sum != self.sum() {
+        if self.sums != [self.limits_sum(), self.sum()] {
             self.is_lost = true;
+            self.sums[0] = self.limits_sum();
             if !matches!(self.state, State::Disarmed(_)) {
                 self.state = State::Latched(Latched::lost());
                 self.fault = Some(Fault::Memory);
@@ -93,22 +94,42 @@ impl<const AXES: usize> Safety<AXES> {
             }
         }
         let result = make(self);
-        self.sum = self.sum();
+        self.sums[1] = self.sum();
         result
     }
 
-    /// Returns a checksum of all other fields. It differs after a change of any single bit.
+    /// Changes limits.
+    pub(crate) fn change_limits<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
+        self.change(|safety| {
+            let result = make(safety);
+            safety.sums[0] = safety.limits_sum();
+            result
+        })
+    }
+
+    /// Returns a checksum of the limits. Like [`Self::sum`], it differs after a change of any single bit. Plain loops: a
+    /// tick computes it.
+    #[inline(never)]
+    fn limits_sum(&self) -> u32 {
+        let mut sum = mix(mix(self.deadline, *self.built.deadline.start()), *self.built.deadline.end());
+        for axes in [&self.axes, &self.built.axes] {
+            for axis in axes {
+                sum = axis.sum(sum);
+            }
+        }
+        sum
+    }
+
+    /// Returns a checksum of everything else.
     #[inline(never)]
     fn sum(&self) -> u32 {
-        let Self { axes, deadline, built, health, state, fault, since_observation, ticks, token, is_lost, sum: _ } =
-            self;
-        let fault = fault.map_or(0, Fault::code);
+        let Self { health, state, fault, since_observation, ticks, token, is_lost, .. } = self;
+        let fault = match fault {
+            Some(fault) => fault.code(),
+            None => 0,
+        };
         let bits = u32::from_le_bytes([fault, u8::from(*is_lost), health.bits(), 0]);
-        let words =
-            [*deadline, *built.deadline.start(), *built.deadline.end(), *since_observation, *ticks, *token, bits];
-        let sum = words.into_iter().fold(0, mix);
-        let sum = axes.iter().chain(&built.axes).fold(sum, |sum, axis| axis.words().into_iter().fold(sum, mix));
-        state.sum(sum)
+        state.sum(mix(mix(mix(bits, *since_observation), *ticks), *token))
     }
 
     /// Returns the outputs from now to the next tick. Call it at every tick, and only there.
@@ -331,6 +352,7 @@ impl<const AXES: usize> Safety<AXES> {
 }
 
 /// Continues a checksum with a word.
+#[inline(always)]
 pub(crate) const fn mix(sum: u32, word: u32) -> u32 {
     sum.rotate_left(1) ^ word
 }

@@ -166,14 +166,22 @@ pub enum State<const AXES: usize> {
 impl<const AXES: usize> State<AXES> {
     /// Continues a checksum with the state.
     pub(crate) fn sum(&self, sum: u32) -> u32 {
-        let outputs = |last: &[Output; AXES], sum| last.iter().flat_map(Output::words).fold(sum, mix);
-        match self {
-            Self::Disarmed(Disarmed { is_coasting }) => mix(sum, u32::from(*is_coasting)),
+        let (last, mut sum) = match self {
+            Self::Disarmed(Disarmed { is_coasting }) => return mix(sum, u32::from(*is_coasting)),
             Self::Armed(Armed { last, target, since_action }) => {
-                let sum = mix(mix(outputs(last, sum), *since_action), 2 + u32::from(target.is_some()));
-                target.iter().flatten().fold(sum, |sum, value| mix(sum, value.to_bits()))
+                let mut sum = mix(mix(sum, *since_action), 2 + u32::from(target.is_some()));
+                if let Some(target) = target {
+                    for value in target {
+                        sum = mix(sum, value.to_bits());
+                    }
+                }
+                (last, sum)
             }
-            Self::Latched(Latched { last, fault }) => mix(outputs(last, sum), 4 + u32::from(fault.code())),
+            Self::Latched(Latched { last, fault }) => (last, mix(sum, 4 + u32::from(fault.code()))),
+        };
+        for output in last {
+            sum = output.sum(sum);
         }
+        sum
     }
 }
