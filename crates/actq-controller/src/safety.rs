@@ -84,18 +84,23 @@ impl<const AXES: usize> Safety<AXES> {
     /// Makes a change. If anything else has changed the memory since the last one, the limits and the last outputs
     /// mean nothing any more: then outputs that brake brake, all others coast, and nothing arms again.
     pub(crate) fn change<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
-        if self.sums != [self.limits_sum(), self.sum()] {
+        self.verify(self.limits_sum());
+        let result = make(self);
+        self.sums[1] = self.sum();
+        result
+    }
+
+    #[inline(never)]
+    fn verify(&mut self, limits: u32) {
+        if self.sums != [limits, self.sum()] {
             self.is_lost = true;
-            self.sums[0] = self.limits_sum();
+            self.sums[0] = limits;
             if !matches!(self.state, State::Disarmed(_)) {
                 self.state = State::Latched(Latched::lost());
                 self.fault = Some(Fault::Memory);
                 self.token = next_token(self.token);
             }
         }
-        let result = make(self);
-        self.sums[1] = self.sum();
-        result
     }
 
     /// Changes limits.
@@ -107,8 +112,8 @@ impl<const AXES: usize> Safety<AXES> {
         })
     }
 
-    /// Returns a checksum of the limits. Like [`Self::sum`], it differs after a change of any single bit. Plain loops: a
-    /// tick computes it.
+    /// Returns a checksum of the limits. Like [`Self::sum`], it differs after a change of any single bit. A tick takes it
+    /// as unchanged, for its time: requests come often enough.
     #[inline(never)]
     fn limits_sum(&self) -> u32 {
         let mut sum = mix(mix(self.deadline, *self.built.deadline.start()), *self.built.deadline.end());
@@ -134,24 +139,25 @@ impl<const AXES: usize> Safety<AXES> {
 
     /// Returns the outputs from now to the next tick. Call it at every tick, and only there.
     pub fn tick(&mut self) -> [Output; AXES] {
-        self.change(|safety| {
-            safety.ticks = safety.ticks.wrapping_add(1);
-            safety.since_observation = safety.since_observation.saturating_add(1);
-            if let State::Armed(armed) = &safety.state {
-                // The action's age does not include the tick that begins now.
-                let late = armed.since_action() >= safety.deadline;
-                if safety.is_stale() {
-                    safety.latch(Fault::Stale);
-                } else if late {
-                    safety.latch(Fault::Late);
-                }
+        self.verify(self.sums[0]);
+        self.ticks = self.ticks.wrapping_add(1);
+        self.since_observation = self.since_observation.saturating_add(1);
+        if let State::Armed(armed) = &self.state {
+            // The action's age does not include the tick that begins now.
+            let late = armed.since_action() >= self.deadline;
+            if self.is_stale() {
+                self.latch(Fault::Stale);
+            } else if late {
+                self.latch(Fault::Late);
             }
-            match &mut safety.state {
-                State::Disarmed(disarmed) => disarmed.tick(),
-                State::Armed(armed) => armed.tick(&safety.axes),
-                State::Latched(latched) => latched.tick(&safety.axes),
-            }
-        })
+        }
+        let outputs = match &mut self.state {
+            State::Disarmed(disarmed) => disarmed.tick(),
+            State::Armed(armed) => armed.tick(&self.axes),
+            State::Latched(latched) => latched.tick(&self.axes),
+        };
+        self.sums[1] = self.sum();
+        outputs
     }
 
     /// Returns `true` if no valid observation arrived within the deadline.

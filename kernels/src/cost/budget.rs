@@ -120,7 +120,8 @@ impl Image<'_> {
                     };
                     let bias = Work::Start(OutputStart::of(accumulate, !matrix.bias.is_empty()));
                     let first = least(Work::Magnitude(matrix.cols)).max(if start { 0 } else { least(bias) });
-                    let first = first.max(Watched::of(self, &op).map_or(0, |watched| least(watched.work())));
+                    let watched = if Watched::may_be(&op) { Watched::of(self, &op) } else { None };
+                    let first = first.max(watched.map_or(0, |watched| least(watched.work())));
                     matrix.blocks().map(of_block).fold(first, u32::max)
                 }
                 _ => least(Work::Elements(&op)),

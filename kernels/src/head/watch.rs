@@ -28,13 +28,15 @@ pub(crate) struct Watched {
 }
 
 impl Watched {
-    /// Returns the words to watch during an operation; `None` if it is no product, or one too short even for its own
-    /// values.
+    /// Returns `true` for a product, if the build watches any.
     #[inline(always)]
+    pub(crate) fn may_be(op: &Op<'_>) -> bool {
+        cfg!(feature = "checksums") && matches!(op.kind, OpKind::Linear { .. })
+    }
+
+    /// Returns the words to watch during a product; `None` if it is too short even for its own values.
+    #[inline(never)]
     pub(crate) fn of(image: &Image<'_>, op: &Op<'_>) -> Option<Self> {
-        if !cfg!(feature = "checksums") || !matches!(op.kind, OpKind::Linear { .. }) {
-            return None;
-        }
         let (rows, cols, scratch) = (op.dst().len, op.src().len, image.scratch_words());
         // Two prepared values in a word.
         let (own, most) = (rows + cols / 2, rows * cols / WEIGHTS);
@@ -55,6 +57,7 @@ impl Watched {
         Work::Magnitude(if self.is_partial { 0 } else { self.scratch })
     }
 
+    #[inline(never)]
     fn sum(&self, arena: &[u32]) -> u32 {
         if self.is_partial {
             return 0;
@@ -80,7 +83,8 @@ pub(super) fn run_watched(
     cursor: &mut Cursor,
     budget: &mut impl Meter,
 ) -> Result<bool, Fault> {
-    let Some(watched) = Watched::of(image, op) else { return run(op, arena, cursor, budget) };
+    let watched = if Watched::may_be(op) { Watched::of(image, op) } else { None };
+    let Some(watched) = watched else { return run(op, arena, cursor, budget) };
     if !cursor.linear.quiet.is_set() {
         if budget.take(1, watched.work()) == 0 {
             return Ok(false);

@@ -86,6 +86,7 @@ pub(crate) fn copy(from: &[u32], to: &mut [u32]) {
 
 /// Returns the exclusive or of words.
 #[cfg(feature = "checksums")]
+#[inline(never)]
 pub(crate) fn xor(words: &[u32]) -> u32 {
     let (most, rest) = words.split_at(words.len() & !15);
     // SAFETY: the length is that of the slice, a multiple of 16 and not 0.

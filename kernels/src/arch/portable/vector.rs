@@ -7,6 +7,7 @@ use crate::math::{Native, Real};
 
 /// Returns the exclusive or of words.
 #[cfg(feature = "checksums")]
+#[inline(never)]
 pub fn xor(words: &[u32]) -> u32 {
     words.iter().fold(0, |sum, word| sum ^ word)
 }
