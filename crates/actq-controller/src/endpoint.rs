@@ -112,6 +112,7 @@ impl<'r, const OBS: usize, const N: usize> Endpoint<'r, OBS, N> {
         let (guard, settings) = (&mut self.guard, &mut self.settings);
         let answer = match received.message {
             Message::Observation(values) => {
+                safety.with(Safety::check_limits);
                 if guard.take(of, values, received.micros, micros).is_ok() {
                     self.observed_token = Some(safety.with(|safety| {
                         safety.observed();

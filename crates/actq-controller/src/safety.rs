@@ -84,10 +84,17 @@ impl<const AXES: usize> Safety<AXES> {
     /// Makes a change. If anything else has changed the memory since the last one, the limits and the last outputs
     /// mean nothing any more: then outputs that brake brake, all others coast, and nothing arms again.
     pub(crate) fn change<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
-        self.verify(self.limits_sum());
+        self.verify(self.sums[0]);
         let result = make(self);
         self.sums[1] = self.sum();
         result
+    }
+
+    /// Requires that nothing else has changed the limits. Call it before [`Self::observed`], not within the same lock: its
+    /// time delays a tick.
+    pub fn check_limits(&mut self) {
+        self.verify(self.limits_sum());
+        self.sums[1] = self.sum();
     }
 
     #[inline(never)]
@@ -105,6 +112,7 @@ impl<const AXES: usize> Safety<AXES> {
 
     /// Changes limits.
     pub(crate) fn change_limits<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
+        self.check_limits();
         self.change(|safety| {
             let result = make(safety);
             safety.sums[0] = safety.limits_sum();
@@ -264,6 +272,7 @@ impl<const AXES: usize> Safety<AXES> {
         if token != self.token {
             return Err(Refusal::Token);
         }
+        self.check_limits();
         self.change(|safety| {
             // Unless the memory is lost.
             let ready = safety.refusal().map_or_else(|| safety.health.ready(), Err)?;

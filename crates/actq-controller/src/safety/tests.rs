@@ -53,7 +53,7 @@ fn a_change_of_any_field_ends_the_outputs_until_a_restart() {
         change(&mut safety);
         // A tick does not compare the limits.
         if matches!(name, "limit" | "safe action" | "limit of the build" | "deadline" | "deadline of the build") {
-            safety.observed();
+            safety.check_limits();
         }
         let outputs = safety.tick();
         if name == "state" {
@@ -90,7 +90,7 @@ fn every_request_finds_a_change() {
     ];
     for (name, request) in requests {
         let mut safety = armed();
-        safety.axes[1] = axis(1.5, SafeAction::Brake);
+        safety.ticks ^= 1;
         request(&mut safety);
         assert_eq!(safety.fault(), Some(Fault::Memory), "{name}");
         assert!(!safety.tick().iter().any(|output| matches!(output, Output::Drive(_))), "{name}");
