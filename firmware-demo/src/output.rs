@@ -20,7 +20,8 @@ impl<S: Stage> Bridges<S> {
     }
 
     /// Applies the outputs of a tick; returns `false` if the stage is off and should be on, or coasts and the break
-    /// input is active, or if a value is outside its limits, which switches the stage off. All bridges share one enable: if one axis coasts, all of them do.
+    /// input is active, or if a value is outside its limits, which switches the stage off. All bridges share one enable:
+    /// if one axis coasts, all of them do.
     pub fn apply(&mut self, outputs: &[Output], axes: &[Axis]) -> bool {
         if !outputs.iter().zip(axes).all(|(output, axis)| output.is_within(axis)) {
             return self.fail();

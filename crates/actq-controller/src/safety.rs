@@ -81,43 +81,41 @@ impl<const AXES: usize> Safety<AXES> {
         safety
     }
 
-    /// Makes a change. If anything else has changed the memory since the last one, the limits and the last outputs
-    /// mean nothing any more: then outputs that brake brake, all others coast, and nothing arms again.
-    pub(crate) fn change<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
+    /// Makes a change, unless anything else has changed the state since the last one.
+    fn change<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
         self.verify(self.sums[0]);
         let result = make(self);
         self.sums[1] = self.sum();
         result
     }
 
-    /// Requires that nothing else has changed the limits. Call it before [`Self::observed`], not within the same lock: its
-    /// time delays a tick.
-    pub fn check_limits(&mut self) {
-        self.verify(self.limits_sum());
-        self.sums[1] = self.sum();
+    /// Makes a change of limits, unless anything else has changed them.
+    pub(crate) fn change_limits<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
+        self.check_limits();
+        let result = make(self);
+        self.sums = [self.limits_sum(), self.sum()];
+        result
     }
 
+    /// Requires that nothing else has changed the limits or the state. Call it before [`Self::observed`], not within the
+    /// same lock: its time delays a tick.
+    pub fn check_limits(&mut self) {
+        self.verify(self.limits_sum());
+    }
+
+    /// Requires these checksums: of the limits, and of the state now. With others, limits and last outputs mean nothing any
+    /// more: outputs that brake brake, all others coast, and nothing arms again.
     #[inline(never)]
     fn verify(&mut self, limits: u32) {
         if self.sums != [limits, self.sum()] {
             self.is_lost = true;
-            self.sums[0] = limits;
             if !matches!(self.state, State::Disarmed(_)) {
                 self.state = State::Latched(Latched::lost());
                 self.fault = Some(Fault::Memory);
                 self.token = next_token(self.token);
             }
+            self.sums = [limits, self.sum()];
         }
-    }
-
-    /// Changes limits.
-    pub(crate) fn change_limits<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
-        self.check_limits();
-        self.change(|safety| {
-            let result = make(safety);
-            safety.sums[0] = safety.limits_sum();
-            result
-        })
     }
 
     /// Returns a checksum of the limits. Like [`Self::sum`], it differs after a change of any single bit. A tick takes it
@@ -147,7 +145,10 @@ impl<const AXES: usize> Safety<AXES> {
 
     /// Returns the outputs from now to the next tick. Call it at every tick, and only there.
     pub fn tick(&mut self) -> [Output; AXES] {
-        self.verify(self.sums[0]);
+        self.change(Self::next)
+    }
+
+    fn next(&mut self) -> [Output; AXES] {
         self.ticks = self.ticks.wrapping_add(1);
         self.since_observation = self.since_observation.saturating_add(1);
         if let State::Armed(armed) = &self.state {
@@ -159,13 +160,11 @@ impl<const AXES: usize> Safety<AXES> {
                 self.latch(Fault::Late);
             }
         }
-        let outputs = match &mut self.state {
+        match &mut self.state {
             State::Disarmed(disarmed) => disarmed.tick(),
             State::Armed(armed) => armed.tick(&self.axes),
             State::Latched(latched) => latched.tick(&self.axes),
-        };
-        self.sums[1] = self.sum();
-        outputs
+        }
     }
 
     /// Returns `true` if no valid observation arrived within the deadline.
@@ -229,7 +228,8 @@ impl<const AXES: usize> Safety<AXES> {
 
     /// Records the outcome of a check. A failed check prevents arming, and latches an armed controller.
     pub fn check(&mut self, check: Check, passed: bool) {
-        if passed && self.health.has_passed(check) {
+        // Most checks are made again and again. One that has failed has latched already.
+        if passed == self.health.has_passed(check) {
             return;
         }
         self.change(|safety| {

@@ -97,6 +97,24 @@ fn every_request_finds_a_change() {
     }
 }
 
+/// Limits are compared before a controller arms, and before they change.
+#[test]
+fn neither_arming_nor_a_parameter_hides_a_changed_limit() {
+    for (name, change) in CHANGES.iter().take(5) {
+        for sets_first in [false, true] {
+            let mut safety = armed();
+            safety.disarm();
+            safety.tick();
+            safety.observed();
+            change(&mut safety);
+            if sets_first {
+                let _ = safety.set(safety.token(), code::Parameter::Rate, 1, 0.125);
+            }
+            assert_eq!(safety.arm(safety.token()), Err(Refusal::Hardware), "{name}");
+        }
+    }
+}
+
 /// A single bit never cancels out: each word is only rotated by the words after it.
 #[test]
 fn a_checksum_differs_after_a_change_of_any_bit() {
