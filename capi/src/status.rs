@@ -55,7 +55,7 @@ codes! {
     ObservationNotFinite = 81, c"a value of the observation is not finite";
     /// A value inside the network exceeded the range of float.
     NotFinite = 82, c"the network produced a value that is not finite";
-    /// The image's memory has changed since it was opened.
+    /// The image's memory has changed since it was opened, or, with the feature `checksums`, scratch memory.
     Damaged = 83, c"the image or the scratch memory was changed by something else";
     /// The self-test gave other bits than the image records.
     SelfTest = 84, c"the self-test gave other bits than the image records";

@@ -12,14 +12,14 @@ pub(crate) struct Checksum(#[cfg(feature = "checksums")] Option<u32>);
 
 #[cfg(feature = "checksums")]
 impl Checksum {
+    /// Takes that of memory.
+    pub(crate) fn of(sum: impl FnOnce() -> u32) -> Self {
+        Self(Some(sum()))
+    }
+
     /// Returns `true` if there is one.
     pub(crate) fn is_set(self) -> bool {
         self.0.is_some()
-    }
-
-    /// Takes that of other memory.
-    pub(crate) fn set(&mut self, sum: impl FnOnce() -> u32) {
-        self.0 = Some(sum());
     }
 
     /// Adds more memory.
@@ -39,11 +39,13 @@ impl Checksum {
 
 #[cfg(not(feature = "checksums"))]
 impl Checksum {
+    pub(crate) fn of(_: impl FnOnce() -> u32) -> Self {
+        Self()
+    }
+
     pub(crate) fn is_set(self) -> bool {
         false
     }
-
-    pub(crate) fn set(&mut self, _: impl FnOnce() -> u32) {}
 
     pub(crate) fn add(&mut self, _: impl FnOnce() -> u32) {}
 

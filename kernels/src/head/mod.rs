@@ -152,9 +152,7 @@ impl<'a, 's> Head<'a, 's> {
 
     /// Ends a change of the memory that lasts between steps.
     fn rest(&mut self) {
-        let mut resting = Checksum::default();
-        resting.set(|| self.sum());
-        self.resting = resting;
+        self.resting = Checksum::of(|| self.sum());
     }
 
     /// Computes the checksum of everything that a saved state has.

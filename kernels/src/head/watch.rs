@@ -5,7 +5,7 @@
 //! recurrent state, a chunk), of its prepared input, and of its finished rows. After it is prepared, its input
 //! itself is not covered: few networks need it again, as those with a sum of a layer's input and output without a norm.
 
-use crate::checksum::xor;
+use crate::checksum::{Checksum, xor};
 use crate::cursor::Cursor;
 use crate::error::Fault;
 use crate::image::{Image, Op, OpKind, Region};
@@ -89,7 +89,7 @@ pub(super) fn run_watched(
         if budget.take(1, watched.work()) == 0 {
             return Ok(false);
         }
-        cursor.linear.quiet.set(|| watched.sum(arena));
+        cursor.linear.quiet = Checksum::of(|| watched.sum(arena));
     }
     if !run(op, arena, cursor, budget)? || budget.take(1, watched.work()) == 0 {
         return Ok(false);

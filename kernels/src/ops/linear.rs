@@ -12,7 +12,7 @@ use crate::activations::{Plan, Prepared, Scale};
 use crate::arch;
 use crate::arch::gemv_with;
 use crate::arch::{Mismatch, Tables};
-use crate::checksum::xor;
+use crate::checksum::{Checksum, xor};
 use crate::cursor::LinearCursor;
 use crate::error::Fault;
 use crate::image::header::BLOCK_WORDS;
@@ -220,7 +220,7 @@ impl Matrix<'_> {
                     at.prepared = Some(shape.width);
                     x_scale.quantize(x, plan, work).ok_or(Fault::Damaged)?;
                     if at.quiet.is_set() {
-                        at.input.set(|| xor(work.get(..plan.words()).unwrap_or_default()));
+                        at.input = Checksum::of(|| xor(work.get(..plan.words()).unwrap_or_default()));
                     }
                 }
             }
