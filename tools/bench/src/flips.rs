@@ -12,7 +12,7 @@ mod gdb;
 use std::fmt;
 
 use actq::random::Random;
-use actq_controller::Axis;
+use actq_controller::{Axis, Output};
 use actq_link::code::Fault;
 
 pub use self::board::Board;
@@ -173,10 +173,10 @@ impl<'a> Judge<'a> {
 
     /// Returns `true` if outputs are within their limits.
     fn is_within(&self, outputs: &[Option<f32>]) -> bool {
-        let is_outside = |(output, axis): (&Option<f32>, &Axis)| {
-            output.is_some_and(|value| !(axis.low()..=axis.high()).contains(&value))
-        };
-        !outputs.iter().zip(self.axes).any(is_outside)
+        outputs
+            .iter()
+            .zip(self.axes)
+            .all(|(output, axis)| output.is_none_or(|value| Output::Drive(value).is_within(axis)))
     }
 
     /// Takes the end of a period.
