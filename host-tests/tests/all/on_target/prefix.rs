@@ -95,7 +95,7 @@ fn a_prefix_over_the_link_gives_the_hosts_bits() -> Result<()> {
     for i in [0, 1, 0] {
         assert_eq!(bench.act(i)?, (false, bench.prefixes[i].1.clone()), "prefix {i}");
     }
-    // What the head does not take.
+    // Prefixes that the head refuses.
     let mut wrong = bench.prefixes[1].0.clone();
     wrong[..4].copy_from_slice(&201u32.to_le_bytes());
     let refused = |bench: &mut Bench, prefix: Prefix<'_>, refusal: Refusal| {
@@ -117,23 +117,25 @@ fn a_prefix_over_the_link_gives_the_hosts_bits() -> Result<()> {
     Ok(())
 }
 
-/// Arms with a prefix of this lifetime; returns `false` if the machine is too busy for the deadline.
-fn arm(bench: &mut Bench, lifetime: u32) -> Result<bool> {
-    bench.client.disarm()?;
-    bench.send(0, lifetime)?;
-    bench.client.observe(&bench.observation)?;
-    Ok(bench.client.arm().is_ok())
-}
-
-#[test]
-fn an_armed_controller_takes_the_next_prefix() -> Result<()> {
+/// Arms with a prefix of this lifetime and runs `run`; both again if the machine is too busy for the deadline, as `run` tells
+/// by `false`.
+fn armed(lifetime: u32, mut run: impl FnMut(&mut Bench) -> Result<bool>) -> Result<()> {
     let mut bench = Bench::start()?;
     let begun = Instant::now();
     loop {
         ensure!(begun.elapsed() < HANG_TIMEOUT, "the host never was in time: {:?}", bench.client.status()?);
-        if !arm(&mut bench, 10_000)? {
-            continue;
+        bench.client.disarm()?;
+        bench.send(0, lifetime)?;
+        bench.client.observe(&bench.observation)?;
+        if bench.client.arm().is_ok() && run(&mut bench)? {
+            return Ok(());
         }
+    }
+}
+
+#[test]
+fn an_armed_controller_takes_the_next_prefix() -> Result<()> {
+    armed(10_000, |bench| {
         // Observations in between keep the controller armed.
         let bytes = bench.prefixes[1].0.clone();
         let mut push = Push::prefix(&mut bench.client, Prefix { bytes: &bytes, image: bench.image, lifetime: 10_000 })?;
@@ -145,21 +147,13 @@ fn an_armed_controller_takes_the_next_prefix() -> Result<()> {
         }
         let (applied, action) = bench.act(1)?;
         assert_eq!(action, bench.prefixes[1].1);
-        if applied {
-            return Ok(());
-        }
-    }
+        Ok(applied)
+    })
 }
 
 #[test]
 fn an_old_prefix_latches() -> Result<()> {
-    let mut bench = Bench::start()?;
-    let begun = Instant::now();
-    loop {
-        ensure!(begun.elapsed() < HANG_TIMEOUT, "the host never was in time: {:?}", bench.client.status()?);
-        if !arm(&mut bench, 1500)? {
-            continue;
-        }
+    armed(1500, |bench| {
         let status = loop {
             bench.client.observe(&bench.observation)?;
             let status = bench.client.status()?;
@@ -170,8 +164,9 @@ fn an_old_prefix_latches() -> Result<()> {
         let fault = status.fault.context("it has stopped")?;
         if fault == Fault::Prefix {
             assert_eq!((status.state, status.refusal), (State::Latched, Some(Refusal::Prefix)));
-            return Ok(());
+            return Ok(true);
         }
         ensure!([Fault::Stale, Fault::Late].contains(&fault), "{fault}");
-    }
+        Ok(false)
+    })
 }

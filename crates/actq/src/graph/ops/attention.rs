@@ -481,17 +481,22 @@ mod tests {
         assert!(off < 1e-5 * most, "{off} of {most}");
     }
 
-    #[test]
-    fn keys_that_do_not_depend_on_the_iterate_are_kept_once() {
-        let mut random = Random::new(8);
-        let mut graph = Graph::new(3);
-        let mut linear = |graph: &mut Graph, rows: usize, input: ValueId| {
+    /// Returns a function that adds a product with random weights, to this number of rows.
+    fn linears(seed: u64) -> impl FnMut(&mut Graph, usize, ValueId) -> ValueId {
+        let mut random = Random::new(seed);
+        move |graph, rows, input| {
             let cols = graph.len_of(input);
             let data = (0..rows * cols).map(|_| random.unit()).collect();
             let matrix = WeightMatrix { name: "m".into(), rows, cols, data };
             let matrix = graph.add_matrix(matrix).expect("a matrix");
             graph.add(Linear { matrix, bias: vec![0.1; rows] }, &[input]).expect("it fits")
-        };
+        }
+    }
+
+    #[test]
+    fn keys_that_do_not_depend_on_the_iterate_are_kept_once() {
+        let mut graph = Graph::new(3);
+        let mut linear = linears(8);
         let (keys, values) = (linear(&mut graph, 8, 0), linear(&mut graph, 8, 0));
         let first = graph.nodes.len();
         let x = graph.add(Iterate { len: 2 }, &[]).expect("it fits");
@@ -515,16 +520,9 @@ mod tests {
     /// Makes a network of three values and a prefix of four tokens for each of two attentions; with `is_iterative`, they
     /// are in the denoising steps of a flow.
     fn prefixed(is_iterative: bool) -> Graph {
-        let mut random = Random::new(9);
         let of = Attention { heads: 4, kv_heads: 2, dim: 2, factor: 0.7, causal: false, context: 0 };
         let mut graph = Graph { prefix_len: 4 * 16, ..Graph::new(3 + 4 * 16) };
-        let mut linear = |graph: &mut Graph, rows: usize, input: ValueId| {
-            let cols = graph.len_of(input);
-            let data = (0..rows * cols).map(|_| random.unit()).collect();
-            let matrix = WeightMatrix { name: "m".into(), rows, cols, data };
-            let matrix = graph.add_matrix(matrix).expect("a matrix");
-            graph.add(Linear { matrix, bias: vec![0.1; rows] }, &[input]).expect("it fits")
-        };
+        let mut linear = linears(9);
         let part = |graph: &mut Graph, from: usize, len: usize| {
             graph.add(Concat(vec![Span { from, len }]), &[0]).expect("it fits")
         };
