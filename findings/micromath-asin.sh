@@ -28,13 +28,13 @@ fn main() {
     let (asin, acos) = (F32Ext::asin(0.5_f32).to_degrees(), F32Ext::acos(0.5_f32).to_degrees());
     let errors = (worst(|sin, _| F32Ext::asin(sin)), worst(|sin, cos| F32Ext::atan2(sin, cos)));
     let rest = F32Ext::atan2(0.0_f32, 0.0);
-    let behind = F32Ext::atan2(-0.0_f32, -1.0).to_degrees();
+    let reversed = F32Ext::atan2(-0.0_f32, -1.0).to_degrees();
     let (floor, trunc) = (F32Ext::floor(3e9_f32), F32Ext::trunc(3e9_f32));
-    println!("SEEN asin {asin:.2}, acos {acos:.2}, sum {:.2}, worst {errors:.2?}, sqrt(2) {}, atan2(0, 0) {rest}, atan2(-0, -1) {behind:.0}, floor {floor}, trunc {trunc}", asin + acos, F32Ext::sqrt(2.0_f32));
+    println!("SEEN asin {asin:.2}, acos {acos:.2}, sum {:.2}, worst {errors:.2?}, sqrt(2) {}, atan2(0, 0) {rest}, atan2(-0, -1) {reversed:.0}, floor {floor}, trunc {trunc}", asin + acos, F32Ext::sqrt(2.0_f32));
     assert!((asin - 30.75).abs() < 0.01 && (acos - 60.09).abs() < 0.01);
     assert!(errors.0 > 1.0 && errors.1 < 0.25);
     assert_eq!(F32Ext::sqrt(2.0_f32), 1.5);
-    assert!(rest.is_nan() && behind > 179.0);
+    assert!(rest.is_nan() && reversed > 179.0);
     assert!(floor < 2.2e9 && trunc == 3e9);
 }
 RS

@@ -224,7 +224,8 @@ fn reproduced(build: impl Fn(&Checkout) -> Result<Vec<u8>>) -> Result<Vec<u8>> {
     Ok(elf)
 }
 
-/// Returns the segments of an ELF file of 32 bits that are loaded into memory; `None` if it is truncated.
+/// Returns the segments of an ELF file of 32 bits that are loaded into memory; `None` if it is truncated. By hand: xtask has
+/// few dependencies, to start soon.
 fn flashed(elf: &[u8]) -> Option<Vec<&[u8]>> {
     let word = |at: usize| Some(u32::from_le_bytes(elf.get(at..)?.first_chunk().copied()?) as usize);
     let (first, sizes) = (word(28)?, word(42)?);
