@@ -6,6 +6,10 @@
 pub(crate) use crate::arch::xor;
 use crate::error::Fault;
 
+/// Weights of a product for each word of a checksum: before and after together, a word takes two and a half instructions,
+/// so all words at most 3 % of those of a product at 2 bits.
+pub(crate) const WEIGHTS: usize = 112;
+
 /// A checksum of memory, while there is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Checksum(#[cfg(feature = "checksums")] Option<u32>);

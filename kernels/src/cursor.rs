@@ -34,7 +34,7 @@ impl Cursor {
 pub(crate) struct LinearCursor {
     /// Scale of the input, if known.
     pub(crate) scale: Option<Scale>,
-    /// Initialized outputs, if outputs are initialized before the rows.
+    /// Initialized outputs, if outputs are initialized before the rows; else the rows in the checksum `rows`.
     pub(crate) started: usize,
     /// Finished blocks.
     pub(crate) block: usize,

@@ -6,8 +6,9 @@
 
 use super::CostItem;
 use crate::cost;
-use crate::head::Watched;
+use crate::head::{Head, Watched};
 use crate::image::{Image, Op, OpKind, RowBlock};
+use crate::layout::STRIP;
 use crate::meter::{Meter, OutputStart, Work};
 
 /// Parts of an instruction in which budgets count, so that rounding up elements of a few instructions costs little.
@@ -20,6 +21,12 @@ const MARGIN: u32 = 32;
 const fn parts(cost: u32) -> u32 {
     let parts = cost / (1024 / PARTS) + 1;
     parts.saturating_add(parts / MARGIN)
+}
+
+/// Returns the most that a checksum costs, in 1024ths of an instruction: its words take less than values compared by
+/// magnitude.
+fn checksum(words: usize) -> u32 {
+    if cfg!(feature = "checksums") { cost::most(|add| cost::magnitude(words, add)) } else { 0 }
 }
 
 /// Cost of a piece, in parts of a budget.
@@ -50,12 +57,17 @@ impl PieceCost {
             ),
             Work::Magnitude(cols) => Self::new(cost::most(|add| cost::magnitude(cols, add)), 0),
             Work::Start(start) => Self::new(CostItem::BIASED.most(), cost::most(|add| cost::start(start, 1, add))),
-            Work::Prepare(shape) => Self::new(cost::most(|add| cost::prepare(shape, add)), 0),
+            Work::Prepare(shape) => {
+                Self::new(cost::most(|add| cost::prepare(shape, add)).saturating_add(checksum(shape.cols / 2)), 0)
+            }
             Work::Strips { shape, in_order, start } => {
                 let (first, each) = cost::strips(shape, in_order, start);
-                Self::new(first, each)
+                Self::new(first, each.saturating_add(checksum(STRIP)))
             }
-            Work::Act(image) => Self::new(cost::most(|add| cost::action(image, add)), 0),
+            Work::Act(image) => {
+                let saved = Head::regions_to_save(image).iter().map(|region| region.len).sum();
+                Self::new(cost::most(|add| cost::action(image, add)).saturating_add(checksum(saved)), 0)
+            }
         }
     }
 }
@@ -121,7 +133,8 @@ impl Image<'_> {
                     let bias = Work::Start(OutputStart::of(accumulate, !matrix.bias.is_empty()));
                     let first = least(Work::Magnitude(matrix.cols)).max(if start { 0 } else { least(bias) });
                     let watched = if Watched::may_be(&op) { Watched::of(self, &op) } else { None };
-                    let first = first.max(watched.map_or(0, |watched| least(watched.work())));
+                    let ends = |watched: Watched| least(watched.work()).max(least(Work::Magnitude(matrix.rows)));
+                    let first = first.max(watched.map_or(0, ends));
                     matrix.blocks().map(of_block).fold(first, u32::max)
                 }
                 _ => least(Work::Elements(&op)),

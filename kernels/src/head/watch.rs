@@ -5,16 +5,12 @@
 //! recurrent state, a chunk), of its prepared input, and of its finished rows. After it is prepared, its input
 //! itself is not covered: few networks need it again, as those with a sum of a layer's input and output without a norm.
 
-use crate::checksum::{Checksum, xor};
+use crate::checksum::{Checksum, WEIGHTS, xor};
 use crate::cursor::Cursor;
 use crate::error::Fault;
 use crate::image::{Image, Op, OpKind, Region};
 use crate::meter::{Meter, Work};
 use crate::ops::run;
-
-/// Weights of a product for each word of a checksum: before and after together, a word takes two and a half instructions,
-/// so all words at most 3 % of those of a product at 2 bits.
-const WEIGHTS: usize = 112;
 
 /// The words to watch during a product, besides its prepared input and its finished rows.
 #[derive(Clone, Copy)]
