@@ -5,6 +5,7 @@
 #[cfg(feature = "checksums")]
 pub(crate) use crate::arch::xor;
 use crate::error::Fault;
+use crate::meter::{Meter, Work};
 
 /// Weights of a product for each word of a checksum: before and after together, a word takes two and a half instructions,
 /// so all words at most 3 % of those of a product at 2 bits.
@@ -13,6 +14,13 @@ pub(crate) const WEIGHTS: usize = 112;
 /// A checksum of memory, while there is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Checksum(#[cfg(feature = "checksums")] Option<u32>);
+
+impl Checksum {
+    /// Returns the work of a checksum of words: a word takes less than half the time of a value compared by magnitude.
+    pub(crate) const fn work(words: usize) -> Work<'static> {
+        Work::Magnitude(words / 2)
+    }
+}
 
 #[cfg(feature = "checksums")]
 impl Checksum {
@@ -39,6 +47,18 @@ impl Checksum {
     pub(crate) fn check(self, sum: impl FnOnce() -> u32) -> Result<(), Fault> {
         if self.0.is_none_or(|before| before == sum()) { Ok(()) } else { Err(Fault::Damaged) }
     }
+
+    /// Does the same as [`Self::check`] for `words`; returns `false` if the budget has no room for it.
+    #[inline(never)]
+    pub(crate) fn holds(self, words: &[u32], budget: &mut impl Meter) -> Result<bool, Fault> {
+        if self.is_set() {
+            if budget.take(1, Self::work(words.len())) == 0 {
+                return Ok(false);
+            }
+            self.check(|| xor(words))?;
+        }
+        Ok(true)
+    }
 }
 
 #[cfg(not(feature = "checksums"))]
@@ -55,6 +75,11 @@ impl Checksum {
 
     pub(crate) fn check(self, _: impl FnOnce() -> u32) -> Result<(), Fault> {
         Ok(())
+    }
+
+    #[inline(always)]
+    pub(crate) fn holds(self, _: &[u32], _: &mut impl Meter) -> Result<bool, Fault> {
+        Ok(true)
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::CostItem;
 use crate::cost;
-use crate::head::{Head, Watched};
+use crate::head::Watched;
 use crate::image::{Image, Op, OpKind, RowBlock};
 use crate::layout::STRIP;
 use crate::meter::{Meter, OutputStart, Work};
@@ -23,10 +23,16 @@ const fn parts(cost: u32) -> u32 {
     parts.saturating_add(parts / MARGIN)
 }
 
-/// Returns the most that a checksum costs, in 1024ths of an instruction: its words take less than values compared by
-/// magnitude.
+/// Returns the most that a checksum costs, in 1024ths of an instruction; 0 in a build without.
+#[inline(always)]
 fn checksum(words: usize) -> u32 {
-    if cfg!(feature = "checksums") { cost::most(|add| cost::magnitude(words, add)) } else { 0 }
+    if cfg!(feature = "checksums") { magnitude(words / 2) } else { 0 }
+}
+
+/// Returns the most that the largest of values costs, in 1024ths of an instruction.
+#[inline(never)]
+fn magnitude(values: usize) -> u32 {
+    cost::most(|add| cost::magnitude(values, add))
 }
 
 /// Cost of a piece, in parts of a budget.
@@ -55,7 +61,7 @@ impl PieceCost {
                 cost::most(|add| cost::piece(op, add)),
                 cost::most(|add| cost::most_expensive_element(op, add)),
             ),
-            Work::Magnitude(cols) => Self::new(cost::most(|add| cost::magnitude(cols, add)), 0),
+            Work::Magnitude(values) => Self::new(magnitude(values), 0),
             Work::Start(start) => Self::new(CostItem::BIASED.most(), cost::most(|add| cost::start(start, 1, add))),
             Work::Prepare(shape) => {
                 Self::new(cost::most(|add| cost::prepare(shape, add)).saturating_add(checksum(shape.cols / 2)), 0)
@@ -65,8 +71,9 @@ impl PieceCost {
                 Self::new(first, each.saturating_add(checksum(STRIP)))
             }
             Work::Act(image) => {
-                let saved = Head::regions_to_save(image).iter().map(|region| region.len).sum();
-                Self::new(cost::most(|add| cost::action(image, add)).saturating_add(checksum(saved)), 0)
+                // At most all words are saved between steps.
+                let saved = checksum(image.scratch_words());
+                Self::new(cost::most(|add| cost::action(image, add)).saturating_add(saved), 0)
             }
         }
     }
@@ -133,8 +140,7 @@ impl Image<'_> {
                     let bias = Work::Start(OutputStart::of(accumulate, !matrix.bias.is_empty()));
                     let first = least(Work::Magnitude(matrix.cols)).max(if start { 0 } else { least(bias) });
                     let watched = if Watched::may_be(&op) { Watched::of(self, &op) } else { None };
-                    let ends = |watched: Watched| least(watched.work()).max(least(Work::Magnitude(matrix.rows)));
-                    let first = first.max(watched.map_or(0, ends));
+                    let first = first.max(watched.map_or(0, |watched| least(watched.work())));
                     matrix.blocks().map(of_block).fold(first, u32::max)
                 }
                 _ => least(Work::Elements(&op)),

@@ -114,7 +114,7 @@ impl Head<'_, '_> {
     }
 
     /// Regions of an image's arena that are saved.
-    pub(crate) fn regions_to_save(image: &Image<'_>) -> [Region; 3] {
+    pub(super) fn regions_to_save(image: &Image<'_>) -> [Region; 3] {
         let action = image.action().offset;
         let len = image.work().offset.saturating_sub(action);
         #[cfg(not(feature = "attention"))]

@@ -19,8 +19,6 @@ pub(crate) struct Watched {
     scratch: usize,
     /// Outputs, input and work area: all words but those to watch.
     others: [Region; 3],
-    /// `true` if these words are too many for the product.
-    is_partial: bool,
 }
 
 impl Watched {
@@ -45,28 +43,32 @@ impl Watched {
             others[1] = Region::default();
         }
         let quiet = others.iter().fold(scratch, |words, region| words.saturating_sub(region.len));
-        Some(Self { scratch, others, is_partial: own + quiet > most })
+        if own + quiet > most {
+            // Too many words for the product: all are others.
+            others[0] = Region { offset: 0, len: scratch };
+        }
+        Some(Self { scratch, others })
     }
 
-    /// Returns the work of the checksum, whose words take less time than values compared by magnitude.
+    /// Returns the work of the checksum.
     pub(crate) fn work(&self) -> Work<'static> {
-        Work::Magnitude(if self.is_partial { 0 } else { self.scratch })
+        Checksum::work(self.scratch)
     }
 
     #[inline(never)]
     fn sum(&self, arena: &[u32]) -> u32 {
-        if self.is_partial {
-            return 0;
-        }
         let (mut sum, mut from) = (0, 0);
-        loop {
-            let others = self.others.iter().filter(|region| region.len > 0 && region.offset >= from);
-            let next = others.min_by_key(|region| region.offset);
-            let end = next.map_or(self.scratch, |region| region.offset);
+        while from < self.scratch {
+            let [mut end, mut after] = [self.scratch; 2];
+            for region in &self.others {
+                if region.len > 0 && (from..end).contains(&region.offset) {
+                    (end, after) = (region.offset, region.end());
+                }
+            }
             sum ^= xor(arena.get(from..end).unwrap_or_default());
-            let Some(next) = next else { return sum };
-            from = next.end();
+            from = after;
         }
+        sum
     }
 }
 

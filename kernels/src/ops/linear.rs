@@ -5,7 +5,6 @@
 //! 3. `y = start + acc * (row_scale * x_scale)`, each operation rounded to f32. `start` is the bias; if the operation
 //!    accumulates, it is the sum of the old `y` and the bias. Rows that no block holds (0 bits) keep `start`.
 
-use core::mem::take;
 use core::ops::Range;
 
 use super::elementwise::copy_le;
@@ -249,23 +248,18 @@ impl Matrix<'_> {
                     return Ok(false);
                 }
             }
-            if at.input.is_set() {
-                if budget.take(1, Work::Magnitude(plan.words())) == 0 {
-                    return Ok(false);
-                }
-                at.input.check(|| xor(words.get(..plan.words()).unwrap_or_default()))?;
+            if !at.input.holds(words.get(..plan.words()).unwrap_or_default(), budget)? {
+                return Ok(false);
             }
             at.block += 1;
             (at.row, at.output) = (0, 0);
         }
-        if at.rows.is_set() {
-            if budget.take(1, Work::Magnitude(at.started)) == 0 {
-                return Ok(false);
-            }
-            let rows = y.get(..at.started).unwrap_or_default();
-            take(&mut at.rows).check(|| xor(bytemuck::must_cast_slice(rows)))?;
+        let summed = y.get(..at.started).unwrap_or_default();
+        let checked = at.rows.holds(bytemuck::must_cast_slice(summed), budget)?;
+        if checked {
+            at.rows = Checksum::default();
         }
-        Ok(true)
+        Ok(checked)
     }
 
     /// Sets outputs to their biases, or adds the biases to `accumulate`.
