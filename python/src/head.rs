@@ -2,7 +2,9 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use actq::runtime::prefix_bytes;
 use actq_batch::Batch;
+use actq_kernels::image::Cache;
 use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods as _};
 use numpy::{IntoPyArray as _, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
@@ -100,6 +102,41 @@ fn flags(mask: &Bound<'_, PyAny>, heads: usize) -> PyResult<Vec<bool>> {
 /// Returns the exception; the text of a head's error has that of its cause.
 fn raised(error: actq_batch::Error) -> PyErr {
     error!("{error}")
+}
+
+/// Keys or values of a cache.
+struct Part {
+    /// `None` if they are those of all robots.
+    robots: Option<usize>,
+    values: Vec<f32>,
+}
+
+impl Part {
+    /// Reads an array [tokens, heads, elements], or one such for each robot.
+    ///
+    /// # Errors
+    ///
+    /// The array's shape, if it has one.
+    fn of(given: &Bound<'_, PyAny>, cache: Cache) -> Result<Self, Option<Vec<usize>>> {
+        let array = floats(given).map_err(|_| None)?;
+        let robots = match *array.shape() {
+            [_, heads, dim] if [heads, dim] == [cache.heads, cache.dim] => None,
+            [n, _, heads, dim] if n > 0 && [heads, dim] == [cache.heads, cache.dim] => Some(n),
+            _ => return Err(Some(array.shape().to_vec())),
+        };
+        Ok(Self { robots, values: array.as_array().iter().copied().collect() })
+    }
+
+    /// Returns the values of a robot.
+    fn of_robot(&self, robot: usize) -> &[f32] {
+        match self.robots {
+            Some(n) => {
+                let len = self.values.len() / n;
+                &self.values[robot * len..][..len]
+            }
+            None => &self.values,
+        }
+    }
 }
 
 #[pymethods]
@@ -222,6 +259,55 @@ impl Head {
                 }
             };
             restored.map_err(raised)
+        })
+    }
+
+    /// Sets the prefix of all robots: keys and values of each cache, [tokens, heads, elements] of all or [n, ...] of each.
+    fn set_prefix(&self, py: Python<'_>, caches: Vec<(Bound<'_, PyAny>, Bound<'_, PyAny>)>) -> PyResult<()> {
+        let image = self.image.clone_ref(py);
+        let needed: Vec<Cache> = image.get().image()?.prefix_caches().collect();
+        if needed.is_empty() {
+            return Err(error!("the image reads no prefix; step the head without one"));
+        }
+        if caches.len() != needed.len() {
+            return Err(error!("{} caches of keys and values; the image's prefix has {}", caches.len(), needed.len()));
+        }
+        let mut arrays = Vec::new();
+        for (i, (cache, (keys, values))) in needed.iter().zip(&caches).enumerate() {
+            for (name, given) in [("keys", keys), ("values", values)] {
+                arrays.push(Part::of(given, *cache).map_err(|shape| match shape {
+                    Some(shape) => error!(
+                        "the {name} of cache {i} have the shape {shape:?}; pass [tokens, {1}, {2}] for all robots, or [n, \
+                         tokens, {1}, {2}], with at most {0} tokens",
+                        cache.slots, cache.heads, cache.dim
+                    ),
+                    None => error!("the {name} of cache {i} are not numbers"),
+                })?);
+            }
+        }
+        let robots = arrays.iter().find_map(|part| part.robots);
+        self.with(py, robots.unwrap_or(1), move |kept, states| {
+            let heads = kept.as_ref().map(Batch::heads).or(robots).unwrap_or(1);
+            if let Some(given) = arrays.iter().filter_map(|part| part.robots).find(|given| *given != heads) {
+                return Err(error!("keys or values of {given} robots for a head of {heads} states"));
+            }
+            let image = image.get().image()?;
+            let row = |robot: usize| {
+                let parts: Vec<_> =
+                    arrays.chunks(2).map(|pair| [pair[0].of_robot(robot), pair[1].of_robot(robot)]).collect();
+                prefix_bytes(&image, &parts).map_err(|error| error!("{error:#}"))
+            };
+            let rows = match robots {
+                Some(_) => (0..heads).map(row).collect::<PyResult<Vec<_>>>()?.concat(),
+                None => row(0)?.repeat(heads),
+            };
+            if let Some(batch) = kept {
+                return batch.set_prefix(&rows).map_err(raised);
+            }
+            let mut batch = states(heads)?;
+            batch.set_prefix(&rows).map_err(raised)?;
+            *kept = Some(batch);
+            Ok(())
         })
     }
 

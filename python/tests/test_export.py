@@ -52,15 +52,9 @@ def test_a_flow_policy_is_unrolled(flow, tmp_path):
     assert chunk.shape[0] == 1 and chunk.shape[2] == flow.act_len and np.isfinite(chunk).all()
 
 
-def recurrent(folder):
-    """Writes a policy folder with a normalization, an LSTM, a GRU, norms, a sum and a product."""
-    random, h = np.random.default_rng(6), 8
-    shapes = {
-        "mean": (5,), "scale": (5,),
-        "lstm.w_ih": (4 * h, 5), "lstm.w_hh": (4 * h, h), "lstm.b_ih": (4 * h,), "lstm.b_hh": (4 * h,),
-        "gru.w_ih": (3 * h, h), "gru.w_hh": (3 * h, h), "gru.b_ih": (3 * h,), "gru.b_hh": (3 * h,),
-        "ln.w": (h,), "ln.b": (h,), "rms.w": (h,), "out.w": (2, h), "out.b": (2,),
-    }  # fmt: skip
+def written(folder, policy, shapes):
+    """Writes a policy folder with tensors of random numbers."""
+    random = np.random.default_rng(6)
     tensors = {name: random.normal(size=shape).astype(np.float32) for name, shape in shapes.items()}
     header, at = {}, 0
     for name, tensor in tensors.items():
@@ -69,6 +63,19 @@ def recurrent(folder):
     text = json.dumps(header).encode()
     data = b"".join(tensor.tobytes() for tensor in tensors.values())
     (folder / "policy.safetensors").write_bytes(len(text).to_bytes(8, "little") + text + data)
+    (folder / "policy.json").write_text(json.dumps(policy))
+    return folder
+
+
+def recurrent(folder):
+    """Writes a policy folder with a normalization, an LSTM, a GRU, norms, a sum and a product."""
+    h = 8
+    shapes = {
+        "mean": (5,), "scale": (5,),
+        "lstm.w_ih": (4 * h, 5), "lstm.w_hh": (4 * h, h), "lstm.b_ih": (4 * h,), "lstm.b_hh": (4 * h,),
+        "gru.w_ih": (3 * h, h), "gru.w_hh": (3 * h, h), "gru.b_ih": (3 * h,), "gru.b_hh": (3 * h,),
+        "ln.w": (h,), "ln.b": (h,), "rms.w": (h,), "out.w": (2, h), "out.b": (2,),
+    }  # fmt: skip
     cell = ("w_ih", "w_hh", "b_ih", "b_hh")
     ops = [
         {"op": "normalize", "mean": "mean", "scale": "scale", "clip": 3.0},
@@ -82,9 +89,7 @@ def recurrent(folder):
         {"op": "mul", "with": "lstm"},
         {"op": "linear", "w": "out.w", "b": "out.b"},
     ]
-    policy = {"name": "recurrent", "obs_dim": 5, "act_dim": 2, "ops": ops}
-    (folder / "policy.json").write_text(json.dumps(policy))
-    return folder
+    return written(folder, {"name": "recurrent", "obs_dim": 5, "act_dim": 2, "ops": ops}, shapes)
 
 
 def test_a_recurrent_network_takes_and_gives_its_state(tmp_path):

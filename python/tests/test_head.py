@@ -12,7 +12,7 @@ import pytest
 
 import actq
 from conftest import UR3
-from test_export import quantized, recurrent
+from test_export import quantized, recurrent, written
 
 
 def served(command, path, observations):
@@ -206,3 +206,40 @@ def test_states_that_do_not_fit_change_nothing(image, mlp):
     assert empty.n is None
     with pytest.raises(actq.Error, match="state 0: saved state belongs to another image"):
         actq.Head(quantized(mlp, bits=3), 4).restore(other.state())
+
+
+def test_robots_have_their_own_prefix_until_the_next(tmp_path):
+    attention = {"op": "attention", "heads": 2, "kv_heads": 1, "dim": 4, "prefix": 5}
+    ops = [{"op": "linear", "w": "q"}, attention, {"op": "linear", "w": "o"}]
+    policy = {"name": "prefixed", "obs_dim": 3, "act_dim": 2, "ops": ops}
+    image = quantized(written(tmp_path, policy, {"q": (8, 3), "o": (2, 8)}))
+    assert "prefix        at most 5 tokens of 1 head of 4, from a host" in str(image.inspect())
+    random = np.random.default_rng(7)
+    rows, keys, values = (random.normal(size=shape).astype(np.float32) for shape in [(3, 3), (3, 2, 1, 4), (3, 2, 1, 4)])
+    head = actq.Head(image)
+    with pytest.raises(actq.Error, match="prefix"):
+        head(rows)
+    head.set_prefix([(keys, values)])
+    first = head(rows)
+    assert head.n == 3 and len(np.unique(first[:, 0])) == 3
+    head.reset()
+    assert np.array_equal(head(rows), first) and np.array_equal(copy.deepcopy(head)(rows), first)
+    # Alone, with arrays that have no axis of robots.
+    for robot in range(3):
+        alone = actq.Head(image)
+        alone.set_prefix([(keys[robot].tolist(), values[robot])])
+        assert np.array_equal(alone(rows[robot]), first[robot])
+    wrong = [
+        ([], "0 caches"),
+        ([(keys[..., :3], values)], r"keys of cache 0 have the shape \[3, 2, 1, 3\]"),
+        ([(keys[:2], values[:2])], "2 robots for a head of 3"),
+        ([(np.zeros((6, 1, 4)), np.zeros((6, 1, 4)))], "more tokens"),
+        ([(keys, np.full_like(values, np.nan))], "not finite"),
+        ([(keys, values[:, :1])], "cache 0"),
+    ]
+    for caches, message in wrong:
+        with pytest.raises(actq.Error, match=message):
+            head.set_prefix(caches)
+    assert np.array_equal(head(rows), first)
+    with pytest.raises(actq.Error, match="reads no prefix"):
+        actq.Head(quantized(recurrent(tmp_path))).set_prefix([(keys, values)])

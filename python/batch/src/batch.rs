@@ -152,14 +152,46 @@ impl Batch {
             return Err(Error::States { expected, given });
         }
         let len = expected / self.heads();
+        self.change(&before, |i, head| {
+            let restored = head.restore(&rows[i * len..][..len]);
+            restored.map_err(|error| Error::Saved { head: i, error })
+        })
+    }
+
+    /// Sets the prefix of each head, as [`Head::set_prefix`] does, from rows of [`Image::prefix_bytes`] bytes.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Prefixes`] if there is not one row for each head, and [`Error::Prefix`] for a row that
+    /// [`Head::set_prefix`] refuses: then every head keeps its prefix.
+    pub fn set_prefix(&mut self, rows: &[u8]) -> Result<(), Error> {
+        let len = self.image().prefix_bytes();
+        let (expected, given) = (self.heads() * len, rows.len());
+        if expected != given {
+            return Err(Error::Prefixes { expected, given });
+        }
+        let before = self.save()?;
+        self.change(&before, |i, head| {
+            let set = head.set_prefix(&rows[i * len..][..len]);
+            set.map_err(|error| Error::Prefix { head: i, error })
+        })
+    }
+
+    /// Clears the prefix of each head, as [`Head::clear_prefix`] does.
+    pub fn clear_prefix(&mut self) {
+        self.each(|_, head| head.clear_prefix());
+    }
+
+    /// Changes each head. After an error every head has its state of `before`, and the first error is returned.
+    fn change(
+        &mut self,
+        before: &[u8],
+        mut work: impl FnMut(usize, &mut Head<'_, '_>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         let mut failed = None;
-        self.each(|i, head| {
-            if let Err(error) = head.restore(&rows[i * len..][..len]) {
-                failed = failed.or(Some(Error::Saved { head: i, error }));
-            }
-        });
+        self.each(|i, head| failed = failed.or(work(i, head).err()));
         let Some(error) = failed else { return Ok(()) };
-        self.restore(&before)?;
+        self.restore(before)?;
         Err(error)
     }
 

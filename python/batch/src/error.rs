@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use actq_kernels::{ImageError, SavedError, StepError};
+use actq_kernels::{ImageError, PrefixError, SavedError, StepError};
 
 /// Why a batch was not made, or a call failed. [`Batch::step`](crate::Batch::step) says what an error leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +59,20 @@ pub enum Error {
         /// Its error.
         error: SavedError,
     },
+    /// The prefixes of all heads have another number of bytes.
+    Prefixes {
+        /// Bytes expected.
+        expected: usize,
+        /// Bytes given.
+        given: usize,
+    },
+    /// The prefix of a head was not set; it is the first of those.
+    Prefix {
+        /// Index of the head in the batch.
+        head: usize,
+        /// Its error.
+        error: PrefixError,
+    },
     /// A head gave no action; it is the first of those that gave none.
     Head {
         /// Index of the head in the batch.
@@ -86,6 +100,10 @@ impl fmt::Display for Error {
             Self::Seeds { expected, given } => write!(f, "{given} seeds were given; the batch has {expected} heads"),
             Self::States { expected, given } => write!(f, "the states have {given} bytes; the batch needs {expected}"),
             Self::Saved { head, error } => write!(f, "state {head}: {error}"),
+            Self::Prefixes { expected, given } => {
+                write!(f, "the prefixes have {given} bytes; the batch needs {expected}")
+            }
+            Self::Prefix { head, error } => write!(f, "prefix {head}: {error}"),
             Self::Head { head, error } => write!(f, "head {head}: {error}"),
         }
     }
@@ -96,6 +114,7 @@ impl std::error::Error for Error {
         match self {
             Self::Image(error) => Some(error),
             Self::Saved { error, .. } => Some(error),
+            Self::Prefix { error, .. } => Some(error),
             Self::Head { error, .. } => Some(error),
             _ => None,
         }

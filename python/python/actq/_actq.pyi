@@ -199,6 +199,15 @@ class Head:
         """
     def reset(self) -> None:
         """Resets every state: recurrent values, chunks, and the last action."""
+    def set_prefix(self, caches: Sequence[Tuple[npt.ArrayLike, npt.ArrayLike]]) -> None:
+        """Sets the keys and values that the image's attentions read as a prefix (docs/POLICY.md), until the next call.
+
+        caches: keys and values of each cache in the order of the attentions, each [tokens, heads, elements] of all robots, or
+            [n, tokens, heads, elements] of each. They are rounded to int8, as a controller gets them.
+
+        A reset keeps the prefix, and `state` has it. Raises `actq.Error` for an image without a prefix, another shape or
+        number, more tokens than the cache has, and values that are not finite: then nothing has changed.
+        """
     def state(self) -> npt.NDArray[np.uint8]:
         """Returns the states of all robots [n, bytes]: a row has everything besides the image that the robot's next actions
         depend on, as recurrent values, chunk, last action and the seed of noise.

@@ -85,6 +85,10 @@ pub fn report(image: &Image<'_>) -> String {
     let words = image.scratch_words();
     let state = 4 * image.state().len;
     let _ = writeln!(text, "scratch       {words} words ({} bytes), {state} bytes of them state", 4 * words);
+    for Cache { heads, dim, slots } in image.prefix_caches() {
+        let [tokens, heads] = [count(slots, "token"), count(heads, "head")];
+        let _ = writeln!(text, "prefix        at most {tokens} of {heads} of {dim}, from a host");
+    }
     let Peak { op, words, placed } = peak(image);
     let name = image.ops().nth(op).map_or("", |op| op.kind.name());
     let _ = writeln!(text, "values        {} bytes, {} of them in use at op {op} ({name})", 4 * placed, 4 * words);
