@@ -54,6 +54,9 @@ impl OutputStart {
 pub(crate) trait Meter {
     /// Takes as many of `units` as the budget allows, and returns their number.
     fn take(&mut self, units: usize, work: Work<'_>) -> usize;
+
+    /// Returns `false` if it allows all work.
+    fn is_limited(&self) -> bool;
 }
 
 /// No limit. A program without slices computes no cost and does not include the cost model.
@@ -64,5 +67,10 @@ impl Meter for Unlimited {
     #[inline(always)]
     fn take(&mut self, units: usize, _: Work<'_>) -> usize {
         units
+    }
+
+    #[inline(always)]
+    fn is_limited(&self) -> bool {
+        false
     }
 }

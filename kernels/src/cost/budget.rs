@@ -111,7 +111,12 @@ impl Budget {
 impl Meter for Budget {
     #[inline(always)]
     fn take(&mut self, units: usize, work: Work<'_>) -> usize {
-        if self.left == u32::MAX { units } else { self.take_priced(units, PieceCost::of(work)) }
+        if self.is_limited() { self.take_priced(units, PieceCost::of(work)) } else { units }
+    }
+
+    #[inline(always)]
+    fn is_limited(&self) -> bool {
+        self.left != u32::MAX
     }
 }
 

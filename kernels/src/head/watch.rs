@@ -92,6 +92,11 @@ pub(super) fn run_watched(
     if !run(op, arena, cursor, budget)? || budget.take(1, watched.work()) == 0 {
         return Ok(false);
     }
-    cursor.linear.quiet.check(|| watched.sum(arena))?;
+    let linear = &cursor.linear;
+    linear.rows.check(|| {
+        let rows = arena.get(op.dst().range()).and_then(|rows| rows.get(..linear.started));
+        xor(rows.unwrap_or_default())
+    })?;
+    linear.quiet.check(|| watched.sum(arena))?;
     Ok(true)
 }
