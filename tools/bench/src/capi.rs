@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use crate::firmware::cargo;
+use crate::firmware::{cargo, lock};
 
 /// Version of the packages.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -138,9 +138,7 @@ impl Core {
             folder.push(target.triple());
         }
         // The libraries of all features have one name: no other is built until this one has been read.
-        fs::create_dir_all(target_dir())?;
-        let lock = fs::File::create(target_dir().join("actq-capi.lock"))?;
-        lock.lock()?;
+        let _building = lock("actq-capi.lock")?;
         cargo("the C interface", &arguments, &[])?;
         let file = folder.join(profile).join("libactq_c.a");
         fs::read(&file).with_context(|| file.display().to_string())

@@ -173,6 +173,16 @@ pub fn portable_binary(name: &'static str, target: Target) -> Result<PathBuf> {
     Ok(build(BENCH, &[name], features, target, "firmware-portable", &[("ACTQ_BACKEND", "portable")])?.join(name))
 }
 
+/// Waits until no thread or process has this lock, and takes it until the file is dropped: other builds have other files of
+/// the same names.
+pub(crate) fn lock(name: &str) -> Result<fs::File> {
+    fs::create_dir_all(target_dir())?;
+    let path = target_dir().join(name);
+    let file = fs::File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
+    file.lock().with_context(|| format!("cannot lock {}", path.display()))?;
+    Ok(file)
+}
+
 /// Builds binaries of a package and returns the folder of their ELF files: a folder of the board and its features,
 /// because cargo uses the same names for all boards of a triple.
 fn build(
@@ -183,9 +193,8 @@ fn build(
     profile: &str,
     environment: &[(&str, &str)],
 ) -> Result<PathBuf> {
-    // Held until the files are where no other build replaces them.
-    static BUILDING: Mutex<()> = Mutex::new(());
-    let _building = BUILDING.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    // Until the files are where no other build replaces them.
+    let _building = lock("actq-firmware.lock")?;
     let mut arguments = vec!["--package", package, "--target", target.triple(), "--profile", profile];
     arguments.extend(["--features", features]);
     arguments.extend(binaries.iter().flat_map(|binary| ["--bin", binary]));
