@@ -38,6 +38,11 @@ impl Harness {
         Self::of(target, firmware::harness(target)?)
     }
 
+    /// Does the same as [`Self::build`] with a feature of the kernels.
+    pub fn build_with(target: Target, feature: &'static str) -> Result<Self> {
+        Self::of(target, firmware::harness_of(target, feature)?)
+    }
+
     /// Builds the counter for a firmware of this target.
     pub fn of(target: Target, elf: PathBuf) -> Result<Self> {
         Ok(Self { target, counter: Counter::build()?, code: Code::of(target, &elf)?, elf })

@@ -2,7 +2,7 @@
 
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::profile::Harness;
-use actq_bench::{Target, bits, firmware};
+use actq_bench::{Target, bits};
 use actq_kernels::cost::Rates;
 use actq_kernels::image::Cache;
 use actq_testkit::Random;
@@ -13,10 +13,6 @@ use crate::draft::Draft;
 
 /// Largest relative error of a predicted step, of which attention is the most.
 const ERROR: f64 = 0.015;
-
-fn harness(target: Target) -> Result<Harness> {
-    Harness::of(target, firmware::harness_of(target, "attention")?)
-}
 
 /// Returns observations for a ring that wraps around, some of them large or zero.
 fn observations(attention: &Attention, random: &mut Random) -> Vec<Vec<f32>> {
@@ -41,7 +37,7 @@ fn attentions() -> Vec<Attention> {
 #[test]
 fn every_core_has_the_hosts_bits() -> Result<()> {
     for target in [Target::Fpu, Target::NoFpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M55] {
-        let harness = harness(target)?;
+        let harness = Harness::build_with(target, "attention")?;
         let mut random = Random::new(12);
         for attention in attentions() {
             let (image, observations) = (Draft(attention.image()), observations(&attention, &mut random));
@@ -65,7 +61,7 @@ fn every_core_has_the_hosts_bits() -> Result<()> {
 #[test]
 fn every_core_has_the_hosts_bits_of_a_prefix() -> Result<()> {
     for target in [Target::Fpu, Target::NoFpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M55] {
-        let harness = harness(target)?;
+        let harness = Harness::build_with(target, "attention")?;
         let mut random = Random::new(14);
         for _ in 0..4 {
             let prefixed = Prefixed::draw(&mut random);
@@ -104,7 +100,7 @@ fn context(slots: usize) -> Attention {
 /// A step with a full ring: it costs a constant, and a constant for each token of the context.
 #[test]
 fn the_cost_grows_with_the_context() -> Result<()> {
-    let harness = harness(Target::Fpu)?;
+    let harness = Harness::build_with(Target::Fpu, "attention")?;
     let (mut counted, mut wrong) = (Vec::new(), Vec::new());
     for slots in [1, 2, 4, 8, 16, 32, 64] {
         let attention = context(slots);

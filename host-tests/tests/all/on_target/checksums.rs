@@ -2,7 +2,7 @@
 
 use actq::policy::Policy;
 use actq_bench::profile::Harness;
-use actq_bench::{Target, bits, firmware, ur3};
+use actq_bench::{Target, bits, ur3};
 use actq_kernels::cost::Cost;
 use anyhow::{Result, ensure};
 
@@ -13,8 +13,8 @@ const PRICE: f64 = 0.03;
 
 #[test]
 fn checksums_take_at_most_three_percent_of_a_step() -> Result<()> {
-    let plain = Harness::of(Target::Fpu, firmware::harness(Target::Fpu)?)?;
-    let checked = Harness::of(Target::Fpu, firmware::harness_of(Target::Fpu, "checksums")?)?;
+    let plain = Harness::build(Target::Fpu)?;
+    let checked = Harness::build_with(Target::Fpu, "checksums")?;
     let policy = Policy::load(&ur3())?;
     let observations = &observations(&ur3(), &policy)?[..5];
     for width in [2.0, 3.0] {

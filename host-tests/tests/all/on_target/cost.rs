@@ -15,7 +15,7 @@ use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::networks::Builder;
 use actq_bench::profile::Harness;
 use actq_bench::qemu;
-use actq_bench::{Target, bits, firmware, shared_policies, ur3};
+use actq_bench::{Target, bits, shared_policies, ur3};
 use actq_kernels::cost::{Core, Cost, Rates};
 use actq_kernels::image::Kind;
 use actq_kernels::{StepError, Width};
@@ -191,11 +191,6 @@ pub(super) fn polls_keep_their_budget(
     Ok(tried)
 }
 
-/// The harness with checksums, as a host's least budget counts them.
-fn checked() -> Result<Harness> {
-    Harness::of(Target::Fpu, firmware::harness_of(Target::Fpu, "checksums")?)
-}
-
 /// Budgets of an image with this least one.
 fn budgets(least: u32) -> Vec<u32> {
     vec![2_000, 5_000, 20_000, least]
@@ -203,7 +198,9 @@ fn budgets(least: u32) -> Vec<u32> {
 
 #[test]
 fn polls_stay_within_their_budget() -> Result<()> {
-    let tried = polls_keep_their_budget(&checked()?, &ur3(), &images(), budgets)?;
+    // A host's least budget counts checksums.
+    let harness = Harness::build_with(Target::Fpu, "checksums")?;
+    let tried = polls_keep_their_budget(&harness, &ur3(), &images(), budgets)?;
     ensure!(tried >= 10, "only {tried} budgets were not below the least");
     Ok(())
 }
@@ -211,7 +208,7 @@ fn polls_stay_within_their_budget() -> Result<()> {
 #[test]
 fn polls_of_shared_policies_stay_within_their_budget() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
-    let harness = checked()?;
+    let harness = Harness::build_with(Target::Fpu, "checksums")?;
     for name in ["go1_mlp", "g1_lstm256", "fetch_pickplace"] {
         let images = [distill(2.0), rtn(Width::W4, 32, Activations::Int8)];
         polls_keep_their_budget(&harness, &policies.join(name), &images, budgets)?;

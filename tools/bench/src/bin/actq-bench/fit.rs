@@ -18,7 +18,7 @@ use actq::random::Random;
 use actq::runtime::ImageBuffer;
 use actq_bench::networks::Builder;
 use actq_bench::profile::Harness;
-use actq_bench::{Target, firmware, root};
+use actq_bench::{Target, root};
 use actq_cli::outputs::files;
 use actq_kernels::Width;
 use actq_kernels::cost::{self, CORES, Core, Cost, CostItem};
@@ -65,7 +65,7 @@ fn of_core(core: Core, only: Option<&str>, all: &mut BTreeMap<CostItem, Row>) ->
             bail!("the rates of {} are those of {}", core.name(), core.measured().name())
         }
     };
-    let attention = Harness::of(target, firmware::harness_of(target, "attention")?)?;
+    let attention = Harness::build_with(target, "attention")?;
     // Only images of attention are measured without the other.
     let others = if only == Some("attention") { None } else { Some(Harness::build(target)?) };
     let harness = others.as_ref().unwrap_or(&attention);
