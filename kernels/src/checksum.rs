@@ -16,9 +16,14 @@ pub(crate) const WEIGHTS: usize = 112;
 pub(crate) struct Checksum(#[cfg(feature = "checksums")] Option<u32>);
 
 impl Checksum {
-    /// Returns the work of a checksum of words: a word takes less than half the time of a value compared by magnitude.
+    /// Returns a number of values: comparing them by magnitude takes longer than a checksum of this number of words.
+    pub(crate) const fn values(words: usize) -> usize {
+        words / 2
+    }
+
+    /// Returns the work of a checksum of words.
     pub(crate) const fn work(words: usize) -> Work<'static> {
-        Work::Magnitude(words / 2)
+        Work::Magnitude(Self::values(words))
     }
 }
 

@@ -5,6 +5,7 @@
 //! neither takes longer than a strip of the rows that it is prepared for.
 
 use super::CostItem;
+use crate::checksum::Checksum;
 use crate::cost;
 use crate::head::Watched;
 use crate::image::{Image, Op, OpKind, RowBlock};
@@ -26,7 +27,7 @@ const fn parts(cost: u32) -> u32 {
 /// Returns the most that a checksum costs, in 1024ths of an instruction; 0 in a build without.
 #[inline(always)]
 fn checksum(words: usize) -> u32 {
-    if cfg!(feature = "checksums") { magnitude(words / 2) } else { 0 }
+    if cfg!(feature = "checksums") { magnitude(Checksum::values(words)) } else { 0 }
 }
 
 /// Returns the most that the largest of values costs, in 1024ths of an instruction.

@@ -2,8 +2,9 @@
 //! meanwhile ends the step.
 //!
 //! Three checksums cover it: of the words that the product does not write (values that later operations add, the
-//! recurrent state, a chunk), of its prepared input, and of its finished rows. After it is prepared, its input
-//! itself is not covered: few networks need it again, as those with a sum of a layer's input and output without a norm.
+//! recurrent state, a chunk), of its prepared input unless that is for few rows, and of its finished rows. After it is
+//! prepared, its input itself is not covered: few networks need it again, as those with a sum of a layer's input and output
+//! without a norm.
 
 use crate::checksum::{Checksum, WEIGHTS, xor};
 use crate::cursor::Cursor;
@@ -22,7 +23,7 @@ pub(crate) struct Watched {
 }
 
 impl Watched {
-    /// Returns `true` for a product, if the build watches any.
+    /// Returns `true` for a product, if the build watches any. (Not a part of [`Self::of`], whose result a caller would copy.)
     #[inline(always)]
     pub(crate) fn may_be(op: &Op<'_>) -> bool {
         cfg!(feature = "checksums") && matches!(op.kind, OpKind::Linear { .. })
