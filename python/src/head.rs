@@ -69,6 +69,22 @@ impl Head {
     }
 }
 
+/// Changes the states, or those of `heads` robots in their beginning if there are none yet: these are kept unless it fails.
+fn change(
+    kept: &mut Option<Batch>,
+    states: States<'_>,
+    heads: usize,
+    work: impl FnOnce(&mut Batch) -> Result<(), actq_batch::Error>,
+) -> PyResult<()> {
+    if let Some(batch) = kept {
+        return work(batch).map_err(raised);
+    }
+    let mut batch = states(heads)?;
+    work(&mut batch).map_err(raised)?;
+    *kept = Some(batch);
+    Ok(())
+}
+
 /// Makes the head that was copied or pickled.
 #[pyfunction]
 pub(crate) fn head_of_states(
@@ -112,17 +128,19 @@ struct Part {
 }
 
 impl Part {
-    /// Reads an array [tokens, heads, elements], or one such for each robot.
-    ///
-    /// # Errors
-    ///
-    /// The array's shape, if it has one.
-    fn of(given: &Bound<'_, PyAny>, cache: Cache) -> Result<Self, Option<Vec<usize>>> {
-        let array = floats(given).map_err(|_| None)?;
+    /// Reads an array [tokens, heads, elements], or one such for each robot. Errors begin with `name`.
+    fn of(name: &str, given: &Bound<'_, PyAny>, Cache { heads, dim, slots }: Cache) -> PyResult<Self> {
+        let array = floats(given)?;
         let robots = match *array.shape() {
-            [_, heads, dim] if [heads, dim] == [cache.heads, cache.dim] => None,
-            [n, _, heads, dim] if n > 0 && [heads, dim] == [cache.heads, cache.dim] => Some(n),
-            _ => return Err(Some(array.shape().to_vec())),
+            [_, h, d] if [h, d] == [heads, dim] => None,
+            [n, _, h, d] if n > 0 && [h, d] == [heads, dim] => Some(n),
+            _ => {
+                return Err(error!(
+                    "{name} have the shape {:?}; pass [tokens, {heads}, {dim}] for all robots, or [n, tokens, {heads}, \
+                     {dim}], with at most {slots} tokens",
+                    array.shape()
+                ));
+            }
         };
         Ok(Self { robots, values: array.as_array().iter().copied().collect() })
     }
@@ -185,22 +203,14 @@ impl Head {
         let observations: Vec<f32> = observations.as_array().iter().copied().collect();
         let act_len = self.act_len;
         let actions = self.with(py, heads, move |kept, states| {
-            let is_new = kept.is_none();
-            let batch = match &mut *kept {
-                Some(batch) => batch,
-                none => none.insert(states(heads)?),
-            };
-            if batch.heads() != heads {
+            if let Some(batch) = kept
+                && batch.heads() != heads
+            {
                 return Err(error!("{heads} observations for a head of {} states; make another head", batch.heads()));
             }
             let mut actions = vec![0.0; heads * act_len];
-            if let Err(error) = batch.step(&observations, reset.as_deref(), &mut actions) {
-                // Observations that fail do not decide how many states there are.
-                if is_new {
-                    *kept = None;
-                }
-                return Err(raised(error));
-            }
+            // Observations that fail do not decide how many states there are.
+            change(kept, states, heads, |batch| batch.step(&observations, reset.as_deref(), &mut actions))?;
             Ok(actions)
         })?;
         actions.into_pyarray(py).reshape(shape)
@@ -246,19 +256,12 @@ impl Head {
         }
         let bytes: Vec<u8> = rows.readonly().as_array().iter().copied().collect();
         self.with(py, heads, move |kept, states| {
-            let restored = match kept {
-                Some(batch) if batch.heads() != heads => {
-                    return Err(error!("{heads} states for a head of {}; make another head", batch.heads()));
-                }
-                Some(batch) => batch.restore(&bytes),
-                none => {
-                    let mut batch = states(heads)?;
-                    let restored = batch.restore(&bytes);
-                    *none = Some(batch).filter(|_| restored.is_ok());
-                    restored
-                }
-            };
-            restored.map_err(raised)
+            if let Some(batch) = kept
+                && batch.heads() != heads
+            {
+                return Err(error!("{heads} states for a head of {}; make another head", batch.heads()));
+            }
+            change(kept, states, heads, |batch| batch.restore(&bytes))
         })
     }
 
@@ -272,42 +275,28 @@ impl Head {
         if caches.len() != needed.len() {
             return Err(error!("{} caches of keys and values; the image's prefix has {}", caches.len(), needed.len()));
         }
-        let mut arrays = Vec::new();
-        for (i, (cache, (keys, values))) in needed.iter().zip(&caches).enumerate() {
-            for (name, given) in [("keys", keys), ("values", values)] {
-                arrays.push(Part::of(given, *cache).map_err(|shape| match shape {
-                    Some(shape) => error!(
-                        "the {name} of cache {i} have the shape {shape:?}; pass [tokens, {1}, {2}] for all robots, or [n, \
-                         tokens, {1}, {2}], with at most {0} tokens",
-                        cache.slots, cache.heads, cache.dim
-                    ),
-                    None => error!("the {name} of cache {i} are not numbers"),
-                })?);
-            }
-        }
-        let robots = arrays.iter().find_map(|part| part.robots);
+        let parts = needed.into_iter().zip(&caches).enumerate().map(|(i, (cache, (keys, values)))| {
+            let of = |name: &str, given| Part::of(&format!("the {name} of cache {i}"), given, cache);
+            Ok([of("keys", keys)?, of("values", values)?])
+        });
+        let parts = parts.collect::<PyResult<Vec<_>>>()?;
+        let robots = parts.iter().flatten().find_map(|part| part.robots);
         self.with(py, robots.unwrap_or(1), move |kept, states| {
             let heads = kept.as_ref().map(Batch::heads).or(robots).unwrap_or(1);
-            if let Some(given) = arrays.iter().filter_map(|part| part.robots).find(|given| *given != heads) {
+            if let Some(given) = parts.iter().flatten().filter_map(|part| part.robots).find(|given| *given != heads) {
                 return Err(error!("keys or values of {given} robots for a head of {heads} states"));
             }
             let image = image.get().image()?;
             let row = |robot: usize| {
-                let parts: Vec<_> =
-                    arrays.chunks(2).map(|pair| [pair[0].of_robot(robot), pair[1].of_robot(robot)]).collect();
-                prefix_bytes(&image, &parts).map_err(|error| error!("{error:#}"))
+                let of_robot: Vec<_> =
+                    parts.iter().map(|pair| pair.each_ref().map(|part| part.of_robot(robot))).collect();
+                prefix_bytes(&image, &of_robot).map_err(|error| error!("{error:#}"))
             };
             let rows = match robots {
                 Some(_) => (0..heads).map(row).collect::<PyResult<Vec<_>>>()?.concat(),
                 None => row(0)?.repeat(heads),
             };
-            if let Some(batch) = kept {
-                return batch.set_prefix(&rows).map_err(raised);
-            }
-            let mut batch = states(heads)?;
-            batch.set_prefix(&rows).map_err(raised)?;
-            *kept = Some(batch);
-            Ok(())
+            change(kept, states, heads, |batch| batch.set_prefix(&rows))
         })
     }
 
