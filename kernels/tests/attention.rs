@@ -12,7 +12,7 @@ use actq_kernels::image::Cache;
 use actq_kernels::math::exp;
 use actq_kernels::{Head, Image, PrefixError, StepError};
 use actq_testkit::Random;
-use common::{Attention, Prefixed, on_head};
+use common::{Attention, Prefixed, on_head, own_len};
 
 /// Attentions in each test.
 const CASES: usize = if cfg!(miri) { 4 } else { 600 };
@@ -177,10 +177,10 @@ fn outputs_are_near_the_exact_ones() {
 #[test]
 fn the_largest_sizes_fit_their_sums() {
     // All integers at one end of their range.
-    let cache = Cache { heads: 1, dim: 120, slots: 512 };
+    let cache = Cache { heads: 1, dim: 120, slots: 512, own: 0 };
     let attention =
         Attention { heads: 1, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: false, factor: 1e-6 };
-    let wide = Attention { cache: Cache { heads: 1, dim: 512, slots: 120 }, ..attention };
+    let wide = Attention { cache: Cache { heads: 1, dim: 512, slots: 120, own: 0 }, ..attention };
     for attention in [attention, wide] {
         let observation = vec![-1.0; attention.lengths().iter().sum()];
         on_head(&attention.image(), |head| {
@@ -230,7 +230,7 @@ fn in_polls(head: &mut Head<'_, '_>, observation: &[f32]) -> (Result<Vec<f32>, S
 
 #[test]
 fn an_overflow_fails_the_step_and_is_forgotten() {
-    let cache = Cache { heads: 1, dim: 3, slots: 4 };
+    let cache = Cache { heads: 1, dim: 3, slots: 4, own: 0 };
     let attention =
         Attention { heads: 1, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: false, factor: 1.0 };
     let finite = [1.0f32; 9];
@@ -275,7 +275,7 @@ fn the_self_test_wraps_around() {
 
 #[test]
 fn zeros_have_equal_weights() {
-    let cache = Cache { heads: 2, dim: 4, slots: 3 };
+    let cache = Cache { heads: 2, dim: 4, slots: 3, own: 0 };
     let attention =
         Attention { heads: 4, cache, tokens: 3, is_ring: false, is_causal: true, is_rotated: false, factor: 0.5 };
     let [queries, keys, values] = attention.lengths();
@@ -314,14 +314,18 @@ fn a_cache_of_any_content_does_not_panic() {
 
 /// Returns the outputs of a prefix's attentions, the queries of each but the first being the outputs before it.
 fn plain_prefixed(prefixed: &Prefixed, observation: &[f32], keys_and_values: &[[Vec<f32>; 2]]) -> Vec<f32> {
-    let mut outputs = observation.to_vec();
+    let (queries, mut own) = observation.split_at(prefixed.len());
+    let mut outputs = queries.to_vec();
     for (cache, [keys, values]) in prefixed.caches.iter().zip(keys_and_values) {
+        let mut part = || own.split_off(..own_len(cache)).expect("keys or values of its own");
+        let (keys, values) = ([keys, part()].concat(), [values, part()].concat());
         let heads: Vec<Pair> =
             keys.chunks(cache.dim).zip(values.chunks(cache.dim)).map(|(k, v)| (k.to_vec(), v.to_vec())).collect();
         let of_unit = |(unit, query): (usize, &[f32])| {
             let shared = unit % prefixed.heads / (prefixed.heads / cache.heads);
-            let seen: Vec<&Pair> = heads.iter().skip(shared).step_by(cache.heads).collect();
-            plain(prefixed.factor, query, &seen)
+            let later = if prefixed.is_causal { prefixed.tokens - 1 - unit / prefixed.heads } else { 0 };
+            let all: Vec<&Pair> = heads.iter().skip(shared).step_by(cache.heads).collect();
+            plain(prefixed.factor, query, &all[..all.len() - later])
         };
         outputs = outputs.chunks(cache.dim).enumerate().flat_map(of_unit).collect();
     }
@@ -344,7 +348,7 @@ fn a_prefix_gives_the_documented_bits() {
                 head.set_prefix(&prefixed.bytes(&keys_and_values)).expect("it is the image's");
                 // It stays over steps, slices and a reset.
                 for _ in 0..2 {
-                    let observation = drawn(&mut random, prefixed.len());
+                    let observation = drawn(&mut random, prefixed.obs_len());
                     let expected = plain_prefixed(&prefixed, &observation, &keys_and_values);
                     assert_eq!(head.step(&observation), Ok(&expected[..]), "{prefixed:?}");
                     assert_eq!(in_polls(head, &observation).0, Ok(expected), "{prefixed:?}");
@@ -357,8 +361,9 @@ fn a_prefix_gives_the_documented_bits() {
 
 /// Two caches, and the words before the second.
 fn two() -> (Prefixed, usize) {
-    let cache = Cache { heads: 2, dim: 3, slots: 5 };
-    let prefixed = Prefixed { heads: 4, caches: vec![cache, Cache { slots: 3, ..cache }], tokens: 2, factor: 0.5 };
+    let cache = Cache { heads: 2, dim: 3, slots: 5, own: 0 };
+    let caches = vec![cache, Cache { slots: 3, ..cache }];
+    let prefixed = Prefixed { heads: 4, caches, tokens: 2, is_causal: false, factor: 0.5 };
     (prefixed, cache.words())
 }
 
@@ -450,7 +455,7 @@ fn a_wrong_prefix_leaves_the_one_before() {
 
 #[test]
 fn only_whole_finite_tokens_fill_a_cache() {
-    let cache = Cache { heads: 2, dim: 3, slots: 4 };
+    let cache = Cache { heads: 2, dim: 3, slots: 4, own: 0 };
     let mut words = vec![0; cache.words()];
     let length = |given| Err(PrefixError::Length { needed: 24, given });
     assert_eq!(cache.fill(&[1.0; 24], &[1.0; 24], &mut words), Ok(()));
@@ -480,8 +485,13 @@ fn a_prefix_has_the_bits_of_keep() {
         let observation = drawn(&mut random, kept.lengths().iter().sum());
         let (queries, rest) = observation.split_at(kept.lengths()[0]);
         let (keys, values) = rest.split_at(kept.lengths()[1]);
-        let prefixed =
-            Prefixed { heads: kept.heads, caches: vec![kept.cache], tokens: kept.tokens, factor: kept.factor };
+        let prefixed = Prefixed {
+            heads: kept.heads,
+            caches: vec![kept.cache],
+            tokens: kept.tokens,
+            is_causal: false,
+            factor: kept.factor,
+        };
         let bytes = prefixed.bytes(&[[keys.to_vec(), values.to_vec()]]);
         let expected = on_head(&kept.image(), |head| head.step(&observation).map(<[f32]>::to_vec));
         on_head(&prefixed.image(), |head| {

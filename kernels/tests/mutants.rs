@@ -24,11 +24,12 @@ const VALID: &[u8] = include_bytes!("valid.actq");
 
 /// Returns the valid images: that of all sections, and attention to a ring, to all tokens of a step, and to a prefix.
 fn valid() -> Vec<Draft> {
-    let cache = Cache { heads: 2, dim: 6, slots: 4 };
+    let cache = Cache { heads: 2, dim: 6, slots: 4, own: 0 };
     let ring = Attention { heads: 4, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: true, factor: 0.4 };
     let whole = Attention { tokens: 3, is_ring: false, is_causal: true, ..ring };
     let attentions = [ring, whole].map(|attention| Draft(attention.image()));
-    let prefixed = Prefixed { heads: 4, caches: vec![cache, Cache { slots: 2, ..cache }], tokens: 3, factor: 0.4 };
+    let caches = vec![cache, Cache { own: 3, ..cache }];
+    let prefixed = Prefixed { heads: 4, caches, tokens: 3, is_causal: false, factor: 0.4 };
     let images = attentions.into_iter().chain([Draft(prefixed.image())]);
     [Draft::of(VALID)].into_iter().chain(images).collect()
 }

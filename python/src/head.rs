@@ -129,7 +129,8 @@ struct Part {
 
 impl Part {
     /// Reads an array [tokens, heads, elements], or one such for each robot. Errors begin with `name`.
-    fn of(name: &str, given: &Bound<'_, PyAny>, Cache { heads, dim, slots }: Cache) -> PyResult<Self> {
+    fn of(name: &str, given: &Bound<'_, PyAny>, cache: Cache) -> PyResult<Self> {
+        let (Cache { heads, dim, .. }, slots) = (cache, cache.prefix_slots());
         let array = floats(given)?;
         let robots = match *array.shape() {
             [_, h, d] if [h, d] == [heads, dim] => None,

@@ -46,7 +46,7 @@ impl ImageBuffer {
 /// Returns the values of an image's prefix in a recording's row, which follow the observation: for each cache its keys, then
 /// its values, of all slots.
 pub fn prefix_len(image: &Image<'_>) -> usize {
-    image.prefix_caches().map(|cache| 2 * cache.slots * cache.heads * cache.dim).sum()
+    image.prefix_caches().map(|cache| 2 * cache.prefix_slots() * cache.heads * cache.dim).sum()
 }
 
 /// Splits the [`prefix_len`] values of a row into keys and values of each cache.
@@ -57,7 +57,7 @@ pub fn keys_and_values<'r>(image: &Image<'_>, mut values: &'r [f32]) -> Vec<(Cac
         part
     };
     let of_cache = |cache: Cache| {
-        let len = cache.slots * cache.heads * cache.dim;
+        let len = cache.prefix_slots() * cache.heads * cache.dim;
         (cache, [part(len), part(len)])
     };
     image.prefix_caches().map(of_cache).collect()

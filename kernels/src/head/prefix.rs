@@ -25,7 +25,7 @@ impl Head<'_, '_> {
         for cache in self.image.prefix_caches() {
             let (this, after) = rest.split_at_checked(cache.words()).unwrap_or_default();
             let (count, after_count) = this.split_first().ok_or(PrefixError::Tokens)?;
-            if !(1..=cache.slots).contains(&(u32::from_le_bytes(*count) as usize)) {
+            if !(1..=cache.prefix_slots()).contains(&(u32::from_le_bytes(*count) as usize)) {
                 return Err(PrefixError::Tokens);
             }
             let scales = after_count.iter().take(cache.scales());
@@ -69,7 +69,7 @@ impl Head<'_, '_> {
         let mut at = region.offset;
         for cache in self.image.prefix_caches() {
             if let Some((count, rest)) = self.arena.get_mut(at..).and_then(<[u32]>::split_first_mut) {
-                *count = cache.slots as u32;
+                *count = cache.prefix_slots() as u32;
                 rest.iter_mut().take(cache.scales()).for_each(|scale| *scale = (1.0f32 / 128.0).to_bits());
             }
             at = at.wrapping_add(cache.words());

@@ -23,6 +23,8 @@ pub struct Cache {
     pub dim: usize,
     /// Tokens that it has room for.
     pub slots: usize,
+    /// Of these, tokens of the network itself after those of a prefix, new in each evaluation; 0 for most caches.
+    pub own: usize,
 }
 
 impl Cache {
@@ -32,6 +34,16 @@ impl Cache {
         let keys = self.slots.saturating_mul(2 + self.key_words());
         let values = self.value_rows().saturating_mul(self.row_words());
         1 + product([self.heads, keys.saturating_add(values), 1])
+    }
+
+    /// Returns the most tokens of a prefix: all but the network's own.
+    pub const fn prefix_slots(self) -> usize {
+        self.slots.saturating_sub(self.own)
+    }
+
+    /// Returns the tokens of an evaluation that the network writes to a cache which is no ring.
+    pub(crate) const fn kept(self) -> usize {
+        if self.own > 0 { self.own } else { self.slots }
     }
 
     /// Returns the words of the scales, which follow the count.
@@ -120,8 +132,8 @@ impl Op<'_> {
     /// Returns the cache of an operation of attention.
     pub fn cache(&self) -> Cache {
         let first = usize::from(self.kind == OpKind::Attend);
-        let [heads, dim, slots] = [0, 1, 2].map(|i| self.half(first + i));
-        Cache { heads, dim, slots }
+        let [heads, dim, slots, flags] = [0, 1, 2, 3].map(|i| self.half(first + i));
+        Cache { heads, dim, slots, own: flags >> 1 }
     }
 
     /// Returns the heads of [`OpKind::Rotary`] and the dimension of a head.
@@ -166,7 +178,7 @@ impl Op<'_> {
         match self.kind {
             OpKind::Attend => [src.len, third.len] = [dst.len, cache.words()],
             OpKind::Keep => {
-                let tokens = if is_ring { 1 } else { cache.slots };
+                let tokens = if is_ring { 1 } else { cache.kept() };
                 [src.len, third.len] = [product([tokens, cache.heads, cache.dim]); 2];
             }
             _ => {}

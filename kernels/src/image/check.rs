@@ -150,6 +150,8 @@ impl<'a> Image<'a> {
             finite: h::WORDS,
             #[cfg(feature = "attention")]
             prefix: self.prefix().offset,
+            #[cfg(feature = "attention")]
+            kept: None,
         };
         for i in 0..self.matrix_count() {
             check_matrix(self.matrix_at(i), front, self.work().len)?;
@@ -310,19 +312,30 @@ impl<'a> Image<'a> {
         Ok(written.max(dst.end()))
     }
 
-    /// Checks that an operation has no word of the prefix, or that it is an attention to the next cache of it.
+    /// Checks that an operation has no word of the prefix, or that it is an attention to the next cache of it, or writes the
+    /// network's own tokens to that cache before.
     #[cfg(feature = "attention")]
     #[inline(never)]
     fn check_prefix(&self, op: &Op<'_>, front: &mut Front<'a>) -> Result<(), ImageError> {
         let (prefix, [dst, src, third]) = (self.prefix(), op.regions);
-        let is_next = op.reads_prefix(prefix) && third.offset == front.prefix;
-        if dst.overlaps(prefix) || src.overlaps(prefix) || !is_next && third.overlaps(prefix) {
-            return Err(ImageError::Overlap);
+        let touches = |regions: &[Region]| regions.iter().any(|region| region.overlaps(prefix));
+        match op.kind {
+            OpKind::Keep if op.cache().own > 0 => {
+                let is_next = dst.offset == front.prefix && dst.end() <= prefix.end() && front.kept.is_none();
+                front.kept = Some(op.cache());
+                if is_next && !touches(&[src, third]) { Ok(()) } else { Err(ImageError::Overlap) }
+            }
+            OpKind::Attend if op.reads_prefix(prefix) || op.cache().own > 0 => {
+                if third.offset != front.prefix || touches(&[dst, src]) {
+                    return Err(ImageError::Overlap);
+                }
+                front.prefix = third.end();
+                let own = Some(op.cache()).filter(|cache| cache.own > 0);
+                if front.kept.take() == own { Ok(()) } else { Err(ImageError::Unwritten) }
+            }
+            _ if touches(&[dst, src, third]) => Err(ImageError::Overlap),
+            _ => Ok(()),
         }
-        if is_next {
-            front.prefix = third.end();
-        }
-        Ok(())
     }
 
     /// Checks an operation of attention: its sizes, and that the work area has room for a head.
@@ -341,14 +354,15 @@ impl<'a> Image<'a> {
         }
         let (cache, [dst, _, third]) = (op.cache(), op.regions);
         let heads = if op.kind == OpKind::Attend { op.query_heads() } else { cache.heads };
-        if [heads, cache.heads, cache.dim, cache.slots].contains(&0) || !heads.is_multiple_of(cache.heads) {
+        // With room for a token of a prefix, if there are tokens after it.
+        if [heads, cache.heads, cache.dim, cache.prefix_slots()].contains(&0) || !heads.is_multiple_of(cache.heads) {
             return Err(ImageError::Shape);
         }
         if cache.dim > MAX_DIM || cache.slots > MAX_SLOTS {
             return Err(ImageError::Overflow);
         }
         if op.kind == OpKind::Keep {
-            if op.half(3) > 1 {
+            if op.is_ring() && cache.own > 0 {
                 return Err(ImageError::Reserved);
             }
             // A reset zeroes the tokens of a ring.
@@ -359,10 +373,10 @@ impl<'a> Image<'a> {
                 true => Err(ImageError::Unwritten),
             };
         }
-        if op.half(4) > 1 || op.half(5) != 0 {
+        if op.half(5) != 0 {
             return Err(ImageError::Reserved);
         }
-        let (token, most) = (heads * cache.dim, if op.is_causal() { cache.slots } else { dst.len });
+        let (token, most) = (heads * cache.dim, if op.is_causal() { cache.kept() } else { dst.len });
         if !dst.len.is_multiple_of(token) || dst.len > most.saturating_mul(token) || third.len > h::MAX_SCRATCH {
             return Err(ImageError::Shape);
         }

@@ -1,5 +1,7 @@
 //! The sections of an image during its check, in their order.
 
+#[cfg(feature = "attention")]
+use super::attention::Cache;
 use super::words::section;
 use crate::error::ImageError;
 
@@ -14,6 +16,9 @@ pub(super) struct Front<'a> {
     /// End of the caches of the prefix that operations have read.
     #[cfg(feature = "attention")]
     pub(super) prefix: usize,
+    /// The next of these caches, if an operation has written the network's own tokens to it.
+    #[cfg(feature = "attention")]
+    pub(super) kept: Option<Cache>,
 }
 
 impl<'a> Front<'a> {

@@ -50,12 +50,17 @@ fn keep(op: &Op<'_>, units: &Range<usize>, cache: &mut [u32], keys: &[f32], valu
     let (shape, count) = (op.cache(), *cache.first().ok_or(Fault::Damaged)?);
     for unit in units.clone() {
         let token = unit.checked_div(shape.heads).ok_or(Fault::Damaged)?;
-        let slot = if op.is_ring() { (count as usize).checked_rem(shape.slots) } else { Some(token) };
+        let slot = match (op.is_ring(), shape.own) {
+            (true, _) => (count as usize).checked_rem(shape.slots),
+            (false, 0) => Some(token),
+            // After the tokens of the prefix.
+            _ => (count as usize).checked_add(token),
+        };
         let (head, slot) = (unit - token * shape.heads, slot.ok_or(Fault::Damaged)?);
         let [key, value] = [vector(keys, unit, shape.dim)?, vector(values, unit, shape.dim)?];
         keep_head(shape, cache, [head, slot], key, value)?;
     }
-    if units.end == op.units() {
+    if units.end == op.units() && shape.own == 0 {
         // A ring counts on from the slots when it reaches twice as many. A caller may have written any count.
         let (slots, next) = (shape.slots as u32, count.saturating_add(1));
         let next = if op.is_ring() && next < 2 * slots { next } else { slots };
@@ -95,16 +100,16 @@ impl Cache {
     /// # Errors
     ///
     /// [`PrefixError::Length`] if `to` has fewer words than the cache, if keys and values are not equally many, or not whole
-    /// tokens; [`PrefixError::Tokens`] without a token, or with more than slots; [`PrefixError::NotFinite`] for a value.
+    /// tokens; [`PrefixError::Tokens`] without a token, or with more than [`Self::prefix_slots`]; [`PrefixError::NotFinite`] for a value.
     pub fn fill(self, keys: &[f32], values: &[f32], to: &mut [u32]) -> Result<(), PrefixError> {
         let (token, given) = (self.heads.saturating_mul(self.dim), keys.len());
         let tokens = given.checked_div(token).unwrap_or(0);
-        let wrong = PrefixError::Length { needed: self.slots.saturating_mul(token), given };
+        let wrong = PrefixError::Length { needed: self.prefix_slots().saturating_mul(token), given };
         let cache = to.get_mut(..self.words()).ok_or(wrong)?;
         if values.len() != given || tokens.saturating_mul(token) != given {
             return Err(wrong);
         }
-        if !(1..=self.slots).contains(&tokens) {
+        if !(1..=self.prefix_slots()).contains(&tokens) {
             return Err(PrefixError::Tokens);
         }
         cache.fill(0);
@@ -143,7 +148,7 @@ fn attend(
     work: &mut [u32],
 ) -> Result<(), Fault> {
     let (shape, heads) = (op.cache(), op.query_heads());
-    let kept = (*cache.first().ok_or(Fault::Damaged)? as usize).min(shape.slots);
+    let kept = (*cache.first().ok_or(Fault::Damaged)? as usize).saturating_add(shape.own).min(shape.slots);
     let last = op.units().checked_div(heads).ok_or(Fault::Damaged)?;
     for unit in units.clone() {
         let token = unit.checked_div(heads).ok_or(Fault::Damaged)?;

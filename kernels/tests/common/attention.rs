@@ -22,7 +22,7 @@ pub(crate) struct Attention {
     pub(crate) factor: f32,
 }
 
-/// Attention to a prefix: the observation is the queries.
+/// Attention to a prefix: the observation is the queries, and then the own keys and values of each cache that has any.
 #[derive(Clone, Debug)]
 pub(crate) struct Prefixed {
     /// Heads of the queries, a multiple of each cache's.
@@ -31,6 +31,8 @@ pub(crate) struct Prefixed {
     pub(crate) caches: Vec<Cache>,
     /// Tokens of the queries.
     pub(crate) tokens: usize,
+    /// Only if each cache has as many own tokens.
+    pub(crate) is_causal: bool,
     pub(crate) factor: f32,
 }
 
@@ -38,21 +40,31 @@ impl Prefixed {
     /// Draws a small one.
     pub(crate) fn draw(random: &mut Random) -> Self {
         let (dim, groups) = (1 + random.below(20), 1 + random.below(3));
-        let slots = (0..1 + random.below(3)).map(|_| 1 + random.below(24));
-        let caches = slots.map(|slots| Cache { heads: groups, dim, slots }).collect();
-        let factor = 1.0 / (dim as f32).sqrt();
-        Self { heads: groups * (1 + random.below(3)), caches, tokens: 1 + random.below(4), factor }
+        let caches = 1 + random.below(3);
+        let mut cache = || {
+            let slots = 1 + random.below(24);
+            Cache { heads: groups, dim, slots, own: random.below(2) * random.below(slots) }
+        };
+        let caches: Vec<_> = (0..caches).map(|_| cache()).collect();
+        let (factor, tokens) = (1.0 / (dim as f32).sqrt(), 1 + random.below(4));
+        let is_causal = caches.iter().all(|cache| cache.own >= tokens);
+        Self { heads: groups * (1 + random.below(3)), caches, tokens, is_causal, factor }
     }
 
-    /// Returns the values of an observation and of an action.
+    /// Returns the values of the queries and of an action.
     pub(crate) fn len(&self) -> usize {
         self.tokens * self.heads * self.caches[0].dim
+    }
+
+    /// Returns the values of an observation.
+    pub(crate) fn obs_len(&self) -> usize {
+        self.len() + self.caches.iter().map(|cache| 2 * own_len(cache)).sum::<usize>()
     }
 
     /// Draws keys and values of each cache, of up to all its slots.
     pub(crate) fn keys_and_values(&self, random: &mut Random) -> Vec<[Vec<f32>; 2]> {
         let of = |cache: &Cache| {
-            let len = (1 + random.below(cache.slots)) * cache.heads * cache.dim;
+            let len = (1 + random.below(cache.prefix_slots())) * cache.heads * cache.dim;
             [0; 2].map(|_| (0..len).map(|_| random.unit()).collect())
         };
         self.caches.iter().map(of).collect()
@@ -75,13 +87,24 @@ impl Prefixed {
         let (len, prefix) = (self.len(), self.caches.iter().map(|cache| cache.words()).sum::<usize>());
         let mut words = vec![0; h::WORDS];
         let mut records = Vec::new();
-        let (mut at, mut queries) = (0, prefix);
-        for Cache { heads, dim, slots } in &self.caches {
+        let (mut at, mut queries, mut own) = (0, prefix, prefix + len);
+        let mut dst = Region { offset: prefix + self.obs_len(), len };
+        for cache in &self.caches {
+            let (Cache { heads, dim, slots, own: tokens }, len) = (*cache, own_len(cache));
+            let region = Region { offset: at, len: cache.words() };
+            if tokens > 0 {
+                let data = words.len() as u32;
+                words.extend([pair(heads, dim), pair(slots, tokens << 1)]);
+                records.push(OpRecord { kind: OpKind::Keep, dst: region, src: own, third: own + len, bias: 0, data });
+                own += 2 * len;
+            }
             let data = words.len() as u32;
-            words.extend([pair(self.heads, *heads), pair(*dim, *slots), 0, self.factor.to_bits()]);
-            let dst = Region { offset: queries + len, len };
+            let flags = usize::from(self.is_causal) | tokens << 1;
+            words.extend([pair(self.heads, heads), pair(dim, slots), flags as u32, self.factor.to_bits()]);
             records.push(OpRecord { kind: OpKind::Attend, dst, src: queries, third: at, bias: 0, data });
-            (at, queries) = (at + Cache { heads: *heads, dim: *dim, slots: *slots }.words(), queries + len);
+            at += region.len;
+            queries = dst.offset;
+            dst.offset += dst.len;
         }
         let ops = Records { offset: words.len() as u32, count: records.len() };
         for record in records {
@@ -93,7 +116,7 @@ impl Prefixed {
         let action = queries + len;
         let work_words = self.caches.iter().map(|cache| cache.work_words()).max().expect("a cache");
         let header = Header {
-            obs_len: len,
+            obs_len: self.obs_len(),
             act_len: len,
             scratch: action + len + work_words,
             observation: prefix,
@@ -107,6 +130,11 @@ impl Prefixed {
         };
         finish(words, header, |head| head.set_test_prefix())
     }
+}
+
+/// Returns the keys of a cache's own tokens.
+pub(crate) fn own_len(cache: &Cache) -> usize {
+    cache.own * cache.heads * cache.dim
 }
 
 /// Returns the header of an image whose name begins at this word, with a self-test of `steps` after it. All else is empty.
@@ -171,7 +199,7 @@ impl Attention {
     /// Draws a small attention.
     pub(crate) fn draw(random: &mut Random) -> Self {
         let (groups, sharing) = (1 + random.below(4), 1 + random.below(4));
-        let cache = Cache { heads: groups, dim: 1 + random.below(20), slots: 1 + random.below(24) };
+        let cache = Cache { heads: groups, dim: 1 + random.below(20), slots: 1 + random.below(24), own: 0 };
         let is_ring = random.below(2) == 0;
         let tokens = if is_ring { 1 } else { 1 + random.below(cache.slots) };
         let factor = 1.0 / (cache.dim as f32).sqrt();
@@ -224,7 +252,7 @@ impl Attention {
         let action = output.offset + output.len;
         let work = Region { offset: action + queries, len: self.cache.work_words() };
         let pair = |low: usize, high: usize| (low | high << 16) as u32;
-        let Cache { heads, dim, slots } = self.cache;
+        let Cache { heads, dim, slots, .. } = self.cache;
         let flag = |flag: bool| usize::from(flag);
         let mut words = vec![0; h::WORDS];
         if self.is_rotated {

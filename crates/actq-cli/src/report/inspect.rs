@@ -85,9 +85,9 @@ pub fn report(image: &Image<'_>) -> String {
     let words = image.scratch_words();
     let state = 4 * image.state().len;
     let _ = writeln!(text, "scratch       {words} words ({} bytes), {state} bytes of them state", 4 * words);
-    for Cache { heads, dim, slots } in image.prefix_caches() {
-        let [tokens, heads] = [count(slots, "token"), count(heads, "head")];
-        let _ = writeln!(text, "prefix        at most {tokens} of {heads} of {dim}, from a host");
+    for cache in image.prefix_caches() {
+        let [tokens, heads] = [count(cache.prefix_slots(), "token"), count(cache.heads, "head")];
+        let _ = writeln!(text, "prefix        at most {tokens} of {heads} of {}, from a host", cache.dim);
     }
     let Peak { op, words, placed } = peak(image);
     let name = image.ops().nth(op).map_or("", |op| op.kind.name());
@@ -140,10 +140,11 @@ pub(super) fn playback(image: &Image<'_>) -> Vec<String> {
 
 /// Describes an operation of attention by its sizes.
 fn attention(op: &Op<'_>) -> String {
-    let Cache { heads, dim, slots } = op.cache();
+    let Cache { heads, dim, slots, own } = op.cache();
     if op.kind == OpKind::Keep {
         let of_steps = if op.is_ring() { "the last " } else { "" };
-        return format!("{heads} x {dim} of {of_steps}{}", count(slots, "token"));
+        let (tokens, after) = if own > 0 { (own, " after a prefix") } else { (slots, "") };
+        return format!("{heads} x {dim} of {of_steps}{}{after}", count(tokens, "token"));
     }
     let (queries, causal) = (op.query_heads(), if op.is_causal() { " causal" } else { "" });
     format!("{queries} x {dim} to {heads} of {}{causal}, factor {}", count(slots, "token"), op.score_factor())

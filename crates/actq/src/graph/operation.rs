@@ -264,6 +264,12 @@ impl<'a> Backward<'a> {
         self.values.of(self.inputs[i])
     }
 
+    /// Returns all inputs.
+    pub fn inputs(&self) -> impl Iterator<Item = &'a Array2<f32>> + use<'a> {
+        let values = self.values;
+        self.inputs.iter().map(move |&value| values.of(value))
+    }
+
     /// Returns the node's output.
     pub fn output(&self) -> &'a Array2<f32> {
         self.values.of(self.node + 1)

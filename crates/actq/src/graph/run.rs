@@ -289,17 +289,21 @@ pub(super) mod tests {
         graph
     }
 
-    /// Makes a network of attention: causal to the three tokens of an evaluation, with one head of keys and values for two
-    /// of queries with rotary positions, then to the last two steps.
-    pub(in crate::graph) fn attentive() -> Graph {
+    /// Returns a function that adds a product with random weights, to this number of rows.
+    fn linears() -> impl FnMut(&mut Graph, usize, ValueId) -> ValueId {
         let mut seed = Random::new(14);
-        let mut graph = Graph::new(5);
-        let mut linear = |graph: &mut Graph, rows: usize, input: ValueId| {
+        move |graph, rows, input| {
             let cols = graph.len_of(input);
             let data = random(rows * cols, &mut seed);
             let matrix = graph.add_matrix(WeightMatrix { name: "m".into(), rows, cols, data }).expect("a matrix");
             graph.add(Linear { matrix, bias: random(rows, &mut seed) }, &[input]).expect("it fits")
-        };
+        }
+    }
+
+    /// Makes a network of attention: causal to the three tokens of an evaluation, with one head of keys and values for two
+    /// of queries with rotary positions, then to the last two steps.
+    pub(in crate::graph) fn attentive() -> Graph {
+        let (mut graph, mut linear) = (Graph::new(5), linears());
         let full = Attention { heads: 2, kv_heads: 1, dim: 2, factor: 0.7, causal: true, context: 0 };
         let inputs = [12, 6, 6].map(|rows| linear(&mut graph, rows, 0));
         let angles = [0.0f32, 0.9, -2.0];
@@ -378,6 +382,12 @@ pub(super) mod tests {
     #[test]
     fn gradients_of_attention_agree_with_finite_differences() {
         derivatives_are_right(&attentive());
+        let (mut graph, mut linear) = (Graph::new(5), linears());
+        let after_prefix = Attention { heads: 2, kv_heads: 1, dim: 2, factor: 0.7, causal: true, context: 0 };
+        let inputs = [12, 6, 6, 4, 4].map(|rows| linear(&mut graph, rows, 0));
+        let tokens = graph.add(after_prefix, &inputs).expect("it fits");
+        linear(&mut graph, 2, tokens);
+        derivatives_are_right(&graph);
     }
 
     #[test]

@@ -118,7 +118,9 @@ fn keep(op: &Op<'_>, arena: &mut [u32], caches: &mut Caches) -> Result<()> {
     let kept = caches.entry(op.dst().offset).or_default();
     for (kept, new) in kept.iter_mut().zip([op.src(), op.third()]) {
         if !op.is_ring() || before == 0 {
-            kept.clear();
+            // All but the tokens of a prefix, which a recording has in all its slots.
+            let prefix = if sizes.own > 0 { sizes.prefix_slots() } else { 0 };
+            kept.truncate(prefix * sizes.heads * sizes.dim);
         }
         kept.extend(floats(&arena[new.range()]));
         kept.drain(..kept.len().saturating_sub(sizes.slots * sizes.heads * sizes.dim));

@@ -16,7 +16,7 @@ const THIRD: usize = 2;
 
 /// Two heads share those of the cache; three queries see four tokens.
 fn whole() -> Attention {
-    let cache = Cache { heads: 2, dim: 6, slots: 4 };
+    let cache = Cache { heads: 2, dim: 6, slots: 4, own: 0 };
     Attention { heads: 4, cache, tokens: 3, is_ring: false, is_causal: true, is_rotated: false, factor: 0.4 }
 }
 
@@ -43,7 +43,6 @@ const BOTH: &[Case] = &[
     }),
     ("more heads than the cache", E::Shape, |d| d.set_low(d.data(KEEP), 0xffff)),
     ("a cache one word longer", E::Shape, |d| d.map_high(d.op(KEEP), |len| len + 1)),
-    ("an unknown flag of keep", E::Reserved, |d| d.map_high(d.data(KEEP) + 1, |flags| flags | 2)),
     ("a detail of keep", E::Reserved, |d| d.map_low(d.op(KEEP), |half| half | 1 << 8)),
     ("a bias of keep", E::Reserved, |d| d.set_low(d.op(KEEP) + THIRD, 1)),
     ("keys over values", E::Overlap, |d| d.set_high(d.op(KEEP) + THIRD, d.high(d.op(KEEP) + 1))),
@@ -57,7 +56,8 @@ const BOTH: &[Case] = &[
     ("queries without columns", E::Shape, |d| d.set_low(d.data(ATTEND) + 1, 0)),
     ("queries of more columns than fit int32", E::Overflow, |d| d.set_low(d.data(ATTEND) + 1, 513)),
     ("part of a query", E::Shape, |d| d.set_low(d.data(ATTEND) + 1, 5)),
-    ("an unknown flag of attend", E::Reserved, |d| d.map_low(d.data(ATTEND) + 2, |flags| flags | 2)),
+    ("tokens after no prefix", E::Overlap, |d| d.map_low(d.data(ATTEND) + 2, |flags| flags | 3 << 1)),
+    ("more tokens than slots after a prefix", E::Shape, |d| d.set_low(d.data(ATTEND) + 2, 0xffff)),
     ("a reserved half of attend", E::Reserved, |d| d.set_high(d.data(ATTEND) + 2, 1)),
     ("a factor of 0", E::Constant, |d| d.set_f32(d.data(ATTEND) + 3, 0.0)),
     ("a negative factor", E::Constant, |d| d.set_f32(d.data(ATTEND) + 3, -1.0)),
@@ -84,6 +84,7 @@ fn impossible_attentions_are_refused() {
             ("a ring that no reset clears", E::Unwritten, |d| d.set_high(d.data(KEEP) + 1, 1)),
             ("more causal queries than slots", E::Shape, |d| d.set_high(d.data(ATTEND) + 1, 2)),
             ("a longer cache than was written", E::Overlap, |d| d.set_high(d.data(ATTEND) + 1, 8)),
+            ("own tokens in no prefix", E::Overlap, |d| d.set_high(d.data(KEEP) + 1, 2)),
         ],
     );
     refused_of(
@@ -91,6 +92,7 @@ fn impossible_attentions_are_refused() {
         &[
             ("a ring that takes all slots at a time", E::Overlap, |d| d.set_high(d.data(KEEP) + 1, 0)),
             ("a ring outside the state", E::Unwritten, |d| d.set_high(h::W_STATE, d.high(h::W_STATE) - 1)),
+            ("a ring after a prefix", E::Reserved, |d| d.map_high(d.data(KEEP) + 1, |flags| flags | 2)),
         ],
     );
 }
@@ -115,18 +117,44 @@ fn impossible_rotary_positions_are_refused() {
     );
 }
 
+/// The first operation that writes own tokens after a prefix.
+const FIRST_KEEP: (u8, usize) = (op::KEEP, 0);
 /// The first attention that reads a prefix, and the second.
 const FIRST: (u8, usize) = (op::ATTEND, 0);
 const SECOND: (u8, usize) = (op::ATTEND, 1);
 
 #[test]
 fn impossible_prefixes_are_refused() {
-    let cache = Cache { heads: 2, dim: 6, slots: 4 };
-    let prefixed = Prefixed { heads: 4, caches: vec![cache, Cache { slots: 3, ..cache }], tokens: 2, factor: 0.4 };
-    let draft = Draft(prefixed.image());
-    assert!(draft.check().is_ok());
+    let cache = Cache { heads: 2, dim: 6, slots: 4, own: 0 };
+    let of = |caches: [Cache; 2]| {
+        let caches = caches.to_vec();
+        let draft = Draft(Prefixed { heads: 4, caches, tokens: 2, is_causal: false, factor: 0.4 }.image());
+        assert!(draft.check().is_ok());
+        draft
+    };
+    // With three tokens of its own in one of them.
+    let own = Cache { slots: 7, own: 3, ..cache };
     refused_of(
-        &draft,
+        &of([own, cache]),
+        &[
+            ("own tokens that are not read", E::Unwritten, |d| d.set_low(d.data(FIRST) + 2, 0)),
+            ("fewer own tokens than are written", E::Unwritten, |d| d.set_low(d.data(FIRST) + 2, 2 << 1)),
+            ("more causal queries than own tokens", E::Shape, |d| d.set_low(d.data(FIRST) + 2, 1 | 1 << 1)),
+            ("own tokens in all slots", E::Shape, |d| d.set_high(d.data(FIRST_KEEP) + 1, 7 << 1)),
+            ("own tokens of other slots", E::Unwritten, |d| {
+                d.set_low(d.data(FIRST_KEEP) + 1, 8);
+                d.set_high(d.op(FIRST_KEEP), Cache { heads: 2, dim: 6, slots: 8, own: 3 }.words() as u32);
+            }),
+            ("own tokens in a later cache", E::Overlap, |d| d.map_low(d.op(FIRST_KEEP) + 1, |at| at + 1)),
+            ("keys in the prefix", E::Overlap, |d| d.set_high(d.op(FIRST_KEEP) + 1, 0)),
+        ],
+    );
+    refused_of(
+        &of([cache, own]),
+        &[("own tokens in a cache of the prefix alone", E::Overlap, |d| d.set_low(d.op(FIRST_KEEP) + 1, 0))],
+    );
+    refused_of(
+        &of([cache, Cache { slots: 3, ..cache }]),
         &[
             ("a cache that the first attention leaves out", E::Overlap, |d| {
                 d.map_high(d.op(FIRST) + THIRD, |at| at + 1)
@@ -141,6 +169,7 @@ fn impossible_prefixes_are_refused() {
             ("a last cache that ends before the observation", E::Arena, |d| {
                 d.map_high(d.data(SECOND) + 1, |slots| slots + 1);
             }),
+            ("own tokens that are not written", E::Unwritten, |d| d.set_low(d.data(FIRST) + 2, 1 << 1)),
             ("queries in the prefix", E::Overlap, |d| d.set_high(d.op(FIRST) + 1, 1)),
             ("outputs in the prefix", E::Overlap, |d| d.set_low(d.op(SECOND) + 1, 1)),
             ("a state in the prefix", E::Overlap, |d| d.set_high(h::W_STATE, 1)),

@@ -25,10 +25,10 @@ fn observations(attention: &Attention, random: &mut Random) -> Vec<Vec<f32>> {
 /// Attentions of every kind: heads that share, columns and slots that are not multiples of a word's.
 fn attentions() -> Vec<Attention> {
     let mut random = Random::new(11);
-    let cache = Cache { heads: 2, dim: 9, slots: 7 };
+    let cache = Cache { heads: 2, dim: 9, slots: 7, own: 0 };
     let ring =
         Attention { heads: 6, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: false, factor: 0.3 };
-    let wide = Attention { heads: 2, cache: Cache { heads: 1, dim: 64, slots: 5 }, is_rotated: true, ..ring };
+    let wide = Attention { heads: 2, cache: Cache { heads: 1, dim: 64, slots: 5, own: 0 }, is_rotated: true, ..ring };
     let whole = Attention { tokens: 4, is_ring: false, is_causal: true, ..ring };
     let drawn = (0..5).map(|_| Attention::draw(&mut random));
     [ring, wide, whole].into_iter().chain(drawn).collect()
@@ -66,7 +66,7 @@ fn every_core_has_the_hosts_bits_of_a_prefix() -> Result<()> {
         for _ in 0..4 {
             let prefixed = Prefixed::draw(&mut random);
             let observations: Vec<Vec<f32>> =
-                (0..3).map(|_| (0..prefixed.len()).map(|_| random.unit()).collect()).collect();
+                (0..3).map(|_| (0..prefixed.obs_len()).map(|_| random.unit()).collect()).collect();
             let image = Draft(prefixed.image());
             let buffer = ImageBuffer::new(image.bytes());
             let least = buffer.image("prefix".as_ref())?.least_budget();
@@ -93,7 +93,7 @@ const COLUMNS: usize = 48;
 
 /// Returns a token's attention to a ring of this many slots.
 fn context(slots: usize) -> Attention {
-    let cache = Cache { heads: HEADS, dim: COLUMNS, slots };
+    let cache = Cache { heads: HEADS, dim: COLUMNS, slots, own: 0 };
     Attention { heads: HEADS, cache, tokens: 1, is_ring: true, is_causal: false, is_rotated: false, factor: 0.15 }
 }
 

@@ -6,7 +6,7 @@ use ndarray::Array2;
 
 use crate::error::{Result, bail, ensure};
 use crate::graph::arrays::{contiguous, contiguous_mut, rounded, sum_of_products};
-use crate::graph::lowering::{BufferId, Lifetime, Lowering, StepData};
+use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, StepData};
 use crate::graph::operation::{Backward, Elements, Forward, NodeState, Operation, Saved};
 use crate::graph::syntax::{Keys, Syntax, required};
 use crate::graph::values::{ValueId, WeightMatrix};
@@ -21,7 +21,8 @@ const WEIGHT_MAX: u16 = 32767;
 
 /// Scaled dot-product attention over three inputs: queries, keys and values, each `[token, head, element]`. Query head
 /// `h` reads key and value head `h / (heads / kv_heads)`:
-/// `softmax(factor q k') v`, with a softmax over the tokens that the query sees.
+/// `softmax(factor q k') v`, with a softmax over the tokens that the query sees. Two more inputs are keys and values of a
+/// prefix, whose tokens come before those.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attention {
     /// Heads of the queries.
@@ -154,10 +155,13 @@ impl Attention {
     /// has.
     fn cache(&self, to: &mut Lowering, inputs: &[ValueId], lifetime: Lifetime) -> (BufferId, Cache) {
         let (keys, values) = (to.place(inputs[1]), to.place(inputs[2]));
-        let slots = if self.context > 0 { self.context } else { keys.len / (self.kv_heads * self.dim) };
-        let sizes = Cache { heads: self.kv_heads, dim: self.dim, slots };
+        let tokens = |place: Slice| place.len / (self.kv_heads * self.dim);
+        let prefix = inputs.get(3).map(|value| tokens(to.place(*value)));
+        let own = if prefix.is_some() { tokens(keys) } else { 0 };
+        let slots = if self.context > 0 { self.context } else { prefix.unwrap_or(0) + tokens(keys) };
+        let sizes = Cache { heads: self.kv_heads, dim: self.dim, slots, own };
         let of = [inputs[1], inputs[2], self.kv_heads];
-        if let Some(cache) = to.cache(of) {
+        if let Some(cache) = to.cache(of).filter(|_| own == 0) {
             return (cache, sizes);
         }
         if to.buffers[keys.buffer].lifetime == Lifetime::Outside {
@@ -173,18 +177,22 @@ impl Attention {
         } else {
             values
         };
-        let cache = to.buffer(sizes.words(), lifetime);
-        let data = vec![pair(self.kv_heads, self.dim), pair(slots, usize::from(self.context > 0))];
+        let cache = to.buffer(sizes.words(), if own > 0 { Lifetime::Prefix } else { lifetime });
+        let data = vec![pair(self.kv_heads, self.dim), pair(slots, usize::from(self.context > 0) | own << 1)];
         to.emit(OpKind::Keep, to.whole(cache), Some(keys), Some(values), StepData::Words(data));
-        if self.context == 0 {
+        if self.context == 0 && own == 0 {
             to.add_cache(of, cache);
         }
         (cache, sizes)
     }
 
-    /// Returns the tokens of a row of each input.
-    fn of_row(&self, inputs: [&Array2<f32>; 3], row: usize) -> Tokens {
-        let [queries, keys, values] = inputs.map(|x| contiguous(&x.row(row)).to_vec());
+    /// Returns the tokens of a row of each input, those of a prefix first.
+    fn of_row(inputs: &[&Array2<f32>], row: usize) -> Tokens {
+        let of = |i: usize| {
+            let parts = [inputs.get(i + 2).filter(|_| i > 0), inputs.get(i)];
+            parts.into_iter().flatten().flat_map(|x| x.row(row)).copied().collect()
+        };
+        let [queries, keys, values] = [0, 1, 2].map(of);
         Tokens { queries, keys, values, before: 0 }
     }
 
@@ -251,8 +259,10 @@ impl Attention {
 
 impl Operation for Attention {
     fn output_len(&self, _: &[WeightMatrix], inputs: &[usize]) -> Result<usize> {
-        let &[queries, keys, values] = inputs else {
-            bail!("takes queries, keys and values, not {} inputs", inputs.len())
+        let (queries, keys, values, prefix) = match *inputs {
+            [queries, keys, values] => (queries, keys, values, None),
+            [queries, keys, values, of_keys, of_values] => (queries, keys, values, Some([of_keys, of_values])),
+            _ => bail!("takes queries, keys and values, and those of a prefix, not {} inputs", inputs.len()),
         };
         let Self { heads, kv_heads, dim, factor, causal, context } = *self;
         ensure!((1..=MAX_HEADS).contains(&heads), "has {heads} heads; 1 to {MAX_HEADS} are supported");
@@ -273,7 +283,14 @@ impl Operation for Attention {
         );
         let (of_queries, tokens) = (queries / width, keys / kv_width);
         ensure!(!causal || of_queries <= tokens, "has {of_queries} queries for {tokens} causal keys");
-        let most = tokens.max(context);
+        if let Some([of_keys, of_values]) = prefix {
+            ensure!(
+                of_keys > 0 && of_keys.is_multiple_of(kv_width) && of_values == of_keys,
+                "the {of_keys} keys and {of_values} values of its prefix are not tokens of {kv_heads} heads of {dim} values"
+            );
+            ensure!(context == 0, "keeps tokens from step to step, and reads a prefix; it can do one of both");
+        }
+        let most = (tokens + prefix.map_or(0, |[of_keys, _]| of_keys / kv_width)).max(context);
         ensure!(most <= MAX_SLOTS, "reads {most} tokens; at most {MAX_SLOTS} are supported");
         ensure!(
             context == 0 || (of_queries, tokens) == (1, 1),
@@ -288,17 +305,21 @@ impl Operation for Attention {
             let dim = required(op.count("dim")?, "dim")?;
             let kv_heads = op.count("kv_heads")?.unwrap_or(heads);
             let (causal, context) = (op.truth("causal")?.unwrap_or(false), op.count("context")?.unwrap_or(0));
-            if let Some(tokens) = op.count("prefix")? {
+            let prefix = op.count("prefix")?;
+            let is_alone = prefix.is_some() && op.text("keys")?.is_none() && op.text("values")?.is_none();
+            if !is_alone {
+                op.add_input("keys")?;
+                op.add_input("values")?;
+            }
+            if let Some(tokens) = prefix {
                 ensure!(
-                    op.text("keys")?.is_none() && op.text("values")?.is_none() && !causal && context == 0,
-                    "reads a prefix, whose keys and values come from the host; leave keys, values, causal and context out"
+                    context == 0 && !(is_alone && causal),
+                    "reads a prefix, whose tokens every query sees; leave context out, and causal unless it names keys and values \
+                     of its own"
                 );
                 let len = tokens.saturating_mul(kv_heads).saturating_mul(dim);
                 op.add_prefix(len)?;
                 op.add_prefix(len)?;
-            } else {
-                op.add_input("keys")?;
-                op.add_input("values")?;
             }
             let factor = op.number("factor")?.map_or(1.0 / (dim as f32).sqrt(), |factor| factor as f32);
             Ok(Self { heads, kv_heads, dim, factor, causal, context })
@@ -327,8 +348,9 @@ impl Operation for Attention {
             )
         };
         if self.context == 0 {
+            let inputs: Vec<_> = run.inputs().collect();
             for (row, mut y) in y.rows_mut().into_iter().enumerate() {
-                contiguous_mut(&mut y).copy_from_slice(&outputs(&self.of_row(inputs, row)));
+                contiguous_mut(&mut y).copy_from_slice(&outputs(&Self::of_row(&inputs, row)));
             }
             return (y, Saved::default());
         }
@@ -346,29 +368,32 @@ impl Operation for Attention {
     }
 
     fn backward(&self, run: &mut Backward<'_>, saved: Saved, dy: Array2<f32>, d_state: &mut NodeState) {
-        let inputs = [run.input(0), run.input(1), run.input(2)];
-        let mut d_inputs = inputs.map(|x| Array2::zeros(x.raw_dim()));
+        let inputs: Vec<_> = run.inputs().collect();
+        let mut d_inputs: Vec<_> = inputs.iter().map(|x| Array2::zeros(x.raw_dim())).collect();
         let gradients = |tokens: &Tokens, dy: &[f32]| {
             wide(
                 #[inline(always)]
                 || self.gradients(tokens, dy),
             )
         };
-        let mut give = |row: usize, parts: [&[f32]; 3]| {
+        let mut give = |row: usize, parts: &[&[f32]]| {
             for (d, part) in d_inputs.iter_mut().zip(parts) {
                 contiguous_mut(&mut d.row_mut(row)).copy_from_slice(part);
             }
         };
         if self.context == 0 {
+            let of_prefix = inputs.get(3).map_or(0, |keys| keys.ncols());
             for (row, dy) in dy.rows().into_iter().enumerate() {
-                let d = gradients(&self.of_row(inputs, row), contiguous(&dy));
-                give(row, [&d.queries, &d.keys, &d.values]);
+                let d = gradients(&Self::of_row(&inputs, row), contiguous(&dy));
+                let [(before_keys, keys), (before_values, values)] =
+                    [&d.keys, &d.values].map(|d| d.split_at(of_prefix));
+                give(row, &[&d.queries, keys, values, before_keys, before_values]);
             }
-        } else if let Ok(start) = NodeState::try_from(saved.inner) {
+        } else if let (Ok(start), &[queries, keys, values]) = (NodeState::try_from(saved.inner), &inputs[..]) {
             let [width, kv_width] = self.widths();
             let batch = start[0].nrows();
             for sample in 0..batch {
-                let tokens = self.of_sequence(inputs, &start, sample);
+                let tokens = self.of_sequence([queries, keys, values], &start, sample);
                 let of_sample: Vec<f32> =
                     (sample..dy.nrows()).step_by(batch).flat_map(|row| dy.row(row).to_vec()).collect();
                 let mut d = gradients(&tokens, &of_sample);
@@ -376,7 +401,7 @@ impl Operation for Attention {
                 for (step, row) in (sample..dy.nrows()).step_by(batch).enumerate() {
                     let token = (tokens.before + step) * kv_width;
                     let of_token = |d: &'_ Vec<f32>| d[token..token + kv_width].to_vec();
-                    give(row, [&d.queries[step * width..][..width], &of_token(&d.keys), &of_token(&d.values)]);
+                    give(row, &[&d.queries[step * width..][..width], &of_token(&d.keys), &of_token(&d.values)]);
                 }
             }
         }
@@ -386,7 +411,8 @@ impl Operation for Attention {
     }
 
     fn prepare(&self, to: &mut Lowering, inputs: &[ValueId], last: ValueId) -> Vec<ValueId> {
-        if self.context > 0 || inputs[1].max(inputs[2]) > last {
+        // Own tokens follow those of the prefix right before they are read.
+        if self.context > 0 || inputs.len() > 3 || inputs[1].max(inputs[2]) > last {
             return inputs.to_vec();
         }
         let (cache, _) = self.cache(to, inputs, Lifetime::Output);
@@ -402,7 +428,8 @@ impl Operation for Attention {
         let dst = to.buffer(len, Lifetime::Step);
         to.work_words = to.work_words.max(sizes.work_words());
         let [heads, shared] = [pair(self.heads, self.kv_heads), pair(self.dim, sizes.slots)];
-        let data = vec![heads, shared, u32::from(self.causal), self.factor.to_bits()];
+        let flags = pair(usize::from(self.causal) | sizes.own << 1, 0);
+        let data = vec![heads, shared, flags, self.factor.to_bits()];
         to.emit(OpKind::Attend, to.whole(dst), Some(to.place(inputs[0])), Some(to.whole(cache)), StepData::Words(data));
         dst
     }
@@ -517,8 +544,8 @@ mod tests {
         assert!(off < 1e-5 * most, "{off} of {most}");
     }
 
-    /// Makes a network of three values and a prefix of four tokens for each of two attentions; with `is_iterative`, they
-    /// are in the denoising steps of a flow.
+    /// Makes a network of three values and a prefix of four tokens for each of two attentions, of which the second has two
+    /// tokens of its own; with `is_iterative`, they are in the denoising steps of a flow.
     fn prefixed(is_iterative: bool) -> Graph {
         let of = Attention { heads: 4, kv_heads: 2, dim: 2, factor: 0.7, causal: false, context: 0 };
         let mut graph = Graph { prefix_len: 4 * 16, ..Graph::new(3 + 4 * 16) };
@@ -536,10 +563,12 @@ mod tests {
             let x = linear(&mut graph, 16, x);
             queries = graph.add(Add, &[x, condition]).expect("it fits");
         }
-        for [keys, values] in [[prefix[0], prefix[1]], [prefix[2], prefix[3]]] {
-            let attended = graph.add(of, &[queries, keys, values]).expect("it fits");
-            queries = linear(&mut graph, 16, attended);
-        }
+        let attended = graph.add(of, &[queries, prefix[0], prefix[1]]).expect("it fits");
+        let [keys, values] = [0; 2].map(|_| linear(&mut graph, 8, attended));
+        queries = linear(&mut graph, 16, attended);
+        let of = Attention { causal: true, ..of };
+        let attended = graph.add(of, &[queries, keys, values, prefix[2], prefix[3]]).expect("it fits");
+        queries = linear(&mut graph, 16, attended);
         linear(&mut graph, 2, queries);
         if is_iterative {
             let step = actq_kernels::ops::denoise::Coefficients::from_array([0.0, 0.0, 1.0, 0.5, 0.0, 0.0, 0.0]);
@@ -560,9 +589,9 @@ mod tests {
                 }
             };
             let program = emit::lower(&policy(graph.clone()), 32, None).expect("a program");
-            assert!(program.steps.iter().all(|step| step.kind != OpKind::Keep));
-            let cache = Cache { heads: 2, dim: 2, slots: 4 };
-            assert_eq!(program.observation.offset, 2 * cache.words());
+            assert_eq!(program.steps.iter().filter(|step| step.kind == OpKind::Keep).count(), 1);
+            let cache = Cache { heads: 2, dim: 2, slots: 4, own: 0 };
+            assert_eq!(program.observation.offset, cache.words() + Cache { slots: 6, own: 2, ..cache }.words());
             assert_eq!(program.observation.len, 3);
             let (off, most) = off_image(&graph, policy);
             assert!(off < 1e-5 * most, "{off} of {most}");
@@ -584,7 +613,7 @@ mod tests {
     fn sizes_that_do_not_fit_are_refused() {
         let plain = Attention { heads: 4, kv_heads: 2, dim: 8, factor: 0.5, causal: true, context: 0 };
         let cases = [
-            (plain, vec![32, 16], "takes queries, keys and values, not 2 inputs"),
+            (plain, vec![32, 16], "takes queries, keys and values, and those of a prefix, not 2 inputs"),
             (
                 Attention { kv_heads: 3, ..plain },
                 vec![32; 3],

@@ -107,7 +107,7 @@ fn attention((heads, kv_heads): (usize, usize), shapes: &[(usize, usize)]) -> Re
             }
             all
         });
-        let cache = value(Cache { heads: kv_heads, dim, slots }.words());
+        let cache = value(Cache { heads: kv_heads, dim, slots, own: 0 }.words());
         let sizes = StepData::Words(vec![pair(kv_heads, dim), pair(slots, 0)]);
         add(OpKind::Keep, cache, Some(keys), Some(values), sizes);
         for queries in 1..=slots.min(2) {
