@@ -301,6 +301,14 @@ impl Head {
         })
     }
 
+    /// Clears the prefix of all robots: no step runs the network until the next one.
+    fn clear_prefix(&self, py: Python<'_>) -> PyResult<()> {
+        self.with(py, 0, |kept, _| {
+            kept.iter_mut().for_each(Batch::clear_prefix);
+            Ok(())
+        })
+    }
+
     /// Returns how `copy` and `pickle` make the head again: with its states.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let make = py.import("actq._actq")?.getattr("head_of_states")?;

@@ -241,5 +241,10 @@ def test_robots_have_their_own_prefix_until_the_next(tmp_path):
         with pytest.raises(actq.Error, match=message):
             head.set_prefix(caches)
     assert np.array_equal(head(rows), first)
+    head.clear_prefix()
+    with pytest.raises(actq.Error, match="none was set"):
+        head(rows)
+    head.set_prefix([(keys, values)])
+    assert np.array_equal(head(rows), first)
     with pytest.raises(actq.Error, match="reads no prefix"):
         actq.Head(quantized(recurrent(tmp_path))).set_prefix([(keys, values)])

@@ -177,6 +177,11 @@ impl Batch {
         })
     }
 
+    /// Clears the prefix of each head, as [`Head::clear_prefix`] does.
+    pub fn clear_prefix(&mut self) {
+        self.each(|_, head| head.clear_prefix());
+    }
+
     /// Changes each head. After an error every head has its state of `before`, and the first error is returned.
     fn change(
         &mut self,

@@ -208,6 +208,8 @@ class Head:
         A reset keeps the prefix, and `state` has it. Raises `actq.Error` for an image without a prefix, another shape or
         number, more tokens than the cache has, and values that are not finite: then nothing has changed.
         """
+    def clear_prefix(self) -> None:
+        """Clears the prefix of all robots: steps that run the network raise `actq.Error` until the next `set_prefix`."""
     def state(self) -> npt.NDArray[np.uint8]:
         """Returns the states of all robots [n, bytes]: a row has everything besides the image that the robot's next actions
         depend on, as recurrent values, chunk, last action and the seed of noise.
