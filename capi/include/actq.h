@@ -90,6 +90,14 @@ enum actq_code {
   ACTQ_IMAGE_LEFT_OUT = 33,
   /** scratch memory is too small for the image */
   ACTQ_SCRATCH_TOO_SMALL = 64,
+  /** prefix has another length than the image's */
+  ACTQ_PREFIX_LENGTH = 65,
+  /** a cache of the prefix has no token, or more tokens than slots */
+  ACTQ_PREFIX_TOKENS = 66,
+  /** a scale of the prefix is not finite, or negative */
+  ACTQ_PREFIX_NOT_FINITE = 67,
+  /** a step is being polled; poll it to its end, or reset, before it gets another prefix */
+  ACTQ_PREFIX_BEGUN = 68,
   /** saved state has another length than the image's */
   ACTQ_SAVED_LENGTH = 70,
   /** not a saved state of this version; reset instead */
@@ -120,6 +128,8 @@ enum actq_code {
   ACTQ_OBSERVATION_RANGE = 90,
   /** a quaternion's length is not near 1, so it is not an orientation */
   ACTQ_ORIENTATION = 91,
+  /** the policy reads a prefix, keys and values from a host, and none was set */
+  ACTQ_NO_PREFIX = 92,
   /** a pointer is null */
   ACTQ_NULL = 128,
   /** a pointer is not aligned for its type */
@@ -144,7 +154,7 @@ enum actq_code {
 /**
  * Number of this interface: it changes with every change of a structure or a function.
  */
-#define ACTQ_ABI 2
+#define ACTQ_ABI 3
 
 /**
  * Bytes of stack that a call takes at most on a Cortex-M with the assembler kernels, without interrupts. A test
@@ -359,6 +369,26 @@ actq_status actq_play(struct actq_head *head, float *action, size_t action_len);
  * long as some steps.
  */
 actq_status actq_self_test(struct actq_head *head);
+
+/**
+ * Gives the bytes of the prefix, keys and values from a host, that the image's attentions read; 0 if they read none. Only
+ * libraries with the feature `attention` have this function and the next two.
+ */
+actq_status actq_prefix_bytes(struct actq_head *head,
+                              size_t *bytes);
+
+/**
+ * Sets the prefix, of `actq_prefix_bytes` bytes. Every step uses it until the next one, also after a reset. After an error
+ * the head keeps the one before.
+ */
+actq_status actq_set_prefix(struct actq_head *head,
+                            const uint8_t *from,
+                            size_t bytes);
+
+/**
+ * Clears the prefix: no step runs the network until the next one. A step that is being polled is dropped.
+ */
+actq_status actq_clear_prefix(struct actq_head *head);
 
 /**
  * Gives the bytes of a saved state.

@@ -85,6 +85,12 @@ public:
             &image_, name, values.data(), values.size(), observation.data(), observation.size());
     }
 
+    Status prefix_bytes(size_t &bytes) noexcept { return actq_prefix_bytes(&head_, &bytes); }
+    Status set_prefix(span<const uint8_t> from) noexcept {
+        return actq_set_prefix(&head_, from.data(), from.size());
+    }
+    Status clear_prefix() noexcept { return actq_clear_prefix(&head_); }
+
     Status saved_bytes(size_t &bytes) noexcept { return actq_saved_bytes(&head_, &bytes); }
     Status save(span<uint8_t> to) noexcept { return actq_save(&head_, to.data(), to.size()); }
     Status restore(span<const uint8_t> from) noexcept {

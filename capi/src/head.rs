@@ -317,6 +317,43 @@ pub unsafe extern "C" fn actq_self_test(head: *mut ActqHead) -> ActqStatus {
     }
 }
 
+/// Gives the bytes of the prefix, keys and values from a host, that the image's attentions read; 0 if they read none. Only
+/// libraries with the feature `attention` have this function and the next two.
+#[cfg(feature = "attention")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn actq_prefix_bytes(head: *mut ActqHead, bytes: *mut usize) -> ActqStatus {
+    // SAFETY: as the caller promises.
+    unsafe {
+        with(head, |running| {
+            running.buffer(bytes, 1)?.put(running.head.image().prefix_bytes());
+            Ok(())
+        })
+    }
+}
+
+/// Sets the prefix, of `actq_prefix_bytes` bytes. Every step uses it until the next one, also after a reset. After an error
+/// the head keeps the one before.
+#[cfg(feature = "attention")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn actq_set_prefix(head: *mut ActqHead, from: *const u8, bytes: usize) -> ActqStatus {
+    // SAFETY: as the caller promises.
+    unsafe { with(head, |running| Ok(running.head.set_prefix(running.buffer(from, bytes)?.read())?)) }
+}
+
+/// Clears the prefix: no step runs the network until the next one. A step that is being polled is dropped.
+#[cfg(feature = "attention")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn actq_clear_prefix(head: *mut ActqHead) -> ActqStatus {
+    // SAFETY: as the caller promises.
+    unsafe {
+        with(head, |running| {
+            running.polling = false;
+            running.head.clear_prefix();
+            Ok(())
+        })
+    }
+}
+
 /// Gives the bytes of a saved state.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn actq_saved_bytes(head: *mut ActqHead, bytes: *mut usize) -> ActqStatus {

@@ -164,11 +164,6 @@ unsafe fn open(
         unsafe { structure.write() }.fill(0);
         // SAFETY: as the caller promises.
         let image = parse(unsafe { content?.read() })?;
-        // No function of this interface sets one.
-        #[cfg(feature = "attention")]
-        if image.prefix_bytes() > 0 {
-            return Err(ImageError::LeftOut.into());
-        }
         let place = to.cast::<Opened>();
         // SAFETY: valid as the words above.
         unsafe { place.write(Opened { seal: seal(place, MAGIC), at: bytes as usize, image }) };

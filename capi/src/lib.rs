@@ -22,7 +22,7 @@ pub use image::*;
 pub use status::*;
 
 /// Number of this interface: it changes with every change of a structure or a function.
-pub const ACTQ_ABI: u32 = 2;
+pub const ACTQ_ABI: u32 = 3;
 
 /// Bytes of stack that a call takes at most on a Cortex-M with the assembler kernels, without interrupts. A test
 /// computes them from the calls in a linked program, for any image.

@@ -3,7 +3,7 @@
 use core::ffi::{CStr, c_char};
 use core::num::NonZero;
 
-use actq_kernels::{HeadError, ImageError, SavedError, StepError};
+use actq_kernels::{HeadError, ImageError, PrefixError, SavedError, StepError};
 
 /// The status that a function returns: one of `actq_code`.
 pub type ActqStatus = i32;
@@ -39,6 +39,14 @@ codes! {
     Pending = -1, c"the step is not ready; poll again";
     /// Too few words of scratch memory.
     ScratchTooSmall = 64, c"scratch memory is too small for the image";
+    /// The length differs from that of the image's prefix.
+    PrefixLength = 65, c"prefix has another length than the image's";
+    /// A cache of the prefix has no token, or more than its slots.
+    PrefixTokens = 66, c"a cache of the prefix has no token, or more tokens than slots";
+    /// A scale of the prefix is not finite, or negative.
+    PrefixNotFinite = 67, c"a scale of the prefix is not finite, or negative";
+    /// A step has begun and is not ready.
+    PrefixBegun = 68, c"a step is being polled; poll it to its end, or reset, before it gets another prefix";
     /// The length differs from that of the image's state.
     SavedLength = 70, c"saved state has another length than the image's";
     /// Not a saved state of this version.
@@ -69,6 +77,8 @@ codes! {
     ObservationRange = 90, c"a value of the observation is outside the range of its raw input";
     /// A quaternion's length is not near 1.
     Orientation = 91, c"a quaternion's length is not near 1, so it is not an orientation";
+    /// The image reads a prefix, and the head has none.
+    NoPrefix = 92, c"the policy reads a prefix, keys and values from a host, and none was set";
     /// A pointer is null.
     Null = 128, c"a pointer is null";
     /// A pointer is not aligned for its type.
@@ -117,6 +127,12 @@ impl From<ImageError> for Failure {
 
 impl From<HeadError> for Failure {
     fn from(error: HeadError) -> Self {
+        Self::of(error.code().into())
+    }
+}
+
+impl From<PrefixError> for Failure {
+    fn from(error: PrefixError) -> Self {
         Self::of(error.code().into())
     }
 }

@@ -109,7 +109,16 @@ fn run(bytes: &[u8], script: &[u8]) {
                     actq_image_port(image, script.next(), port.as_mut_ptr());
                     actq_set_input(image, c"q".as_ptr(), o, obs, actions.as_mut_ptr(), act)
                 }
-                _ => actq_self_test(head),
+                _ => match script.next() % 4 {
+                    0 => actq_clear_prefix(head),
+                    1 => {
+                        let mut bytes = 0;
+                        actq_prefix_bytes(head, &mut bytes);
+                        saved[script.next()] ^= script.next() as u8;
+                        actq_set_prefix(head, saved.as_ptr(), script.length(bytes, saved.len()))
+                    }
+                    _ => actq_self_test(head),
+                },
             };
             assert!(!actq_status_text(status).is_null());
         }
