@@ -8,6 +8,7 @@ use anyhow::Result;
 use crate::client::{Client, require_armed};
 use crate::event::Event;
 use crate::log::Log;
+use crate::push::{Prefix, Push};
 
 /// Options for sending observations.
 #[derive(Clone, Copy, Debug)]
@@ -20,24 +21,65 @@ pub struct Pace {
 
 /// Longest wait for the last action, counted from the controller's answer to a later request.
 const LAST_ACTION: Duration = Duration::from_millis(100);
+/// Time after which a prefix is sent again, half of its [`LIFETIME`].
+const RENEWAL: Duration = Duration::from_secs(5);
+/// The longest lifetime of a prefix that the application accepts.
+pub const LIFETIME: Duration = Duration::from_secs(10);
 /// Observations that [`stream`] sends before it arms.
 pub const BEFORE_ARMING: usize = 5;
 
-/// Sends every observation at its time. Passes each received status to `seen`.
+/// A prefix that the controller has, or that is on its way.
+struct Sent<'p> {
+    prefix: Prefix<'p>,
+    /// Its transfer; `None` when the controller has it.
+    push: Option<Push<'p>>,
+    begun: Instant,
+}
+
+impl<'p> Sent<'p> {
+    fn begin(client: &mut Client, prefix: Prefix<'p>) -> Result<Self> {
+        Ok(Self { prefix, push: Some(Push::prefix(client, prefix)?), begun: Instant::now() })
+    }
+
+    /// Makes the next request of the transfer; returns `false` if none is left.
+    fn advance(&mut self, client: &mut Client) -> Result<bool> {
+        if let Some(push) = &mut self.push
+            && push.advance(client)?
+        {
+            self.push = None;
+        }
+        Ok(self.push.is_some())
+    }
+}
+
+/// Sends every observation at its time. Passes each received status to `seen`. `prefix` returns the prefix of each
+/// observation by its number, if the image reads one: the first arrives before all observations. Another prefix is sent
+/// between observations, and so is the same one after [`RENEWAL`]; until it has arrived, the one before is used.
 ///
 /// # Errors
 ///
-/// Fails if the controller cannot be armed, is lost, or stops for a fault while armed. The log then has the actions so
-/// far.
-pub fn stream(
+/// Fails if the controller cannot be armed, refuses a prefix, is lost, or stops for a fault while armed. The log then has
+/// the actions so far.
+pub fn stream<'p>(
     client: &mut Client,
     observations: impl Iterator<Item = Vec<f32>>,
+    prefix: impl Fn(usize) -> Option<Prefix<'p>>,
     pace: &Pace,
     log: &mut Log,
     mut seen: impl FnMut(&Status),
 ) -> Result<()> {
+    let mut sent = prefix(0).map(|prefix| Sent::begin(client, prefix)).transpose()?;
+    while let Some(sent) = &mut sent
+        && sent.advance(client)?
+    {}
     let (mut due, mut armed) = (Instant::now(), false);
     for (i, observation) in observations.enumerate() {
+        if let (Some(next), Some(last)) = (prefix(i), &mut sent)
+            && last.push.is_none()
+            && (next.bytes != last.prefix.bytes || last.begun.elapsed() > RENEWAL)
+        {
+            *last = Sent::begin(client, next)?;
+        }
         if pace.arm && i == BEFORE_ARMING {
             client.arm()?;
             armed = true;
@@ -45,16 +87,16 @@ pub fn stream(
         log.observed(client.observe(&observation)?, &observation);
         // No burst follows if arming took longer than a period.
         due = (due + pace.period).max(Instant::now());
-        listen(client, due, armed, log, &mut seen)?;
+        listen(client, due, sent.as_mut(), armed, log, &mut seen)?;
     }
     // The last action may be late. A controller that answers a later request has read the observation.
     if log.rows().last().is_some_and(|row| row.answer.is_none()) {
         client.status()?;
-        listen(client, Instant::now() + pace.period.max(LAST_ACTION), armed, log, &mut seen)?;
+        listen(client, Instant::now() + pace.period.max(LAST_ACTION), None, armed, log, &mut seen)?;
     }
     if armed {
         client.disarm()?;
-        listen(client, Instant::now(), false, log, &mut seen)?;
+        listen(client, Instant::now(), None, false, log, &mut seen)?;
     }
     Ok(())
 }
@@ -62,6 +104,7 @@ pub fn stream(
 fn listen(
     client: &mut Client,
     until: Instant,
+    mut sent: Option<&mut Sent<'_>>,
     armed: bool,
     log: &mut Log,
     seen: &mut impl FnMut(&Status),
@@ -78,6 +121,9 @@ fn listen(
                 }
                 _ => {}
             }
+        }
+        if let Some(sent) = &mut sent {
+            sent.advance(client)?;
         }
         if Instant::now() >= until {
             return Ok(());

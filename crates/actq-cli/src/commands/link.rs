@@ -8,15 +8,16 @@ use std::path::Path;
 use std::time::Duration;
 
 use actq::data::{Dataset, Sizes};
-use actq::runtime::ImageBuffer;
+use actq::runtime::{ImageBuffer, keys_and_values, prefix_bytes, prefix_len};
 use actq::text::count;
 use actq_client::client::Client;
 use actq_client::connection::Connection;
 use actq_client::keys::Signed;
 use actq_client::log::Log;
-use actq_client::push::{Package, axes_note, push};
-use actq_client::stream::{BEFORE_ARMING, Pace, stream};
+use actq_client::push::{Package, Prefix, axes_note, push};
+use actq_client::stream::{BEFORE_ARMING, LIFETIME, Pace, stream};
 use actq_client::{port, serve};
+use actq_kernels::Image;
 use anyhow::{Context as _, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -116,15 +117,23 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     let pace = Pace { period: Duration::from_secs_f64(1.0 / rate), arm: args.arm };
     // A signal ends the observations: the controller is disarmed, and the log written.
     let _ends_itself = EndsItself::begin();
+    let (prefixes, of_frame) = prefixes(&image, &recording)?;
+    let ticks = LIFETIME.as_nanos() / u128::from(client.timing()?.period.max(1));
+    let lifetime = u32::try_from(ticks).unwrap_or(u32::MAX);
+    let prefix = |frame: usize| {
+        let bytes = prefixes.get(*of_frame.get(frame)?)?;
+        Some(Prefix { bytes, image: image.crc(), lifetime })
+    };
     let (progress, mut log) = (Progress::new(false, "streaming")?, Log::default());
     let observations =
         recording.observations().take_while(|_| ending::stop_signal().is_none()).enumerate().map(|(i, observation)| {
             progress.set_share(i as f64 / frames as f64);
-            // The noise of an iterative head follows the observation; the controller makes its own.
+            // Prefix and noise follow the observation; the controller makes its own noise.
             observation.iter().take(image.obs_len()).copied().collect()
         });
-    let outcome =
-        stream(&mut client, observations, &pace, &mut log, |status| progress.set_work(&status.state.to_string()));
+    let outcome = stream(&mut client, observations, prefix, &pace, &mut log, |status| {
+        progress.set_work(&status.state.to_string())
+    });
     drop(progress);
     // After an error the log shows what came before it.
     if args.log.is_some() {
@@ -141,6 +150,23 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
         at(0.99)
     ))?;
     outcome
+}
+
+/// Returns the prefixes in a recording, each once as long as it does not change, and the number of each frame's; nothing for an
+/// image that reads none.
+fn prefixes(image: &Image<'_>, recording: &Dataset) -> Result<(Vec<Vec<u8>>, Vec<usize>)> {
+    let (mut prefixes, mut of_frame, mut last) = (Vec::new(), Vec::new(), Vec::new());
+    let len = prefix_len(image);
+    for observation in recording.observations().filter(|_| len > 0) {
+        let row: Vec<f32> = observation.iter().skip(image.obs_len()).take(len).copied().collect();
+        if row != last {
+            let parts: Vec<_> = keys_and_values(image, &row).into_iter().map(|(_, part)| part).collect();
+            prefixes.push(prefix_bytes(image, &parts)?);
+            last = row;
+        }
+        of_frame.push(prefixes.len() - 1);
+    }
+    Ok((prefixes, of_frame))
 }
 
 fn run_push(args: &PushArgs) -> Result<()> {

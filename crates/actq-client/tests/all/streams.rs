@@ -32,7 +32,7 @@ fn a_streamed_recording_is_logged_with_its_actions() {
         moved.set(moved.get() || followed && status.state == State::Armed);
     };
     let sent = observations(MANY).enumerate().take_while(|(i, _)| *i < 100 || !moved.get()).map(|(_, values)| values);
-    stream(&mut client, sent, &PACE, &mut log, seen).expect("losing one in twenty frames stops nothing");
+    stream(&mut client, sent, |_| None, &PACE, &mut log, seen).expect("losing one in twenty frames stops nothing");
     assert!(moved.get());
     assert_eq!(client.status().expect("the controller answers").state, State::Disarmed);
     let rows = log.rows();
@@ -63,7 +63,7 @@ fn a_stopped_controller_ends_the_stream() {
         }
         values
     });
-    let error = stream(&mut client, cut, &PACE, &mut log, |_| ()).expect_err("it has latched");
+    let error = stream(&mut client, cut, |_| None, &PACE, &mut log, |_| ()).expect_err("it has latched");
     assert!(error.to_string().contains("no valid observation arrived within the deadline"), "{error:#}");
     // A controller that is late loses the last answers with the connection, but not that to the observation before
     // arming.
@@ -82,7 +82,7 @@ fn a_late_controller_loses_no_last_action() {
             }
             values
         });
-        stream(&mut client, late, &Pace { arm, ..PACE }, &mut log, |_| ()).expect("the controller answers");
+        stream(&mut client, late, |_| None, &Pace { arm, ..PACE }, &mut log, |_| ()).expect("the controller answers");
         let answer = log.rows()[19].answer.as_ref().expect("the last observation has its action");
         assert_eq!((&answer.action[..], answer.applied), (&[0.25, -0.125][..], arm));
     }

@@ -1,8 +1,11 @@
 //! A prefix that a host sends to the application in QEMU: the actions have the host's bits, and no old one is used.
 
+use std::fs;
 use std::time::{Duration, Instant};
 
-use actq::runtime::{ImageBuffer, with_head};
+use actq::data::arrays;
+use actq::runtime::{ImageBuffer, prefix_len, take_prefix, with_head};
+use actq_bench::command::{actq, run, succeeded};
 use actq_bench::controller::{Controller, HANG_TIMEOUT, wait_until};
 use actq_bench::{Target, bits, firmware, qemu};
 use actq_boards::Clock;
@@ -13,19 +16,23 @@ use actq_kernels::image::Cache;
 use actq_link::code::{Fault, Refusal, State};
 use actq_testkit::Random;
 use anyhow::{Context as _, Result, bail, ensure};
+use ndarray::Array3;
+use tempfile::TempDir;
 
 use crate::attention::Prefixed;
 use crate::draft::Draft;
+use crate::folder::write_observations;
 
 /// Six axes, and a prefix of several frames.
 fn prefixed() -> Prefixed {
-    let cache = Cache { heads: 1, dim: 3, slots: 200 };
-    Prefixed { heads: 2, caches: vec![cache, Cache { slots: 30, ..cache }], tokens: 1, factor: 0.5 }
+    let cache = Cache { heads: 1, dim: 3, slots: 200, own: 0 };
+    let caches = vec![cache, Cache { slots: 30, own: 4, ..cache }];
+    Prefixed { heads: 2, caches, tokens: 1, is_causal: false, factor: 0.5 }
 }
 
 /// The board, its client, the image's checksum, an observation, and two prefixes with the bits of their actions.
 struct Bench {
-    _controller: Controller,
+    controller: Controller,
     client: Client,
     image: u32,
     observation: Vec<f32>,
@@ -40,7 +47,7 @@ impl Bench {
         let file = qemu::slot(draft.bytes())?;
         let buffer = ImageBuffer::new(draft.bytes());
         let image = buffer.image(file.path())?;
-        let observation: Vec<f32> = (0..prefixed.len()).map(|_| random.unit()).collect();
+        let observation: Vec<f32> = (0..prefixed.obs_len()).map(|_| random.unit()).collect();
         let mut prefixes = [(); 2].map(|()| (prefixed.bytes(&prefixed.keys_and_values(&mut random)), Vec::new()));
         for (bytes, action) in &mut prefixes {
             *action = with_head::<_, anyhow::Error>(image, |head| {
@@ -52,7 +59,7 @@ impl Bench {
         let elf = firmware::controller_with(Target::Fpu, file.path())?;
         let controller = Controller::start_by(Target::Fpu, &elf, None, Clock::Host)?;
         let client = controller.client()?;
-        Ok(Self { _controller: controller, client, image: image.crc(), observation, prefixes })
+        Ok(Self { controller, client, image: image.crc(), observation, prefixes })
     }
 
     /// Sends a prefix before anything is armed.
@@ -169,4 +176,54 @@ fn an_old_prefix_latches() -> Result<()> {
         ensure!([Fault::Stale, Fault::Late].contains(&fault), "{fault}");
         Ok(false)
     })
+}
+
+/// `actq link stream` sends the prefix of a recording's first row before all observations, and another one between them.
+#[test]
+fn a_recorded_prefix_is_streamed() -> Result<()> {
+    const EACH: usize = 20;
+    let bench = Bench::start()?;
+    drop(bench.client);
+    let folder = TempDir::new()?;
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let [image_file, recording, log] = ["image.actq", "rows.npz", "log.npz"].map(path);
+    let draft = Draft(prefixed().image());
+    fs::write(&image_file, draft.bytes())?;
+    let buffer = ImageBuffer::new(draft.bytes());
+    let image = buffer.image(image_file.as_ref())?;
+    let (own, prefix, mut random) = (image.obs_len(), prefix_len(&image), Random::new(16));
+    let prefixes = [(); 2].map(|()| (0..prefix).map(|_| random.unit()).collect::<Vec<f32>>());
+    let rows = Array3::from_shape_fn((1, 2 * EACH, own + prefix), |(_, row, i)| match i.checked_sub(own) {
+        Some(i) => prefixes[row / EACH][i],
+        None => random.unit(),
+    });
+    write_observations(recording.as_ref(), &rows)?;
+    let port = bench.controller.address().to_string();
+    let line = ["link", "stream", &port, &image_file, &recording, "--rate", "20", "--log", &log, "--timeout", "600"];
+    let begun = Instant::now();
+    loop {
+        ensure!(begun.elapsed() < HANG_TIMEOUT, "the second prefix never came in time");
+        succeeded(&run(actq(&line), &[])?)?;
+        let log = arrays(log.as_ref())?;
+        let [observations, actions] = ["obs", "action"].map(|name| log[name].values.to_f32().unwrap_or_default());
+        let steps = observations.chunks_exact(own).zip(actions.chunks_exact(image.act_len())).enumerate();
+        let answered = steps.filter(|(_, (_, action))| !action[0].is_nan());
+        let mut of_second = false;
+        with_head::<_, anyhow::Error>(image, |head| {
+            for (row, (observation, action)) in answered {
+                let mut with = |prefix: &[f32]| -> Result<bool> {
+                    let row = [observation, prefix].concat();
+                    let (observation, _) = take_prefix(head, &row)?;
+                    Ok(bits(head.step(observation)?) == bits(action))
+                };
+                let [first, second] = [with(&prefixes[0])?, with(&prefixes[1])?];
+                ensure!(first != second && (!of_second || second) && (row >= EACH || first), "row {row}");
+                of_second |= second;
+            }
+            Ok(())
+        })?;
+        if of_second {
+            return Ok(());
+        }
+    }
 }
