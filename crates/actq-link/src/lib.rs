@@ -21,6 +21,6 @@ mod window;
 
 pub use floats::Floats;
 pub use message::Message;
-pub use pipe::{NO_ACTION, RESET, STEP};
+pub use pipe::{NO_ACTION, PREFIX, RESET, STEP};
 pub use receiver::{Received, Receiver};
 pub use sender::Sender;

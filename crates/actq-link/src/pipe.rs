@@ -4,10 +4,15 @@
 //! Little-endian. A request is the byte [`RESET`], which has no reply, or the byte [`STEP`] and the observation (f32),
 //! whose reply is the action (f32). The policy queues action chunks. If the observation or a value computed from it is
 //! not finite, all values of the reply are [`NO_ACTION`]. The recurrent state and the rest of a chunk are then
-//! discarded, the last action is kept for the step limit, and serving continues.
+//! discarded, the last action is kept for the step limit, and serving continues. `actq serve` also takes the byte
+//! [`PREFIX`] and all keys and values (f32) of a policy that reads a prefix, in the order of its recordings, without a
+//! reply.
 
 /// Resets the policy.
 pub const RESET: u8 = b'R';
+
+/// Sets the policy's prefix.
+pub const PREFIX: u8 = b'P';
 
 /// Steps the policy.
 pub const STEP: u8 = b'S';

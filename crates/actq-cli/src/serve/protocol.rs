@@ -2,9 +2,9 @@
 
 use std::io::{ErrorKind, Read, Write};
 
-use actq::runtime::with_head;
+use actq::runtime::{prefix_len, take_prefix, with_head};
 use actq_kernels::Image;
-use actq_link::{NO_ACTION, RESET, STEP};
+use actq_link::{NO_ACTION, PREFIX, RESET, STEP};
 use anyhow::{Context, Result, bail, ensure};
 
 /// A request of the simulator, and its outcome.
@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail, ensure};
 pub(crate) enum Seen<'a> {
     /// It reset the policy.
     Reset,
-    /// It sent this observation, and the reply was an action.
+    /// It sent this observation, here with its prefix, and the reply was an action.
     Observation(&'a [f32]),
     /// It sent an observation without an action; the head has reset itself.
     NoAction,
@@ -25,12 +25,7 @@ pub(crate) fn serve(
     mut output: impl Write,
     mut seen: impl FnMut(Seen<'_>),
 ) -> Result<()> {
-    ensure!(
-        image.prefix_bytes() == 0,
-        "the image reads a prefix, keys and values from a host, which a simulator cannot send; only a controller on the \
-         link and `Head::set_prefix` take one"
-    );
-    let mut bytes = vec![0u8; 4 * image.obs_len()];
+    let mut observation = vec![0.0; image.obs_len() + prefix_len(&image)];
     let no_action = vec![NO_ACTION; image.act_len()];
     with_head(image, |head| {
         loop {
@@ -44,14 +39,18 @@ pub(crate) fn serve(
                     head.reset();
                     seen(Seen::Reset);
                 }
+                PREFIX => {
+                    ensure!(image.prefix_bytes() > 0, "the image reads no prefix; send none");
+                    let (_, prefix) = observation.split_at_mut(image.obs_len());
+                    read(&mut input, "a prefix", prefix)?;
+                    take_prefix(head, &observation)?;
+                }
                 STEP => {
-                    input
-                        .read_exact(&mut bytes)
-                        .with_context(|| format!("the input ends inside an observation of {} bytes", bytes.len()))?;
-                    let observation: Vec<f32> =
-                        bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+                    ensure!(head.has_prefix(), "the image reads a prefix: send P and the keys and values before S");
+                    let (own, _) = observation.split_at_mut(image.obs_len());
+                    read(&mut input, "an observation", own)?;
                     // After an error the head has reset itself.
-                    let (action, what) = match head.step(&observation) {
+                    let (action, what) = match head.step(own) {
                         Ok(action) => (action, Seen::Observation(&observation)),
                         Err(_) => (&no_action[..], Seen::NoAction),
                     };
@@ -60,8 +59,16 @@ pub(crate) fn serve(
                     seen(what);
                     written.context("cannot write the output")?;
                 }
-                other => bail!("unknown command byte 0x{other:02x}; send R to reset or S to step"),
+                other => bail!("unknown command byte 0x{other:02x}; send R to reset, S to step or P for a prefix"),
             }
         }
     })
+}
+
+/// Reads values, `what` they are.
+fn read(input: &mut impl Read, what: &str, values: &mut [f32]) -> Result<()> {
+    let mut bytes = vec![0; 4 * values.len()];
+    input.read_exact(&mut bytes).with_context(|| format!("the input ends inside {what} of {} bytes", bytes.len()))?;
+    values.iter_mut().zip(bytes.as_chunks().0).for_each(|(value, bytes)| *value = f32::from_le_bytes(*bytes));
+    Ok(())
 }

@@ -8,6 +8,7 @@ use std::thread;
 
 use actq::graph::Evaluator;
 use actq::policy::Policy;
+use actq::runtime::prefix_len;
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, anyhow};
 
@@ -104,7 +105,7 @@ impl<'a, F: Fn(String)> Recorder<'a, F> {
     fn new(image: &Image<'_>, plan: RecordPlan<'a>, note: &'a F) -> Result<Self> {
         let recurrent = image.state().len > 0;
         let action = if plan.source.is_some() { image.output().len } else { 0 };
-        let episodes = Episodes::new(plan.folder(), image.obs_len(), action, recurrent)
+        let episodes = Episodes::new(plan.folder(), image.obs_len() + prefix_len(image), action, recurrent)
             .with_context(|| format!("{}: cannot create a temporary file", plan.folder().display()))?;
         Ok(Self {
             plan,
