@@ -12,12 +12,12 @@ use crate::firmware::cargo_build;
 /// Returns the path of the command `actq`, built once.
 pub fn binary() -> Result<&'static Path> {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
-    built(&BINARY, "actq-cli", "actq")
+    built(&BINARY, "actq")
 }
 
-/// Builds the command `name` of a package, unless `path` holds its path already, in the profile of this build and
+/// Builds the command `name`, unless `path` holds its path already, in the profile of this build and
 /// beside it: cargo does not build the binaries of a dependency.
-fn built(path: &'static OnceLock<PathBuf>, package: &str, name: &str) -> Result<&'static Path> {
+fn built(path: &'static OnceLock<PathBuf>, name: &str) -> Result<&'static Path> {
     if let Some(path) = path.get() {
         return Ok(path);
     }
@@ -27,10 +27,8 @@ fn built(path: &'static OnceLock<PathBuf>, package: &str, name: &str) -> Result<
     let folder = if folder.ends_with("deps") { folder.parent().unwrap_or(folder) } else { folder };
     let profile = folder.file_name().and_then(|name| name.to_str()).context("the profile's name is not UTF-8")?;
     let profile = if profile == "debug" { "dev" } else { profile };
-    // Building it with this package selects the features of the tests; otherwise cargo would build the quantizer twice.
-    let packages = ["--package", package, "--package", env!("CARGO_PKG_NAME")];
-    let command = [&packages[..], &["--bin", name, "--profile", profile]].concat();
-    cargo_build(name, &command, &[])?;
+    // Of all packages, as the tests: for some of them cargo would choose other features, and build the libraries again.
+    cargo_build(name, &["--bin", name, "--profile", profile], &[])?;
     Ok(path.get_or_init(|| folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX))))
 }
 
@@ -44,7 +42,7 @@ pub fn actq(arguments: &[&str]) -> Command {
 /// Returns the command `actq-research` with arguments.
 pub fn research(arguments: &[&str]) -> Command {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
-    let mut command = Command::new(built(&BINARY, "actq-research", "actq-research").expect("actq-research builds"));
+    let mut command = Command::new(built(&BINARY, "actq-research").expect("actq-research builds"));
     command.args(arguments);
     command
 }
