@@ -5,12 +5,10 @@ use std::path::Path;
 
 use actq::runtime::ImageBuffer;
 use actq_bench::command::{actq, failed, research, run, succeeded};
-use actq_bench::ur3;
 use actq_kernels::Width;
 use actq_testkit::{Dtype, safetensors};
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
-use tempfile::TempDir;
 
 use super::fixture::{
     ACT, CHUNK, EPISODES, Fixture, HIDDEN, OBS, STEPS, cut, draw_observations, notes, text, write_npy, write_recording,
@@ -40,15 +38,15 @@ fn a_budget_of_time_is_kept_or_refused() -> Result<()> {
 
 #[test]
 fn relative_errors_change_the_image() -> Result<()> {
-    let dir = TempDir::new()?;
-    let (policy, out) = (text(&ur3()), text(&dir.path().join("relative.actq")));
+    let fixture = Fixture::with_long_recording()?;
+    let (policy, out) = (text(&fixture.policy()), text(&fixture.out("relative.actq")));
     let quantize = |arguments: &[&str]| {
-        run(actq(&[&["quantize", &policy, "--out", &out, "--bpw", "2.0"], arguments].concat()), b"")
+        run(actq(&[&["quantize", &policy, "--out", &out, "--bpw", "2.5"], arguments].concat()), b"")
     };
     // As many steps as learning needs to be kept.
-    succeeded(&quantize(&["--steps", "200"])?)?;
+    succeeded(&quantize(&["--steps", "1000"])?)?;
     let even = fs::read(&out)?;
-    succeeded(&quantize(&["--steps", "200", "--relative"])?)?;
+    succeeded(&quantize(&["--steps", "1000", "--relative"])?)?;
     ensure!(fs::read(&out)? != even, "the option changes nothing");
     Ok(())
 }

@@ -15,6 +15,7 @@ use actq_kernels::Width;
 use anyhow::Result;
 
 use super::recorded::TOLERANCE;
+use super::units::{self, SMALL_OBS, small};
 
 fn image(quantizer: &Quantizer<'_>, options: &Options) -> actq::error::Result<Vec<u8>> {
     Ok(quantizer.quantize(options, ())?.image)
@@ -70,7 +71,10 @@ fn a_forced_width_reaches_every_row() -> Result<()> {
 
 #[test]
 fn another_seed_gives_another_image() -> Result<()> {
-    let quantizer = quantizer()?;
+    let units = [1.0; SMALL_OBS];
+    let policy = Policy::of("small", small(&units, 3)?);
+    let recordings = Recordings { calib: Some(units::recorded(1, &units, &policy.graph)), heldout: None };
+    let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
     // As many steps as learning needs to be kept.
     let options = distill(2.0, 200);
     let other = Options { seed: 2, ..options.clone() };

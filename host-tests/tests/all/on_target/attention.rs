@@ -63,7 +63,7 @@ fn every_core_has_the_hosts_bits_of_a_prefix() -> Result<()> {
     for target in [Target::Fpu, Target::NoFpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M55] {
         let harness = Harness::build_with(target, "attention")?;
         let mut random = Random::new(14);
-        for _ in 0..4 {
+        for _ in 0..2 {
             let prefixed = Prefixed::draw(&mut random);
             let observations: Vec<Vec<f32>> =
                 (0..3).map(|_| (0..prefixed.obs_len()).map(|_| random.unit()).collect()).collect();

@@ -12,7 +12,7 @@ use anyhow::{Context as _, Result, ensure};
 use crate::deployed::{Made, PUBLISHED, published};
 
 /// Ticks on the host and in QEMU.
-const TICKS: usize = 1000;
+const TICKS: usize = 400;
 
 fn single(raw: &[Vec<Vec<f64>>]) -> Vec<Vec<f32>> {
     let single = |tick: usize| raw[tick % raw.len()].iter().flatten().map(|x| *x as f32).collect();

@@ -206,8 +206,6 @@ impl Steps {
         let features = ["mps2-an386,tick-8khz,foc"];
         let arguments = [&["clippy", "--package", APPLICATION], &fpu[..], &programs, &features, &DENY].concat();
         self.add_of_firmware("lints of the application's other features", &arguments, &[]);
-        let current_loop = ["test", "--profile", PROFILE, "--package", APPLICATION, "--lib", "--features", "foc"];
-        self.add("tests of the application's current loop", &current_loop);
         let styles = [&["clippy", "--package", STYLES, "--lib", "--bins"], &fpu[..], &DENY].concat();
         self.add_of_firmware("lints of the styles", &styles, &[]);
         let defmt = [&["clippy", "--package", "actq-kernels", "--features", "defmt"], &fpu[..], &DENY].concat();
