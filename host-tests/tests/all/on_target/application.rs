@@ -253,7 +253,7 @@ fn crumb_of(target: Target, command: u8) -> Result<(PathBuf, Breadcrumb)> {
 fn a_hard_fault_leaves_its_address() -> Result<()> {
     for target in BOARDS {
         let (elf, crumb) = crumb_of(target, b'h')?;
-        assert_eq!(crumb.crash, Some(Crash::HardFault), "{target:?}");
+        assert_eq!(crumb.crash, Some(Crash::HardFault), "{target:?}: {crumb:?}");
         let instruction = halfword_at(&elf, crumb.pc)?;
         // UDF, or C.UNIMP.
         let is_undefined = if target == Target::Riscv { instruction == 0 } else { instruction & 0xff00 == 0xde00 };
