@@ -120,8 +120,9 @@ fn run(
             "values": denoising.len, "noise": denoising.noise_len(), "limit": limit(denoising.limit.into()), "clip_iterate": inputs.clip_iterate,
         })
     });
+    let inputs: Vec<_> = imported.inputs.iter().chain(&imported.prefix.inputs).collect();
     let plan = serde_json::json!({
-        "inputs": imported.inputs, "states": states, "output": imported.output.0, "sampler": sampler,
+        "inputs": inputs, "states": states, "output": imported.output.0, "sampler": sampler,
     });
     let python = env::var_os("ACTQ_PYTHON").unwrap_or_else(|| "python3".into());
     let failed =
@@ -139,7 +140,7 @@ fn run(
         .stderr(Stdio::piped())
         .spawn()
         .context(failed)?;
-    let bytes: Vec<u8> = observations.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
+    let bytes: Vec<u8> = observations.iter().flat_map(|row| imported.of_file(row)).flat_map(f32::to_le_bytes).collect();
     // Python may have ended without reading; its message then gives the reason.
     let _ = child.stdin.take().context("Python has no standard input")?.write_all(&bytes);
     let output = child.wait_with_output().context(failed)?;

@@ -12,7 +12,9 @@ use actq_onnx::Imported;
 pub fn probes(imported: &Imported, policy: &Policy, magnitudes: &[f32], frames: usize) -> Vec<Vec<f32>> {
     let mut random = Random::new(1);
     let whole = |(name, len): &(String, usize)| vec![imported.integers.contains(name); *len];
-    let whole: Vec<bool> = imported.inputs.iter().flat_map(whole).collect();
+    let mut whole: Vec<bool> = imported.inputs.iter().flat_map(whole).collect();
+    // A prefix follows the observation.
+    whole.resize(whole.len() + policy.graph.prefix_len, false);
     let plain = vec![(0.0, 1.0); whole.len()];
     let normalized = normalizers(&policy.graph);
     let rounds = if normalized == plain { vec![plain] } else { vec![plain, normalized] };

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
-use actq::error::{Context as _, Result, bail, ensure};
+use actq::error::{Context as _, Error, Result, bail, ensure};
 use actq::import::json::{Input, JsonOp};
 use actq::import::values::{Tensor, Values};
 
@@ -18,6 +18,9 @@ struct Part {
     len: usize,
 }
 
+/// The slot of a prefix, of which no op but attention reads.
+const PREFIX: usize = usize::MAX;
+
 /// The most repetitions of an element in one operand, each of which is a copy. A longer operand repeats an op with this
 /// many copies.
 const MAX_COPIES: usize = 64;
@@ -26,6 +29,8 @@ const MAX_COPIES: usize = 64;
 pub(crate) struct Lowered {
     pub(crate) ops: Vec<JsonOp>,
     pub(crate) tensors: BTreeMap<String, Tensor>,
+    /// Values of the inputs that are the prefix, in the order of the ops that read them: keys, then values.
+    pub(crate) prefix: Vec<usize>,
     /// Input parts of each op, and the slots of its other operands.
     reads: Vec<(Vec<Part>, Vec<usize>)>,
     /// Names and lengths of the inputs in slot 0.
@@ -42,17 +47,26 @@ pub(crate) struct Lowered {
     included: HashSet<Id>,
 }
 
-/// Lowers a value. `inputs` are the names and lengths of the policy's inputs, and `offsets` the place of each graph input
-/// in them. An error holds the expression without an op.
+/// Places of graph inputs, by their indices.
+#[derive(Clone, Copy)]
+pub(crate) struct Offsets<'a> {
+    /// In the policy's inputs, one after the other.
+    pub(crate) observed: &'a HashMap<usize, usize>,
+    /// In the inputs that are the prefix, likewise.
+    pub(crate) prefix: &'a HashMap<usize, usize>,
+}
+
+/// Lowers a value. `inputs` are the names and lengths of the policy's inputs. An error holds the expression without an op.
 pub(crate) fn lower(
     exprs: &Exprs,
     root: Id,
-    offsets: &HashMap<usize, usize>,
+    offsets: Offsets<'_>,
     inputs: Vec<(&'static str, usize)>,
-) -> Result<Lowered, (Id, actq::error::Error)> {
+) -> Result<Lowered, (Id, Error)> {
     let mut lowered = Lowered {
         ops: Vec::new(),
         tensors: BTreeMap::new(),
+        prefix: Vec::new(),
         reads: Vec::new(),
         lens: vec![inputs.iter().map(|(_, len)| len).sum()],
         inputs,
@@ -84,16 +98,24 @@ pub(crate) fn lower(
         }
     }
     lowered.end(root).map_err(|error| (root, error))?;
+    let is_of_prefix = |part: &Part| part.slot == PREFIX;
+    if lowered.reads.iter().any(|(parts, _)| parts.iter().any(is_of_prefix)) {
+        let why =
+            "reads a value of the prefix that is no key or value of attention before those of the network's own tokens";
+        return Err((root, Error::input(why)));
+    }
     lowered.slots();
     Ok(lowered)
 }
 
 impl Lowered {
-    fn value(&mut self, exprs: &Exprs, id: Id, offsets: &HashMap<usize, usize>) -> Result<()> {
+    fn value(&mut self, exprs: &Exprs, id: Id, offsets: Offsets<'_>) -> Result<()> {
         let place = match exprs.get(id) {
             Expr::Input(i) => {
-                let from = *offsets.get(i).context("a recurrent state is read outside its cell")?;
-                vec![Part { slot: 0, from, len: exprs.len_of(id) }]
+                let observed = offsets.observed.get(i).map(|from| (0, from));
+                let place = observed.or(offsets.prefix.get(i).map(|from| (PREFIX, from)));
+                let (slot, &from) = place.context("a recurrent state is read outside its cell")?;
+                vec![Part { slot, from, len: exprs.len_of(id) }]
             }
             Expr::Pick(runs) => merged(runs.iter().flat_map(|run| self.cut(*run)).collect()),
             Expr::Spread(x) => self.spread(*x, exprs.len_of(id))?,
@@ -147,7 +169,7 @@ impl Lowered {
             Expr::Unary(Unary::Known(f), x) => self.push(JsonOp::new(f.name()), self.place(*x), &[], len),
             Expr::Add(x, y) | Expr::Mul(x, y) => {
                 let name = if matches!(exprs.get(id), Expr::Add(..)) { "add" } else { "mul" };
-                let with = self.whole(*y)?;
+                let with = self.whole(*y);
                 self.push(JsonOp::new(name), self.place(*x), &[("with", with)], len)
             }
             Expr::LayerNorm(x, weight, bias, eps) => {
@@ -201,11 +223,30 @@ impl Lowered {
             "has a mask that depends on an input, and only that of a window of tokens in the state is supported; export \
              a causal or a full one"
         );
-        let (keys, values) = (self.whole(of.keys)?, self.whole(of.values)?);
+        let [keys, values] = [of.keys, of.values].map(|id| {
+            let mut prefix = self.place(id);
+            let own = prefix.split_off(prefix.iter().take_while(|part| part.slot == PREFIX).count());
+            (prefix, own)
+        });
+        let (width, of_prefix) = (of.kv_heads * of.dim, [len_of(&keys.0), len_of(&values.0)]);
+        ensure!(
+            of_prefix[0] == of_prefix[1] && of_prefix[0].is_multiple_of(width),
+            "reads {} keys and {} values of the prefix, which are not the same tokens of {width}",
+            of_prefix[0],
+            of_prefix[1]
+        );
+        self.prefix.extend([&keys.0, &values.0].into_iter().flatten().flat_map(|part| part.from..part.from + part.len));
+        let mut others = Vec::new();
+        if of_prefix[0] == 0 {
+            others.extend([("keys", self.whole(of.keys)), ("values", self.whole(of.values))]);
+        } else if !keys.1.is_empty() {
+            others.extend([("keys", self.slot_of(keys.1)), ("values", self.slot_of(values.1))]);
+        }
         let op = JsonOp::new("attention").key("heads", Some(of.heads)).key("kv_heads", Some(of.kv_heads));
         let op = op.key("dim", Some(of.dim)).key("factor", Some(of.factor)).key("causal", Some(of.causal));
         let op = op.key("context", (of.context > 0).then_some(of.context));
-        Ok(self.push(op, self.place(of.queries), &[("keys", keys), ("values", values)], len))
+        let op = op.key("prefix", (of_prefix[0] > 0).then_some(of_prefix[0] / width));
+        Ok(self.push(op, self.place(of.queries), &others, len))
     }
 
     fn cell(&mut self, cell: &Cell, hidden: usize) -> Result<Vec<Part>> {
@@ -256,15 +297,20 @@ impl Lowered {
     }
 
     /// Returns the slot that consists of this value, or copies the value to a new one.
-    fn whole(&mut self, id: Id) -> Result<usize> {
-        let place = self.place(id);
+    fn whole(&mut self, id: Id) -> usize {
+        let slot = self.slot_of(self.place(id));
+        self.places.insert(id, vec![Part { slot, from: 0, len: self.lens[slot] }]);
+        slot
+    }
+
+    /// Returns the slot that consists of these parts, or copies them to a new one.
+    fn slot_of(&mut self, place: Vec<Part>) -> usize {
         match place[..] {
-            [part] if self.is_whole(part) => Ok(part.slot),
+            [part] if self.is_whole(part) => part.slot,
             _ => {
-                let n = place.iter().map(|part| part.len).sum();
-                let moved = self.push(JsonOp::new("identity"), place, &[], n);
-                self.places.insert(id, moved);
-                Ok(self.ops.len())
+                let n = len_of(&place);
+                self.push(JsonOp::new("identity"), place, &[], n);
+                self.ops.len()
             }
         }
     }
@@ -368,6 +414,10 @@ impl Lowered {
         self.tensors.insert(name.clone(), Tensor { shape, values: Values::F32(data) });
         Ok(name)
     }
+}
+
+fn len_of(parts: &[Part]) -> usize {
+    parts.iter().map(|part| part.len).sum()
 }
 
 fn slot_name(slot: usize) -> String {

@@ -7,9 +7,10 @@ mod options;
 mod output;
 mod remarks;
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use actq::error::{Context as _, Error, Result};
+use actq::error::{Context as _, Error, Result, ensure};
 use actq::import::contract::JsonContract;
 use actq::import::json::PolicyJson;
 use actq::import::{Importer, PolicySource};
@@ -19,12 +20,12 @@ use prost::bytes::Bytes;
 
 pub use self::denoiser::Denoiser;
 use self::denoiser::Places;
-use self::observation::{Observation, named_states, observed_inputs, read_inputs, refuse_integers};
+use self::observation::{Observation, named_states, observed_inputs, prefix_inputs, read_inputs, refuse_integers};
 pub use self::options::ImportOptions;
 use self::output::{actions, choose, refuse_batch, refuse_column, refused_actions};
 use crate::action;
 use crate::file::model::Model;
-use crate::lower::lower;
+use crate::lower::{Offsets, lower};
 use crate::nodes::attention::{PRODUCT, SOFTMAX};
 use crate::nodes::follow::Follower;
 use crate::patterns::simplify::simplify;
@@ -45,6 +46,8 @@ pub struct Imported {
     pub inputs: Vec<(String, usize)>,
     /// Observed inputs that the file takes as integers. The observation holds them as integers in float32.
     pub integers: Vec<String>,
+    /// Inputs of keys and values that a host sends.
+    pub prefix: Prefix,
     /// Inputs of a denoiser that are not observed.
     pub denoiser: Option<Denoiser>,
     /// Inputs that hold recurrent state, the outputs of their next values, and their lengths.
@@ -73,6 +76,16 @@ pub struct Imported {
     pub unsized_axes: Vec<String>,
     /// Reasons why the file is invalid, although its network can be read.
     pub faults: Vec<String>,
+}
+
+/// Inputs of a file that are keys and values of a prefix.
+#[derive(Clone, Debug, Default)]
+pub struct Prefix {
+    /// Names and lengths of the inputs.
+    pub inputs: Vec<(String, usize)>,
+    /// For each value of the policy's prefix, which follows the observation, its place in these inputs, one after the
+    /// other.
+    pub order: Vec<usize>,
 }
 
 /// A parsed ONNX file. Its errors name the file.
@@ -194,6 +207,12 @@ impl Imported {
             text += &format!("{head:9} obs[{at}:{}] = {name}{integers}\n", at + len);
             at += len;
         }
+        let from_host: Vec<_> =
+            self.prefix.inputs.iter().map(|(name, len)| format!("{name}, {}", count(*len, "value"))).collect();
+        if !from_host.is_empty() {
+            let order = "from a host; in recordings after the observation, as [token, head, element]";
+            text += &format!("prefix    {}; {order}\n", from_host.join("; "));
+        }
         if let Some(Denoiser { time, iterate, times, .. }) = &self.denoiser {
             text += &format!("sampler   {iterate} from noise in {}, at {time}\n", count(times.len(), "evaluation"));
         }
@@ -202,6 +221,17 @@ impl Imported {
         }
         let chunk = self.source.json.chunk.map_or(String::new(), |chunk| format!(": a chunk of {chunk} actions"));
         text + &format!("output    {}, {}{chunk}\n", self.output.0, count(self.output.1, "value"))
+    }
+
+    /// Returns the values of the file's inputs for a row of the policy: those that it observes, those of the prefix, and the
+    /// rest of the row.
+    pub fn of_file(&self, row: &[f32]) -> Vec<f32> {
+        let observed: usize = self.inputs.iter().map(|(_, len)| len).sum();
+        let mut values = row.to_vec();
+        for (i, at) in self.prefix.order.iter().enumerate() {
+            values[observed + at] = row[observed + i];
+        }
+        values
     }
 
     /// Names the inputs and outputs that are left out, a line for each of the two.
@@ -231,7 +261,9 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
     let pairs = cells.pairs(model, &exprs, &live, &outputs)?;
     let graph = Chosen { model, exprs: &exprs, cells: &cells, outputs: &outputs, action: &output.name };
     let values = exprs.len_of(root);
-    let read = read_inputs(&exprs, &live);
+    let all_read = read_inputs(&exprs, &live);
+    let of_prefix = prefix_inputs(model, &all_read, &options.prefix)?;
+    let read: Vec<usize> = all_read.iter().copied().filter(|i| !of_prefix.contains(i)).collect();
     let places = match &options.sampler {
         Some(sampler) => Some(Places::find(model, &read, values, sampler)?),
         None => None,
@@ -248,6 +280,7 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         Some(_) => observation.of_denoiser()?,
         None => vec![("obs", observation.len)],
     };
+    let prefix = Observation::of(model, &exprs, &live, &of_prefix);
     let states = named_states(model, &pairs, &outputs);
 
     let (chunk, act_len) = if options.is_fed {
@@ -267,8 +300,15 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         false => Some(contract.unwrap_or_default().limited(&options.limits, act_len)?),
     };
     let root = simplify(&mut exprs, root, &cells.instead);
-    let lowered =
-        lower(&exprs, root, &observation.offsets, slots).map_err(|(id, error)| at_node(model, &exprs, id, error))?;
+    let offsets = Offsets { observed: &observation.offsets, prefix: &prefix.offsets };
+    let lowered = lower(&exprs, root, offsets, slots).map_err(|(id, error)| at_node(model, &exprs, id, error))?;
+    let is_read_once = lowered.prefix.iter().collect::<HashSet<_>>().len() == prefix.len;
+    ensure!(
+        is_read_once && lowered.prefix.len() == prefix.len,
+        "attention reads {} of the {} values of the inputs of --prefix; it must read each once",
+        lowered.prefix.len(),
+        prefix.len
+    );
 
     let is_chunk = chunk > 1 || places.is_some();
     let sampler = options.sampler.as_ref();
@@ -300,7 +340,8 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         ops: json.ops.iter().map(|op| op.op.clone()).collect(),
         source: PolicySource { json, about, tensors: lowered.tensors },
         producer: model.producer.clone(),
-        cut_inputs: cut_inputs(model, &read, &states),
+        cut_inputs: cut_inputs(model, &all_read, &states),
+        prefix: Prefix { inputs: prefix.inputs, order: lowered.prefix },
         cut_outputs: cut_outputs(model, &action, &states),
         denoiser: places.zip(sampler).map(|(places, sampler)| places.named(model, sampler)).transpose()?,
         inputs: observation.inputs,

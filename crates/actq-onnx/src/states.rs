@@ -244,7 +244,7 @@ impl Chosen<'_> {
             if let Some(reason) = self.cells.caches.reasons.get(&i) {
                 bail!(
                     "the input {name:?} holds tokens of earlier steps, and {reason}; if it is measured anew in each step, pass --observe \
-                     {name}"
+                     {name}; keys and values from a host are a prefix (docs/IMPORT.md)"
                 );
             }
             ensure!(

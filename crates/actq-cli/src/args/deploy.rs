@@ -29,6 +29,10 @@ pub(crate) struct ImportArgs {
     /// An input that is measured anew in each step, although its name is that of a state or a constant; may be repeated
     #[arg(long, value_name = "NAME")]
     pub(crate) observe: Vec<String>,
+    /// An input of keys or values that a host sends, as those of a large model (docs/POLICY.md); may be repeated. Attention
+    /// reads them before the network's own
+    #[arg(long, value_name = "NAME")]
+    pub(crate) prefix: Vec<String>,
     /// The file has the network of a flow or a diffusion policy, which makes actions from noise: a JSON file of its steps,
     /// as {"kind": "flow", "steps": 10, "time": {"from": 0, "to": 1}} (docs/POLICY.md). The time and the iterate are the inputs
     /// of one value and of the output's length, or those that the keys time_input and iterate_input name

@@ -32,10 +32,11 @@ pub(crate) fn is_bundle(args: &ImportArgs) -> bool {
 
 /// Reads a bundle, checks it, and writes its description with copies of the networks.
 pub(crate) fn run(args: &ImportArgs) -> Result<()> {
-    let names = args.output.is_some() || !args.state.is_empty() || !args.observe.is_empty();
+    let lists = [args.observe.is_empty(), args.prefix.is_empty(), args.state.is_empty()];
+    let names = args.output.is_some() || lists.contains(&false);
     ensure!(
         !names && args.rate_hz.is_none() && args.sampler.is_none(),
-        "a bundle takes no --output, --state, --observe, --rate-hz and --sampler: its description has them"
+        "a bundle takes no --output, --state, --observe, --prefix, --rate-hz and --sampler: its description has them"
     );
     ensure!(
         !args.check || args.reading.reference.is_some(),

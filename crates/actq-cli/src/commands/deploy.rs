@@ -91,6 +91,7 @@ fn import_bundle(args: &DeployArgs, policy: &Path, description: &Path) -> Result
             output: None,
             state: Vec::new(),
             observe: Vec::new(),
+            prefix: Vec::new(),
             sampler: None,
             rate_hz: None,
             check: false,

@@ -25,6 +25,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         output: args.output.clone(),
         states: args.state.clone(),
         observed: args.observe.clone(),
+        prefix: args.prefix.clone(),
         sampler: args.sampler.as_deref().map(sampler).transpose()?,
         ..ImportOptions::default()
     };

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use actq::error::{Result, bail, ensure};
+use actq::error::{Context as _, Result, bail, ensure};
 use actq::text::printable;
 
 use super::options::ImportOptions;
@@ -55,6 +55,15 @@ pub(super) fn read_inputs(exprs: &Exprs, live: &[Id]) -> Vec<usize> {
     let mut read: Vec<usize> = live.iter().filter_map(input).collect();
     read.sort_unstable();
     read
+}
+
+/// Returns the indices of the inputs with these names. Refuses one that the action does not `read`.
+pub(super) fn prefix_inputs(model: &Model, read: &[usize], names: &[String]) -> Result<Vec<usize>> {
+    let index = |name: &String| {
+        let found = read.iter().find(|i| model.graph.inputs[**i].name == *name).copied();
+        found.with_context(|| format!("--prefix {}: the action does not depend on this input", printable(name)))
+    };
+    names.iter().map(index).collect()
 }
 
 /// Returns the inputs that the action `read`s, by their indices, except states. Refuses an action without any.

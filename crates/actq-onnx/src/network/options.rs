@@ -19,6 +19,8 @@ pub struct ImportOptions {
     pub states: Vec<(String, String)>,
     /// Inputs that are observed, although their names are those of states or constants.
     pub observed: Vec<String>,
+    /// Inputs that are keys or values of a prefix, which a host sends (docs/POLICY.md).
+    pub prefix: Vec<String>,
     /// `true` if the caller gives each input its value in each step, and takes the values of the output one after the
     /// other. An input may then hold a state without a cell, and the output's axes mean nothing.
     pub is_fed: bool,
@@ -46,13 +48,15 @@ impl ImportOptions {
                 outputs()
             );
         }
-        for name in &self.observed {
-            ensure!(
-                graph.inputs.iter().any(|port| port.name == *name),
-                "--observe {}: the file has no input of this name; its inputs are {}",
-                printable(name),
-                listed(graph.inputs.iter())
-            );
+        for (option, names) in [("observe", &self.observed), ("prefix", &self.prefix)] {
+            for name in names {
+                ensure!(
+                    graph.inputs.iter().any(|port| port.name == *name),
+                    "--{option} {}: the file has no input of this name; its inputs are {}",
+                    printable(name),
+                    listed(graph.inputs.iter())
+                );
+            }
         }
         for (from, to) in &self.states {
             let [state, from_name, to_name] =

@@ -1,8 +1,9 @@
 //! ONNX's operator Attention, which tract does not have, against its parts.
 
+use actq::graph::{Node, NodeKind};
 use actq::measure::actions::actions;
 use actq_onnx::{ImportOptions, proto};
-use anyhow::{Result, ensure};
+use anyhow::{Context as _, Result, ensure};
 use prost::Message as _;
 
 use super::file::{File, encoded};
@@ -87,6 +88,67 @@ fn its_past_keys_are_a_state() -> Result<()> {
          Flatten(MatMul(w, values))"
     );
     equal(&written(with_states(), &operator, 8), &written(with_states(), &parts, 8))
+}
+
+/// Begins a file of two tokens with keys and values of three tokens before them, of two heads.
+fn with_past() -> File {
+    let mut file = begun(2);
+    for name in ["past_key", "past_value"] {
+        file.input(name, &[1, 2, 3, 2]);
+    }
+    file
+}
+
+/// Keys and values from a host, before the network's own or alone: the actions are those of a policy that observes them.
+#[test]
+fn inputs_are_a_prefix() -> Result<()> {
+    let names = ["past_key", "past_value"].map(str::to_owned).to_vec();
+    let own = "Flatten(Attention(q, k, v, full(0.0, 2, 5), past_key, past_value, q_num_heads=4, kv_num_heads=2))";
+    let alone = "Flatten(Attention(Transpose(Reshape(q, [1, 2, 4, 2]), perm=[0, 2, 1, 3]), past_key, past_value))";
+    for (line, has_own) in [(own, true), (alone, false)] {
+        let bytes = written(with_past(), line, 16);
+        let (found, policy) = imported(&bytes, &ImportOptions { prefix: names.clone(), ..ImportOptions::default() })?;
+        ensure!((policy.graph.own_len(), policy.graph.prefix_len) == (12, 24), "{:?}", policy.graph.prefix_len);
+        let is_attention = |node: &&Node| matches!(node.kind, NodeKind::Attention(_));
+        let node = policy.graph.nodes.iter().find(is_attention).context("no attention")?;
+        ensure!(node.inputs.len() == if has_own { 5 } else { 3 }, "{:?}", node.inputs);
+        ensure!(
+            found.ports().contains("prefix    past_key, 12 values; past_value, 12 values; from a host"),
+            "{}",
+            found.ports()
+        );
+        // The heads' order differs between file and policy.
+        ensure!(found.prefix.order[..4] == [0, 1, 6, 7], "{:?}", found.prefix.order);
+        let rows = drawn(&policy);
+        let of_file: Vec<Vec<f32>> = rows.iter().map(|row| found.of_file(row)).collect();
+        let (_, observing) = imported(&bytes, &ImportOptions { observed: names.clone(), ..ImportOptions::default() })?;
+        compare(&actions(&observing, &of_file), &actions(&policy, &rows))?;
+    }
+    Ok(())
+}
+
+#[test]
+fn only_keys_and_values_are_a_prefix() {
+    let refused = |line: &str, names: &[&str], expected: &str| {
+        let prefix = names.iter().map(|name| (*name).to_owned()).collect();
+        let bytes = written(with_past(), line, 16);
+        let error = imported(&bytes, &ImportOptions { prefix, ..ImportOptions::default() }).expect_err(expected);
+        assert!(format!("{error:#}").contains(expected), "{error:#} instead of {expected}");
+    };
+    let names = ["past_key", "past_value"];
+    let attention = |key: &str, value: &str| {
+        format!("Flatten(Attention(Transpose(Reshape(q, [1, 2, 4, 2]), perm=[0, 2, 1, 3]), {key}, {value}))")
+    };
+    let both = attention("past_key", "past_value");
+    refused(&both, &["no_key"], "--prefix no_key: the file has no input of this name");
+    refused(&both, &["past_key"], "pass --observe past_value; keys and values from a host are a prefix");
+    refused(&attention("past_key + 1.0", "past_value"), &names, "no key or value of attention");
+    refused(
+        &attention("past_key", "past_key"),
+        &names,
+        "--prefix past_value: the action does not depend on this input",
+    );
+    refused(&attention("past_key", "past_key"), &["past_key"], "attention reads 24 of the 12 values");
 }
 
 /// Its axis is the last from operator set 13 on.
