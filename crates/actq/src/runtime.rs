@@ -86,6 +86,20 @@ pub fn prefix_bytes(image: &Image<'_>, keys_and_values: &[[&[f32]; 2]]) -> Resul
     Ok(bytes)
 }
 
+/// Refuses an image that reads a prefix, for `what` cannot set one.
+///
+/// # Errors
+///
+/// Names the commands that can.
+pub fn refuse_prefix(image: &Image<'_>, what: &str) -> Result<()> {
+    ensure!(
+        image.prefix_bytes() == 0,
+        "the image reads a prefix, keys and values from a host, which {what} does not set; `actq eval`, `actq serve` and \
+         `actq link stream` do"
+    );
+    Ok(())
+}
+
 /// Gives a head the prefix in a recording's row of [observation, prefix, noise], and returns observation and noise.
 ///
 /// # Errors

@@ -174,6 +174,22 @@ fn a_simulator_sends_a_prefix() -> Result<()> {
 }
 
 #[test]
+fn pages_and_golden_runs_have_no_prefix() -> Result<()> {
+    let dir = TempDir::new()?;
+    write(dir.path(), json!({}))?;
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    let [image, page, folder, recording] = ["policy.actq", "page.html", "c", "heldout.npz"].map(at);
+    std::fs::write(&image, rtn(&Policy::load(dir.path())?, Width::W8, 32, Activations::Int8)?)?;
+    write_observations(recording.as_ref(), &Array3::from_elem((1, 3, OBS + 2 * EACH), 0.5f32))?;
+    for line in
+        [&["report", &image, "--out", &page][..], &["export-c", &image, "--golden", &recording, "--out", &folder]]
+    {
+        failed(&run(actq(line), b"")?, 1, &["reads a prefix", "`actq eval`"])?;
+    }
+    Ok(())
+}
+
+#[test]
 fn a_c_head_reads_a_prefix() -> Result<()> {
     let dir = TempDir::new()?;
     write(dir.path(), json!({"keys": "own", "values": "own"}))?;

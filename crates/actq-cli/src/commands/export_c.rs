@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use actq::data::{Dataset, Sizes};
-use actq::runtime::{ImageBuffer, with_head};
+use actq::runtime::{ImageBuffer, refuse_prefix, with_head};
 use actq_kernels::Image;
 use anyhow::{Result, ensure};
 
@@ -68,6 +68,7 @@ pub fn write(files: &Files, folder: &Path, inputs: &[&Path], force: bool) -> Res
 
 /// Runs the image from a reset on the first `steps` observations of a recording's first episode.
 fn replay(image: Image<'_>, recording: &Path, steps: usize) -> Result<Golden> {
+    refuse_prefix(&image, "a golden run")?;
     let recording = Dataset::load(recording, Sizes::of_image(&image))?;
     let mut golden = Golden { observations: Vec::new(), actions: Vec::new() };
     with_head::<_, anyhow::Error>(image, |head| {

@@ -9,7 +9,7 @@ use actq::measure::time::CLOCK;
 use actq::measure::{eval, own};
 use actq::pipeline::stats::Stats;
 use actq::policy::Policy;
-use actq::runtime::ImageBuffer;
+use actq::runtime::{ImageBuffer, refuse_prefix};
 use actq::text::printable;
 use actq_deploy::Raw;
 use actq_jobs::record::Outcome;
@@ -93,6 +93,7 @@ fn page(
     policy: Option<&Policy>,
     mut dataset: Option<Dataset>,
 ) -> Result<Page> {
+    refuse_prefix(&image, "a page")?;
     let reference = policy.map(Reference::of).transpose()?;
     let mut nmse = None;
     if let (Some(dataset), Some(policy), false) = (&mut dataset, policy, image.has_around()) {
