@@ -142,7 +142,8 @@ fn only_keys_and_values_are_a_prefix() {
     let both = attention("past_key", "past_value");
     refused(&both, &["no_key"], "--prefix no_key: the file has no input of this name");
     refused(&both, &["past_key"], "pass --observe past_value; keys and values from a host are a prefix");
-    refused(&attention("past_key + 1.0", "past_value"), &names, "no key or value of attention");
+    refused(&attention("past_key + 1.0", "past_value"), &names, "reads 0 keys and 12 values of the prefix");
+    refused(&attention("past_key + 1.0", "past_value + 1.0"), &names, "no key or value of attention");
     refused(
         &attention("past_key", "past_key"),
         &names,
