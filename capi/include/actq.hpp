@@ -7,7 +7,7 @@
 
 #include "actq.h"
 
-static_assert(ACTQ_ABI == 2, "actq.h and actq.hpp are of different versions");
+static_assert(ACTQ_ABI == 3, "actq.h and actq.hpp are of different versions");
 
 namespace actq {
 

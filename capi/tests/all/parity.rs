@@ -147,7 +147,7 @@ fn structures_and_numbers_match_the_interface_version() {
         size_of::<CPort>(),
         size_of::<CCost>(),
     ];
-    assert_eq!((ACTQ_ABI, sizes), (2, [48, 320, 64, 16, 64, 24]));
+    assert_eq!((ACTQ_ABI, sizes), (3, [48, 320, 64, 16, 64, 24]));
     let own: Vec<_> = Code::ALL.iter().filter(|code| !(1..128).contains(&(**code as i32))).copied().collect();
     let numbers: Vec<i32> = own.iter().map(|code| *code as i32).collect();
     assert_eq!(
