@@ -35,7 +35,8 @@ pub(crate) fn raise_of_import(error: actq::error::Error) -> PyErr {
 /// Replaces options and their values by arguments, as `--observe gain` by `observe=["gain"]`.
 fn as_arguments(text: &str) -> String {
     let mut text = text.replace("actq import --", "--");
-    for (option, argument) in [("--observe ", "observe"), ("--output ", "output"), ("--state ", "states")] {
+    for argument in ["observe", "prefix", "output", "states"] {
+        let option = &format!("--{} ", if argument == "states" { "state" } else { argument });
         let mut rest = std::mem::take(&mut text);
         while let Some(at) = rest.find(option) {
             let value = &rest[at + option.len()..];
@@ -44,7 +45,7 @@ fn as_arguments(text: &str) -> String {
             let (value, after) = value.split_at(word.trim_end_matches([';', ':', ',']).len());
             text += &rest[..at];
             text += &match (argument, value.split_once('=')) {
-                ("observe", _) => format!("observe=[{value:?}]"),
+                ("observe" | "prefix", _) => format!("{argument}=[{value:?}]"),
                 ("states", Some((from, to))) => format!("states={{{from:?}: {to:?}}}"),
                 _ => format!("{argument}={value:?}"),
             };

@@ -201,7 +201,7 @@ pub(crate) fn policy_of_files(json: Vec<u8>, weights: Vec<u8>, guards: Vec<Strin
 
 /// Reads a policy folder, an ONNX file, or a deploy bundle.
 #[pyfunction]
-#[pyo3(signature = (path, *, output, states, observe, limits, rate_hz, accept_profile, answers, profile, sampler))]
+#[pyo3(signature = (path, *, output, states, observe, prefix, limits, rate_hz, accept_profile, answers, profile, sampler))]
 #[expect(clippy::too_many_arguments, reason = "Python passes them by name")]
 pub(crate) fn import_path(
     py: Python<'_>,
@@ -209,6 +209,7 @@ pub(crate) fn import_path(
     #[pyo3(from_py_with = given)] output: Option<String>,
     #[pyo3(from_py_with = given)] states: Vec<(String, String)>,
     #[pyo3(from_py_with = given)] observe: Vec<String>,
+    #[pyo3(from_py_with = given)] prefix: Vec<String>,
     #[pyo3(from_py_with = given)] limits: [Vec<f64>; 3],
     #[pyo3(from_py_with = given)] rate_hz: Option<f64>,
     #[pyo3(from_py_with = given)] accept_profile: bool,
@@ -220,7 +221,8 @@ pub(crate) fn import_path(
         let limits = stated(limits);
         let sampler = sampler.map(|text| Sampler::parse(text.as_bytes())).transpose().or_raise()?;
         let observed = observe;
-        let options = ImportOptions { output, states, observed, limits, rate_hz, sampler, ..ImportOptions::default() };
+        let options =
+            ImportOptions { output, states, observed, prefix, limits, rate_hz, sampler, ..ImportOptions::default() };
         let is_answered = accept_profile || !answers.is_empty() || profile.is_some();
         let is_onnx = Onnx.accepts(&path);
         if is_onnx && !is_answered {
@@ -231,15 +233,16 @@ pub(crate) fn import_path(
         if options.sampler.is_some() {
             return Err(error!("{}: only an ONNX file takes sampler, without answers of a bundle", path.display()));
         }
-        let names_values = options.output.is_some() || !options.states.is_empty() || !options.observed.is_empty();
+        let lists = [options.states.is_empty(), options.observed.is_empty(), options.prefix.is_empty()];
+        let names_values = options.output.is_some() || lists.contains(&false);
         if is_onnx && (names_values || options.rate_hz.is_some()) {
             return Err(error!(
-                "{}: a bundle takes no output, states, observe and rate_hz: its description has them",
+                "{}: a bundle takes no output, states, observe, prefix and rate_hz: its description has them",
                 path.display()
             ));
         }
         if names_values {
-            return Err(error!("{}: only an ONNX file takes output, states and observe", path.display()));
+            return Err(error!("{}: only an ONNX file takes output, states, observe and prefix", path.display()));
         }
         let is_policy = DeployFolder.accepts(&path) || path.join(FILES[0]).is_file();
         // Answers make a bundle of an ONNX file, as they do for `actq import`.

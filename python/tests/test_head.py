@@ -248,3 +248,42 @@ def test_robots_have_their_own_prefix_until_the_next(tmp_path):
     assert np.array_equal(head(rows), first)
     with pytest.raises(actq.Error, match="reads no prefix"):
         actq.Head(quantized(recurrent(tmp_path))).set_prefix([(keys, values)])
+
+
+def test_inputs_of_a_file_are_a_prefix(tmp_path):
+    onnx = pytest.importorskip("onnx", reason="onnx is not installed")
+    random = np.random.default_rng(8)
+    shapes = {"wq": (6, 8), "wk": (6, 8), "wv": (6, 8), "wo": (24, 2)}
+    weights = {name: random.normal(size=shape).astype(np.float32) for name, shape in shapes.items()}
+    weights["shape"] = np.array([1, 3, 2, 4], np.int64)
+    lines = []
+    for name in "qkv":
+        lines += [("MatMul", ["obs", f"w{name}"], f"{name}0"), ("Reshape", [f"{name}0", "shape"], f"{name}1")]
+        lines += [("Transpose", [f"{name}1"], name, {"perm": [0, 2, 1, 3]})]
+    lines += [("Concat", ["past_k", "k"], "keys", {"axis": 2}), ("Concat", ["past_v", "v"], "values", {"axis": 2})]
+    lines += [("Transpose", ["keys"], "across", {"perm": [0, 1, 3, 2]}), ("MatMul", ["q", "across"], "scores")]
+    lines += [("Softmax", ["scores"], "shares", {"axis": -1}), ("MatMul", ["shares", "values"], "heads")]
+    lines += [("Transpose", ["heads"], "tokens", {"perm": [0, 2, 1, 3]}), ("Flatten", ["tokens"], "flat")]
+    lines += [("MatMul", ["flat", "wo"], "action")]
+    nodes = [onnx.helper.make_node(op, inputs, [to], **dict(*rest)) for op, inputs, to, *rest in lines]
+    shapes = {"obs": [1, 3, 6], "past_k": [1, 2, 5, 4], "past_v": [1, 2, 5, 4], "action": [1, 2]}
+    *inputs, output = [onnx.helper.make_tensor_value_info(name, 1, shape) for name, shape in shapes.items()]
+    constants = [onnx.numpy_helper.from_array(values, name) for name, values in weights.items()]
+    model = onnx.helper.make_model(
+        onnx.helper.make_graph(nodes, "expert", inputs, [output], constants),
+        opset_imports=[onnx.helper.make_opsetid("", 17)],
+        ir_version=8,
+    )
+    onnx.save(model, tmp_path / "expert.onnx")
+    policy = actq.import_policy(tmp_path / "expert.onnx", prefix=["past_k", "past_v"], low=-100, high=100, rate_hz=50)
+    head = actq.Head(actq.quantize(policy, bits=8, activations=16, method="rtn", progress=False))
+    obs, past_k, past_v = (random.normal(size=shapes[name]).astype(np.float32) for name in ["obs", "past_k", "past_v"])
+    head.set_prefix([(past_k[0].swapaxes(0, 1), past_v[0].swapaxes(0, 1))])
+    q, k, v = ((obs[0] @ weights[f"w{name}"]).reshape(3, 2, 4).swapaxes(0, 1) for name in "qkv")
+    keys, values = np.concatenate([past_k[0], k], axis=1), np.concatenate([past_v[0], v], axis=1)
+    scores = np.exp(q @ keys.swapaxes(1, 2))
+    flat = (scores / scores.sum(axis=-1, keepdims=True) @ values).swapaxes(0, 1).reshape(-1)
+    expected = flat @ weights["wo"]
+    assert np.abs(head(obs.reshape(-1)) - expected).max() < 0.1 * np.abs(expected).max()
+    with pytest.raises(actq.Error, match=r'prefix=\["force:1"\]: the file has no input of this name'):
+        actq.import_policy(tmp_path / "expert.onnx", prefix=["force:1"])

@@ -222,7 +222,7 @@ def test_one_onnx_file_with_metadata_is_a_bundle(mlp, tmp_path):
     assert actq.import_policy(path).obs_len == 12
     with pytest.raises(actq.Error, match="rate_hz: how many ticks a second"):
         actq.import_policy(path, accept_profile=True)
-    with pytest.raises(actq.Error, match="mjlab.onnx: a bundle takes no output, states, observe and rate_hz"):
+    with pytest.raises(actq.Error, match="mjlab.onnx: a bundle takes no output, states, observe, prefix and rate_hz"):
         actq.import_policy(path, accept_profile=True, output="action")
 
 

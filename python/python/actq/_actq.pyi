@@ -298,6 +298,7 @@ def import_path(
     output: Optional[str],
     states: List[Tuple[str, str]],
     observe: Sequence[str],
+    prefix: Sequence[str],
     limits: Tuple[List[float], List[float], List[float]],
     rate_hz: Optional[float],
     accept_profile: bool,

@@ -37,6 +37,7 @@ def import_policy(
     output: Optional[str] = None,
     states: Optional[Mapping[str, str]] = None,
     observe: Sequence[str] = (),
+    prefix: Sequence[str] = (),
     input_names: Optional[Sequence[str]] = None,
     output_names: Optional[Sequence[str]] = None,
     name: Optional[str] = None,
@@ -61,6 +62,7 @@ def import_policy(
         candidate.
     states: of ONNX or a module, the inputs that hold recurrent state, each with the output of its next value.
     observe: of ONNX or a module, the inputs that are observed in each step, although they look like memory.
+    prefix: of ONNX, the inputs that are keys and values from a host, as those of a large model: `Head.set_prefix` takes them.
     input_names, output_names: of a module, names of its inputs and outputs, for `output` and `states`. The default are
         the keys of a mapping or named tuple, else input_0 .. and output_0 .. .
     name: of a module, the policy's name; the default is its class.
@@ -85,8 +87,9 @@ def import_policy(
     """
     if states is not None and not isinstance(states, Mapping):
         raise _actq.Error(f"states is of type {type(states).__name__}; pass a mapping of inputs to outputs")
-    if isinstance(observe, str):
-        raise _actq.Error(f"observe is the text {observe!r}; pass a list of inputs")
+    for option, inputs in [("observe", observe), ("prefix", prefix)]:
+        if isinstance(inputs, str):
+            raise _actq.Error(f"{option} is the text {inputs!r}; pass a list of inputs")
     pairs = list((states or {}).items())
     limits = (_numbers("low", low), _numbers("high", high), _numbers("max_step", max_step))
     if rate_hz is not None and (isinstance(rate_hz, bool) or not isinstance(rate_hz, Real) or not 0 < rate_hz < float("inf")):
@@ -106,7 +109,7 @@ def import_policy(
                 if value is not None:
                     raise _actq.Error(f"{path}: only a module or a TorchScript file takes {key}")
             policy = _actq.import_path(
-                path, output=output, states=pairs, observe=observe, limits=limits, rate_hz=rate_hz,
+                path, output=output, states=pairs, observe=observe, prefix=prefix, limits=limits, rate_hz=rate_hz,
                 accept_profile=accept_profile, answers=_toml(answers), profile=_text("profile", profile), sampler=_json(sampler),
             )  # fmt: skip
             return _logged(policy)
@@ -124,6 +127,8 @@ def import_policy(
         raise _actq.Error("only a deploy bundle takes accept_profile, answers and profile")
     if sampler is not None:
         raise _actq.Error("only an ONNX file takes sampler; export the module, with the iterate and the time as inputs")
+    if len(prefix) > 0:
+        raise _actq.Error("only an ONNX file takes prefix; export the module, with the keys and values as inputs")
     torch_module(NEEDS_TORCH)
     from . import _models
     from ._torch import import_module
