@@ -54,7 +54,7 @@ impl<'p> Sent<'p> {
 
 /// Sends every observation at its time. Passes each received status to `seen`. `prefix` returns the prefix of each
 /// observation by its number, if the image reads one: the first arrives before all observations. Another prefix is sent
-/// between observations, and so is the same one after [`RENEWAL`]; until it has arrived, the one before is used.
+/// between observations, and so is the same one after half of its [`LIFETIME`]; until it has arrived, the one before is used.
 ///
 /// # Errors
 ///

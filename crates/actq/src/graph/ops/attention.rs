@@ -190,7 +190,9 @@ impl Attention {
     fn of_row(inputs: &[&Array2<f32>], row: usize) -> Tokens {
         let of = |i: usize| {
             let parts = [inputs.get(i + 2).filter(|_| i > 0), inputs.get(i)];
-            parts.into_iter().flatten().flat_map(|x| x.row(row)).copied().collect()
+            let mut all = Vec::new();
+            parts.into_iter().flatten().for_each(|x| all.extend_from_slice(contiguous(&x.row(row))));
+            all
         };
         let [queries, keys, values] = [0, 1, 2].map(of);
         Tokens { queries, keys, values, before: 0 }
