@@ -183,10 +183,6 @@ pub(crate) fn lock(name: &str) -> Result<fs::File> {
     Ok(file)
 }
 
-/// Cargo's variables for builds without line tables: nothing here reads them, and they take a fifth of the time.
-const WITHOUT_LINES: [(&str, &str); 2] =
-    [("CARGO_PROFILE_FIRMWARE_DEBUG", "0"), ("CARGO_PROFILE_FIRMWARE_PORTABLE_DEBUG", "0")];
-
 /// Builds binaries of a package and returns the folder of their ELF files: a folder of the board and its features,
 /// because cargo uses the same names for all boards of a triple.
 fn build(
@@ -202,7 +198,7 @@ fn build(
     let mut arguments = vec!["--package", package, "--target", target.triple(), "--profile", profile];
     arguments.extend(["--features", features]);
     arguments.extend(binaries.iter().flat_map(|binary| ["--bin", binary]));
-    let environment: Vec<_> = environment.iter().copied().chain(target.rustflags()).chain(WITHOUT_LINES).collect();
+    let environment: Vec<_> = environment.iter().copied().chain(target.rustflags()).collect();
     cargo_build(&format!("{package} for {}", target.board().name), &arguments, &environment)?;
     let built = target_dir().join(target.triple()).join(profile);
     let own = built.join(if features.is_empty() { target.board().name } else { features });
