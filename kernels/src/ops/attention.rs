@@ -48,14 +48,16 @@ pub(super) fn run(op: &Op<'_>, arena: &mut [u32], units: &Range<usize>) -> Resul
 
 fn keep(op: &Op<'_>, units: &Range<usize>, cache: &mut [u32], keys: &[f32], values: &[f32]) -> Result<(), Fault> {
     let (shape, count) = (op.cache(), *cache.first().ok_or(Fault::Damaged)?);
+    // Of the first token: in a ring, or after the tokens of a prefix.
+    let first = match (op.is_ring(), shape.own) {
+        (true, _) => (count as usize).checked_rem(shape.slots).ok_or(Fault::Damaged)?,
+        (false, 0) => 0,
+        _ => count as usize,
+    };
     for unit in units.clone() {
         let token = unit.checked_div(shape.heads).ok_or(Fault::Damaged)?;
-        let slot = match (op.is_ring(), shape.own) {
-            (true, _) => (count as usize).checked_rem(shape.slots),
-            (false, 0) => Some(token),
-            // After the tokens of the prefix.
-            _ => (count as usize).checked_add(token),
-        };
+        // A ring keeps one token.
+        let slot = first.checked_add(token);
         let (head, slot) = (unit - token * shape.heads, slot.ok_or(Fault::Damaged)?);
         let [key, value] = [vector(keys, unit, shape.dim)?, vector(values, unit, shape.dim)?];
         keep_head(shape, cache, [head, slot], key, value)?;
