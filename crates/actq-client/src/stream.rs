@@ -8,7 +8,7 @@ use anyhow::Result;
 use crate::client::{Client, require_armed};
 use crate::event::Event;
 use crate::log::Log;
-use crate::push::{Prefix, Push};
+use crate::push::{Prefix, Push, push_prefix};
 
 /// Options for sending observations.
 #[derive(Clone, Copy, Debug)]
@@ -36,19 +36,15 @@ struct Sent<'p> {
     begun: Instant,
 }
 
-impl<'p> Sent<'p> {
-    fn begin(client: &mut Client, prefix: Prefix<'p>) -> Result<Self> {
-        Ok(Self { prefix, push: Some(Push::prefix(client, prefix)?), begun: Instant::now() })
-    }
-
-    /// Makes the next request of the transfer; returns `false` if none is left.
-    fn advance(&mut self, client: &mut Client) -> Result<bool> {
+impl Sent<'_> {
+    /// Makes the next request of the transfer, if one is left.
+    fn advance(&mut self, client: &mut Client) -> Result<()> {
         if let Some(push) = &mut self.push
             && push.advance(client)?
         {
             self.push = None;
         }
-        Ok(self.push.is_some())
+        Ok(())
     }
 }
 
@@ -68,17 +64,17 @@ pub fn stream<'p>(
     log: &mut Log,
     mut seen: impl FnMut(&Status),
 ) -> Result<()> {
-    let mut sent = prefix(0).map(|prefix| Sent::begin(client, prefix)).transpose()?;
-    while let Some(sent) = &mut sent
-        && sent.advance(client)?
-    {}
+    let mut sent = prefix(0).map(|prefix| Sent { prefix, push: None, begun: Instant::now() });
+    if let Some(Sent { prefix, .. }) = &sent {
+        push_prefix(client, prefix)?;
+    }
     let (mut due, mut armed) = (Instant::now(), false);
     for (i, observation) in observations.enumerate() {
         if let (Some(next), Some(last)) = (prefix(i), &mut sent)
             && last.push.is_none()
             && (next.bytes != last.prefix.bytes || last.begun.elapsed() > RENEWAL)
         {
-            *last = Sent::begin(client, next)?;
+            *last = Sent { prefix: next, push: Some(Push::prefix(client, next)?), begun: Instant::now() };
         }
         if pace.arm && i == BEFORE_ARMING {
             client.arm()?;

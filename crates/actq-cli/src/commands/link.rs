@@ -105,6 +105,7 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
         args.recording.display(),
         count(frames, "observation")
     );
+    let (prefixes, of_frame) = prefixes(&image, &recording)?;
     let mut client = connect(&args.port)?;
     let runs = client.status()?.image;
     ensure!(
@@ -117,9 +118,7 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     let pace = Pace { period: Duration::from_secs_f64(1.0 / rate), arm: args.arm };
     // A signal ends the observations: the controller is disarmed, and the log written.
     let _ends_itself = EndsItself::begin();
-    let (prefixes, of_frame) = prefixes(&image, &recording)?;
-    let ticks = LIFETIME.as_nanos() / u128::from(client.timing()?.period.max(1));
-    let lifetime = u32::try_from(ticks).unwrap_or(u32::MAX);
+    let lifetime = if prefixes.is_empty() { 0 } else { lifetime(&mut client)? };
     let prefix = |frame: usize| {
         let bytes = prefixes.get(*of_frame.get(frame)?)?;
         Some(Prefix { bytes, image: image.crc(), lifetime })
@@ -150,6 +149,12 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
         at(0.99)
     ))?;
     outcome
+}
+
+/// Returns the ticks of the longest lifetime of a prefix.
+fn lifetime(client: &mut Client) -> Result<u32> {
+    let ticks = LIFETIME.as_nanos() / u128::from(client.timing()?.period.max(1));
+    Ok(u32::try_from(ticks).unwrap_or(u32::MAX))
 }
 
 /// Returns the prefixes in a recording, each once as long as it does not change, and the number of each frame's; nothing for an
