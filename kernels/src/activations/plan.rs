@@ -53,7 +53,7 @@ impl Plan {
     const fn of_valid(shape: BlockShape) -> Self {
         let layout = shape.layout();
         let format = &layout.x;
-        let (read, padded, group, groups, run) = if shape.group == 0 {
+        let (read, padded, group, groups, run) = if !shape.has_groups() {
             let read = round_up(shape.cols, layout.step);
             let padded = round_up(read, layout.pad);
             (read, padded, padded, 1, format.run)

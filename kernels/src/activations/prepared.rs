@@ -80,7 +80,7 @@ pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: i
             let first = if plan.layout.x.pairs { sum.wrapping_sub(last) } else { sum };
             let second = if plan.layout.x.pairs { last } else { sum };
             let halves = (first & 0xffff) | second << 16;
-            *word = if plan.shape.group == 0 { sum } else { halves } as u32;
+            *word = if !plan.shape.has_groups() { sum } else { halves } as u32;
         }
     }
 }

@@ -62,10 +62,9 @@ impl Playback {
         let [output, kept, ..] = regions(arena, &[image.output(), image.kept(), Region::default()], Region::default());
         if let horizon @ 1.. = image.horizon() {
             let (sums, counts) = kept.split_at_mut_checked(horizon * len).ok_or(Fault::Damaged)?;
-            for (ahead, new) in
-                output.chunks_exact(len.max(1)).skip(self.next).take(horizon - self.next.min(horizon)).enumerate()
-            {
-                let slot = (self.slot + ahead) % horizon;
+            for position in self.next..horizon.min(chunk) {
+                let slot = (self.slot + position - self.next) % horizon;
+                let new = part(output, &(position * len..position * len + len));
                 let sum = part(sums, &(slot * len..slot * len + len));
                 let count = counts.get_mut(slot).ok_or(Fault::Damaged)?;
                 let [weight, _] = image.ensemble(*count as usize);

@@ -39,6 +39,12 @@ impl BlockShape {
         self.rows >= 1 && self.rows <= 0xffff && self.cols >= 1 && self.cols <= cols && group
     }
 
+    /// Returns `true` if rows have group scales: in a build without them, at compile time.
+    #[inline(always)]
+    pub(crate) const fn has_groups(self) -> bool {
+        cfg!(any(feature = "groups", feature = "writer")) && self.group != 0
+    }
+
     /// Returns the layout, of a width and lanes that the build has.
     #[inline(always)]
     pub(crate) const fn layout(self) -> &'static Layout {

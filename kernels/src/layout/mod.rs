@@ -73,7 +73,7 @@ pub(crate) mod half;
 pub(crate) mod lanes;
 mod pack;
 mod pow2;
-mod table;
+pub(crate) mod table;
 pub mod w2;
 #[cfg(feature = "helium")]
 pub mod w2_helium;

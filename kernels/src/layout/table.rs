@@ -74,18 +74,21 @@ macro_rules! table {
             }
         }
 
-        /// Calls a function that is generic over the layout of `$shape`.
+        /// Calls a function that is generic over the layout of `$shape`, and has code for those of this build alone: it
+        /// has no blocks of others.
         macro_rules! with_format {
             ($shape:expr, $call:ident::<_>$arguments:tt) => {{
                 use $crate::layout::lanes::Lanes;
                 use $crate::layout::width::Width;
+                use $crate::layout::table::has;
                 match ($shape.width, $shape.lanes) {
-                    $((Width::$width, Lanes::Single) => $call::<$single>$arguments,
-                    (Width::$width, Lanes::Paired) => $call::<$paired>$arguments,
+                    $((Width::$width, Lanes::Single) if has(Width::$width, Lanes::Single) => $call::<$single>$arguments,
+                    (Width::$width, Lanes::Paired) if has(Width::$width, Lanes::Paired) => $call::<$paired>$arguments,
                     #[cfg(feature = "scalar")]
-                    (Width::$width, Lanes::Scalar) => $call::<$scalar>$arguments,
+                    (Width::$width, Lanes::Scalar) if has(Width::$width, Lanes::Scalar) => $call::<$scalar>$arguments,
                     #[cfg(feature = "helium")]
-                    (Width::$width, Lanes::Helium) => $call::<$helium>$arguments,)*
+                    (Width::$width, Lanes::Helium) if has(Width::$width, Lanes::Helium) => $call::<$helium>$arguments,)*
+                    _ => Default::default(),
                 }
             }};
         }
@@ -93,6 +96,11 @@ macro_rules! table {
     };
 }
 registry!(table());
+
+/// Returns `true` if this build has blocks of a width and lanes. (A writer packs all.)
+pub(crate) const fn has(width: Width, lanes: Lanes) -> bool {
+    cfg!(feature = "writer") || width.is_built() && lanes.is_built()
+}
 
 /// Layouts by width and lanes. A table in memory takes fewer instructions than a branch for every constant.
 pub(super) static LAYOUTS: [[Layout; Lanes::IN_TABLES.len()]; Width::IN_TABLES.len()] = {

@@ -2,7 +2,8 @@
 
 use std::fs;
 use std::io::{Cursor, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use actq_boards::{Target, root, target_dir, version};
 use actq_cli::outputs;
@@ -10,10 +11,11 @@ use actq_cli::report::export::sha256;
 use actq_kernels::Image;
 use anyhow::{Context as _, Result, ensure};
 use serde_json::{Value, json};
+use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use crate::firmware::{cargo, lock};
+use crate::firmware::{cargo, flash_bytes, lock};
 
 /// Version of the packages.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -144,6 +146,38 @@ impl Core {
         fs::read(&file).with_context(|| file.display().to_string())
     }
 
+    /// Returns the features of a library for `image`, or for any.
+    fn features(self, image: Option<&Image<'_>>, compact: bool) -> String {
+        let mut features = image.map_or_else(|| vec!["default"], |image| image.features().collect());
+        // The layouts of the core's own images.
+        features.extend((image.is_none() && !self.has_assembler()).then_some("scalar"));
+        features.extend(compact.then_some("compact"));
+        features.join(" ")
+    }
+
+    /// Returns the bytes of code and constants that a program links from the library for `image`, if it opens the image,
+    /// makes a head and runs steps. It takes rustc's linker, and no C compiler.
+    ///
+    /// # Errors
+    ///
+    /// If the library cannot be built or linked.
+    pub fn linked_bytes(self, image: &Image<'_>) -> Result<u64> {
+        let folder = TempDir::new()?;
+        let [library, program] = ["libactq.a", "program.elf"].map(|name| folder.path().join(name));
+        fs::write(&library, self.library(&self.features(Some(image), false))?)?;
+        let roots = ["actq_image_open", "actq_image_sizes", "actq_head_init"].map(|name| format!("--undefined={name}"));
+        let output = Command::new(linker()?)
+            .args(["-flavor", "gnu", "--gc-sections", "--entry=actq_step"])
+            .args(roots)
+            .arg(&library)
+            .arg("-o")
+            .arg(&program)
+            .output()
+            .context("cannot start rust-lld")?;
+        ensure!(output.status.success(), "cannot link: {}", String::from_utf8_lossy(&output.stderr));
+        flash_bytes(&program)
+    }
+
     /// Writes the package to `out`: an archive if its name ends in `.zip`, otherwise a folder. Neither may exist
     /// before, but for an empty folder. The library runs any image, or only images that need no other features of the
     /// kernels than `image`; its loops are short if `compact`.
@@ -162,11 +196,7 @@ impl Core {
             if is_archive { !out.exists() } else { fs::read_dir(out).map_or(true, |mut files| files.next().is_none()) };
         ensure!(is_free, "{}: exists already; remove it, or name another file or folder", out.display());
         let mut files = Files::default();
-        let mut features = image.map_or_else(|| vec!["default"], |image| image.features().collect());
-        // The layouts of the core's own images.
-        features.extend((image.is_none() && !self.has_assembler()).then_some("scalar"));
-        features.extend(compact.then_some("compact"));
-        let features = features.join(" ");
+        let features = self.features(image, compact);
         let library = self.library(&features)?;
         files.put("lib/libactq.a", &library);
         let capi = root().join("capi");
@@ -248,6 +278,13 @@ impl Files {
         }
         outputs::files::write(out, &archive.finish()?.into_inner())
     }
+}
+
+/// Returns the path of the linker that is a part of rustc.
+fn linker() -> Result<PathBuf> {
+    let output = Command::new("rustc").args(["--print", "target-libdir"]).output().context("cannot start rustc")?;
+    let folder = PathBuf::from(String::from_utf8(output.stdout)?.trim_end());
+    Ok(folder.with_file_name("bin").join("rust-lld"))
 }
 
 /// Adds the licences of the crates in the library; returns these with their versions and licences.

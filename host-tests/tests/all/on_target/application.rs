@@ -332,8 +332,8 @@ fn the_application_is_small_and_has_no_panic() -> Result<()> {
         let flash = firmware::flash_bytes(&elf)? - image;
         // These have the layouts of two kinds of cores, and most of them compiled kernels.
         let kilobytes = match target {
-            Target::NoDsp | Target::V6m => 144,
-            Target::Riscv => 152,
+            Target::NoDsp | Target::V6m => 120,
+            Target::Riscv => 124,
             Target::M55 => 72,
             _ => 64,
         };

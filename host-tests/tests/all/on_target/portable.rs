@@ -19,14 +19,15 @@ fn counts(target: Target, elf: &Path, others: Option<Lanes>) -> Result<Vec<(Stri
     Ok(text.lines().zip(regions).map(|(line, region)| (line.to_owned(), per_mac(region))).collect())
 }
 
-/// Requires that the layouts of the DSP extension stay within `limit`, and the scalar layouts within `scalar`: at 2, 3, 4
-/// and 8 bits, each with row scales and with groups of 32.
-fn stay_within(target: Target, limit: f64, scalar: &[f64]) -> Result<()> {
+/// Requires that the layouts of the DSP extension stay within the limits of row scales and of groups of 32, and the scalar
+/// layouts within `scalar`: at 2, 3, 4 and 8 bits, each with row scales and with groups of 32.
+fn stay_within(target: Target, [rows, groups]: [f64; 2], scalar: &[f64]) -> Result<()> {
     let elf = firmware::portable_binary("portable", target)?;
     let others = (!target.has_assembler()).then_some(Lanes::Scalar);
     let (scalar_lines, lines): (Vec<_>, Vec<_>) =
         counts(target, &elf, others)?.into_iter().partition(|(line, _)| line.contains(" Scalar "));
-    let limits = scalar_lines.into_iter().zip(scalar).chain(lines.into_iter().map(|line| (line, &limit)));
+    let lines = lines.into_iter().map(|line| if line.0.ends_with(" 0") { (line, &rows) } else { (line, &groups) });
+    let limits = scalar_lines.into_iter().zip(scalar).chain(lines);
     for ((line, per_mac), limit) in limits {
         println!("{target:?} {line}: {per_mac:.3}");
         assert!(line.starts_with("Portable "), "{line}");
@@ -37,25 +38,26 @@ fn stay_within(target: Target, limit: f64, scalar: &[f64]) -> Result<()> {
 
 #[test]
 fn portable_macs_take_few_instructions() -> Result<()> {
-    stay_within(Target::Fpu, 3.5, &[])
+    stay_within(Target::Fpu, [3.5; 2], &[])
 }
 
-/// Without the DSP extension, a product takes more instructions, and the conversions from and to f32 are by integers.
+/// Without the DSP extension, a product takes more instructions, and the conversions from and to f32 are by integers. The
+/// layouts of the DSP extension take little code there, and more time.
 #[test]
 fn macs_without_dsp_and_fpu_take_few_instructions() -> Result<()> {
-    stay_within(Target::NoDsp, 5.7, &[1.45, 2.05, 1.85, 2.5, 1.9, 2.7, 2.4, 3.15])
+    stay_within(Target::NoDsp, [7.1, 10.3], &[1.45, 2.05, 1.85, 2.5, 1.9, 2.7, 2.4, 3.15])
 }
 
 /// Armv6-M multiplies to 32 bits only.
 #[test]
 fn macs_on_armv6m_take_few_instructions() -> Result<()> {
-    stay_within(Target::V6m, 10.0, &[2.2, 3.25, 2.8, 3.85, 3.45, 4.85, 4.25, 5.6])
+    stay_within(Target::V6m, [11.4, 15.6], &[2.2, 3.25, 2.8, 3.85, 3.45, 4.85, 4.25, 5.6])
 }
 
 /// RV32IMAC has no instruction that multiplies and adds, and none that extracts bits: a weight takes two of both.
 #[test]
 fn macs_on_riscv_take_few_instructions() -> Result<()> {
-    stay_within(Target::Riscv, 8.4, &[2.2, 2.9, 2.85, 3.6, 3.05, 3.9, 3.75, 5.0])
+    stay_within(Target::Riscv, [8.4, 10.7], &[2.2, 2.9, 2.85, 3.6, 3.05, 3.9, 3.75, 5.0])
 }
 
 /// Each width with row scales and with groups of 32.

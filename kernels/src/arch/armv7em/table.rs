@@ -88,5 +88,5 @@ static KERNELS: [[Both; Lanes::IN_TABLES.len()]; Width::IN_TABLES.len()] = {
 /// Returns the kernels for blocks of this shape.
 #[inline(always)]
 pub(super) fn kernels(shape: BlockShape) -> Kernels {
-    KERNELS[shape.width.index()][shape.lanes.index()][usize::from(shape.group != 0)]
+    KERNELS[shape.width.index()][shape.lanes.index()][usize::from(shape.has_groups())]
 }

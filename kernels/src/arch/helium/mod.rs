@@ -77,7 +77,7 @@ fn kernels(shape: BlockShape) -> [Kernel; 2] {
         }
         _ => [[left_out; 2]; 2],
     };
-    if cfg!(feature = "groups") && shape.group != 0 { group } else { row }
+    if shape.has_groups() { group } else { row }
 }
 
 /// Computes a product as [`crate::arch::gemv`] does.

@@ -52,9 +52,9 @@ fn tiles(Product { block, x, first_row, acc, .. }: Product<'_>, tile: &mut [TwoC
         let Some(pairs) = x.words().get(at..at + len) else { return };
         tile.iter_mut().zip(pairs).for_each(|(columns, pair)| *columns = two_columns(*pair));
         let tile = tile.get(..len).unwrap_or(&[]);
-        fixed = if shape.group == 0 { fixed } else { 0 } + terms(tile);
+        fixed = if !shape.has_groups() { fixed } else { 0 } + terms(tile);
         let weights = words.get(2 * at + groups..).unwrap_or(&[]);
-        if shape.group == 0 {
+        if !shape.has_groups() {
             add_bytes(weights, stride, tile, strips);
         } else {
             let scales = words.get(2 * end.min(units) + groups..).unwrap_or(&[]);
@@ -70,11 +70,11 @@ fn tiles(Product { block, x, first_row, acc, .. }: Product<'_>, tile: &mut [TwoC
             }
         }
         at += len;
-        if shape.group != 0 && at == end {
+        if shape.has_groups() && at == end {
             (end, groups) = (end + group, groups + 1);
         }
     }
-    if shape.group == 0 {
+    if !shape.has_groups() {
         separate(strips.as_flattened_mut(), fixed);
     }
 }

@@ -24,7 +24,7 @@ pub(super) fn gemv(Product { block, x, first_row, acc, .. }: Product<'_>) {
     let mut last = last.first_chunk_mut::<QUAD>();
     let after = words.get(strips.len() * stride..).unwrap_or(&[]);
     let row = Row { x, units: shape.units(), group: shape.units_per_group() };
-    if shape.group == 0 {
+    if !shape.has_groups() {
         strips.as_flattened_mut().fill(0);
         last.iter_mut().for_each(|last| last.fill(0));
         let fixed = row.chunks(0, |at, chunk| {

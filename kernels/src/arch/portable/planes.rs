@@ -50,7 +50,7 @@ fn tiles_of_planes<const B: usize>(Product { block, x, first_row, acc, .. }: Pro
     let (units, stride) = (shape.units(), STRIP / QUAD * block.quad_words());
     let memory = memory.as_chunks_mut::<TABLE_WORDS>().0;
     let mut x = x.words().as_chunks::<{ COLS / 2 }>().0;
-    let log = if shape.group == 0 { None } else { Some(shape.units_per_group().trailing_zeros()) };
+    let log = shape.has_groups().then(|| shape.units_per_group().trailing_zeros());
     let bias = ((1 << B) - 1) * BIAS;
     acc.fill(if log.is_none() { -bias * units as i32 } else { 0 });
     let mut first = 0;

@@ -21,7 +21,8 @@ pub(super) fn gemv<F: Format>(Product { block, x, first_row, acc, .. }: Product<
             let mut sums = [0; STRIP];
             let sums = sums.get_mut(..acc.len()).unwrap_or(&mut []);
             strip::<F>(weights, x.get(F::X.start_words..).unwrap_or(&[]), sums);
-            let (scales, rest) = rest.split_at(if shape.group == 0 { 0 } else { (acc.len() / QUAD).min(rest.len()) });
+            let (scales, rest) =
+                rest.split_at(if !shape.has_groups() { 0 } else { (acc.len() / QUAD).min(rest.len()) });
             for (i, (acc, sum)) in acc.iter_mut().zip(&*sums).enumerate() {
                 let scale = scales.get(i / QUAD).map_or(1, |word| u32::from_le(*word) >> (8 * (i % QUAD)) & 0xff);
                 *acc = acc.wrapping_add(sum.wrapping_mul(scale as i32));

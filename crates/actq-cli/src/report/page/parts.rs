@@ -44,9 +44,9 @@ pub const RUNTIMES: [(Core, usize); 6] = [
     (Core::M4f, DSP),
     (Core::M7, DSP),
     (Core::M33, DSP),
-    (Core::M3, 94_464),
-    (Core::M0, 91_616),
-    (Core::Rv32imac, 109_978),
+    (Core::M3, 70_476),
+    (Core::M0, 70_284),
+    (Core::Rv32imac, 79_650),
 ];
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Networks on every core: instructions, memory and code of our own images, and of other projects' code.
 
-mod cases;
+pub(crate) mod cases;
 mod compilers;
 mod others;
 
@@ -14,36 +14,37 @@ use actq_bench::firmware::{harness, kernel_bytes};
 use actq_bench::qemu::{self, Counter};
 use actq_cli::report::table::table;
 use actq_kernels::Width;
+use actq_kernels::math::Function;
 use anyhow::{Context as _, Result};
 use serde::Serialize;
 
 use cases::CASES;
 
 /// Cores that run in QEMU, with the harness of a board.
-const CORES: [(&str, Core, Target); 5] = [
+const CORES: [(&str, Core, Target); 6] = [
     ("m4f", Core::M4f, Target::Fpu),
     ("m55", Core::M55, Target::M55),
     ("m3", Core::M3, Target::NoDsp),
     ("m0", Core::M0, Target::V6m),
     ("rv32imac", Core::Rv32imac, Target::Riscv),
+    ("rv32zb", Core::Rv32zb, Target::RiscvZb),
 ];
-
-/// Cores that are left out, and why.
-const SKIPPED: [(&str, &str); 1] = [("rv32zb", "the table of boards has no core with Zba and Zbb")];
 
 /// The figures of an image on a core.
 #[derive(Debug, Serialize)]
 struct Row {
     core: &'static str,
     network: &'static str,
+    /// The function between its layers, if it has more than one.
+    function: Option<&'static str>,
     bits: u32,
     /// Instructions of a step.
     instructions: u64,
     macs: usize,
     /// Bytes of scratch memory.
     scratch: usize,
-    /// Bytes of stack of a step; `None` where it is not measured.
-    stack: Option<u64>,
+    /// Bytes of stack of a step.
+    stack: u64,
     /// Bytes of the kernels' functions in the program, which runs any image.
     code: u64,
 }
@@ -66,9 +67,6 @@ pub(crate) fn run(ours: bool, words: &[String], folder: Option<&Path>, json: Opt
 
 /// Measures our own rows, and prints them.
 fn own() -> Result<Vec<Row>> {
-    for (core, why) in SKIPPED {
-        eprintln!("{core}: skipped: {why}");
-    }
     let counter = Counter::build()?;
     let mut rows = Vec::new();
     for (name, core, target) in CORES {
@@ -83,7 +81,8 @@ fn own() -> Result<Vec<Row>> {
                 let instructions = regions.first().context("the harness has run no step")?.instructions;
                 let (code, stack) = (kernel_bytes(&elf)?, stack(target, &elf, slot)?);
                 let (network, macs, bits) = (case.name, case.macs(), width.bits());
-                rows.push(Row { core: name, network, bits, instructions, macs, scratch, stack, code });
+                let function = case.between_layers().map(Function::name);
+                rows.push(Row { core: name, network, function, bits, instructions, macs, scratch, stack, code });
             }
         }
     }
@@ -96,7 +95,7 @@ fn own() -> Result<Vec<Row>> {
             row.instructions.to_string(),
             format!("{:.3}", row.instructions as f64 / row.macs as f64),
             row.scratch.to_string(),
-            row.stack.map_or("-".to_owned(), |stack| stack.to_string()),
+            row.stack.to_string(),
             row.code.to_string(),
         ]);
     }
@@ -104,13 +103,10 @@ fn own() -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Returns the bytes of stack that a step takes, which the harness prints; `None` on cores whose stack it cannot read.
-fn stack(target: Target, elf: &Path, slot: Option<&Path>) -> Result<Option<u64>> {
-    if target == Target::Riscv {
-        return Ok(None);
-    }
+/// Returns the bytes of stack that a step takes, which the harness prints.
+fn stack(target: Target, elf: &Path, slot: Option<&Path>) -> Result<u64> {
     let output = qemu::run(qemu::command_on(target, elf, slot, "stack")?, &[])?;
     let text = String::from_utf8_lossy(&output.stdout);
     let bytes = text.lines().find_map(|line| line.strip_prefix("stack ")?.parse().ok());
-    Ok(Some(bytes.with_context(|| format!("the harness has not measured its stack: {output:?}"))?))
+    bytes.with_context(|| format!("the harness has not measured its stack: {output:?}"))
 }

@@ -67,6 +67,11 @@ impl Case {
         }
     }
 
+    /// Returns the function that follows layers.
+    pub(crate) fn between_layers(&self) -> Option<Function> {
+        self.function.filter(|_| self.lengths.len() > 2)
+    }
+
     /// Returns the network with random weights, rounded to nearest with row scales, and int8 activations; and its f32
     /// original. Weights are the same for all widths.
     pub(crate) fn quantized(&self, width: Width) -> Result<(Quantized, Vec<Product>)> {
