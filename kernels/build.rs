@@ -15,6 +15,7 @@ fn main() {
     println!("cargo::rustc-check-cfg=cfg(actq_armv6m)");
     println!("cargo::rustc-check-cfg=cfg(actq_armv7m)");
     println!("cargo::rustc-check-cfg=cfg(actq_rv32im)");
+    println!("cargo::rustc-check-cfg=cfg(actq_zba)");
     println!("cargo::rustc-check-cfg=cfg(actq_loops)");
     println!("cargo::rustc-check-cfg=cfg(actq_scaling)");
     println!("cargo::rustc-check-cfg=cfg(actq_armv8m)");
@@ -47,6 +48,9 @@ fn main() {
     if let Some((_, loops)) = loops.iter().find(|(prefix, _)| target.starts_with(prefix) && fits) {
         println!("cargo::rustc-cfg={loops}");
         println!("cargo::rustc-cfg=actq_loops");
+        if has_feature("zba") {
+            println!("cargo::rustc-cfg=actq_zba");
+        }
         if !has_fpu(&target) {
             println!("cargo::rustc-cfg=actq_scaling");
         }

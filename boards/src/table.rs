@@ -67,6 +67,8 @@ targets! {
     V6m: "thumbv6m-none-eabi" on v6m::BOARD;
     /// RV32IMAC: the portable kernels.
     Riscv: "riscv32imac-unknown-none-elf" on virt::BOARD;
+    /// RV32IMAC with Zba and Zbb.
+    RiscvZb: "riscv32imac-unknown-none-elf" on virt::ZB;
     /// Cortex-M33 with FPU and DSP extension.
     M33: "thumbv8m.main-none-eabihf" on mps2::host::AN505;
     /// Cortex-M7: the code of the Cortex-M4.
@@ -101,7 +103,12 @@ impl Target {
 
     /// Returns cargo's variable with the flags of rustc, if they are not those of the triple in cargo's configuration.
     pub fn rustflags(self) -> Option<(&'static str, &'static str)> {
-        (self == Self::M55).then_some(("RUSTFLAGS", "-C target-cpu=cortex-m55 -C target-feature=-mve"))
+        let flags = match self {
+            Self::M55 => "-C target-cpu=cortex-m55 -C target-feature=-mve",
+            Self::RiscvZb => "-C target-cpu=sifive-e31 -C target-feature=+zba,+zbb",
+            _ => return None,
+        };
+        Some(("RUSTFLAGS", flags))
     }
 
     /// Returns the profile of a build (`Cargo.toml`).
@@ -200,6 +207,6 @@ mod tests {
     #[test]
     fn features_select_boards_that_triples_do_not() {
         let chosen: Vec<_> = Target::ALL.into_iter().filter_map(Target::feature).collect();
-        assert_eq!(chosen, ["mps2-an385-v6m", "mps2-an500", "stm32f405", "mps3-an547"]);
+        assert_eq!(chosen, ["mps2-an385-v6m", "virt-zb", "mps2-an500", "stm32f405", "mps3-an547"]);
     }
 }

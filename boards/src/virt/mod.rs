@@ -20,3 +20,15 @@ pub(crate) const BOARD: Board = Board {
     binaries: &["functions", "golden", "portable"],
     application: Some(Application { about: "RV32IMAC, QEMU", scratch: SCRATCH }),
 };
+
+/// The same with QEMU's own RV32, as far as it has Zba and Zbb, for measurements.
+#[cfg(not(target_os = "none"))]
+pub(crate) const ZB: Board = Board {
+    name: "virt-zb",
+    machine: &["-M", "virt", "-cpu", ZB_CPU, "-bios", "none"],
+    binaries: &["golden"],
+    application: None,
+    ..BOARD
+};
+#[cfg(not(target_os = "none"))]
+const ZB_CPU: &str = "rv32,f=off,d=off,zba=on,zbb=on,zbc=off,zbs=off";

@@ -6,10 +6,24 @@
 use super::tables::{TABLE_WORDS, Table};
 use crate::layout::{QUAD, STRIP};
 
+/// The symbol `ZBA` in a file: 1 where RISC-V adds a shifted index to an address in one instruction.
+#[cfg(actq_zba)]
+macro_rules! zba {
+    () => {
+        ".set ZBA, 1"
+    };
+}
+#[cfg(not(actq_zba))]
+macro_rules! zba {
+    () => {
+        ".set ZBA, 0"
+    };
+}
+
 /// Assembles the files of an architecture.
 macro_rules! assembler {
     ($folder:literal) => {
-        core::arch::global_asm!(include_str!(concat!($folder, "/planes.s")), options(raw));
+        core::arch::global_asm!(zba!(), include_str!(concat!($folder, "/planes.s")), options(raw));
         core::arch::global_asm!(include_str!(concat!($folder, "/pairs.s")), options(raw));
         core::arch::global_asm!(include_str!(concat!($folder, "/bytes.s")), options(raw));
     };

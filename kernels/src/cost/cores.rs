@@ -98,11 +98,10 @@ impl Core {
     }
 
     /// Returns the core whose rates are taken for this one: the core itself, if it was measured. Code of the Cortex-M4 runs
-    /// on the M7 and the M33, which take no more cycles; the kernels of RV32 do not use Zba.
+    /// on the M7 and the M33, which take no more cycles.
     pub fn measured(self) -> Self {
         match self {
             Self::M7 | Self::M33 => Self::M4f,
-            Self::Rv32zb => Self::Rv32imac,
             _ => self,
         }
     }

@@ -29,7 +29,7 @@ impl Timing {
         match target {
             Target::NoDsp => Self::M3,
             Target::Small | Target::V6m => Self::M0,
-            Target::Riscv => Self::Hazard3,
+            Target::Riscv | Target::RiscvZb => Self::Hazard3,
             Target::M55 => Self::M55,
             Target::Fpu | Target::NoFpu | Target::M33 | Target::M7 | Target::F405 => Self::M4,
         }

@@ -118,9 +118,11 @@ fn main() -> ExitCode {
         Command::Bench(options) => measure(&[Target::Fpu], "bench", options),
         Command::Descriptions(options) => measure(&[Target::Fpu], "descriptions", options),
         Command::Faults(options) => measure(&[Target::Fpu], "faults", options),
-        Command::Peers(options) => {
-            measure(&[Target::Fpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M55], "peers", options)
-        }
+        Command::Peers(options) => measure(
+            &[Target::Fpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::RiscvZb, Target::M55],
+            "peers",
+            options,
+        ),
         Command::Fit(options) => measure(
             &[Target::Fpu, Target::NoFpu, Target::NoDsp, Target::V6m, Target::Riscv, Target::M55],
             "fit",

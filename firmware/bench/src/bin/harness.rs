@@ -19,7 +19,7 @@ mod firmware {
     use core::task::Poll;
 
     use actq_firmware_support::machine::{entry, singleton};
-    #[cfg(all(target_arch = "arm", not(actq_small)))]
+    #[cfg(not(actq_small))]
     use actq_firmware_support::stack::Room;
     use actq_firmware_support::{count, host, slot};
     use actq_kernels::{Head, Image, StepError, include_image};
@@ -71,7 +71,7 @@ mod firmware {
         match (arguments.split(' ').next(), number) {
             _ if arguments.is_empty() => replay(&mut head),
             _ if arguments == "serve" => serve(&mut head, Run::Whole),
-            #[cfg(all(target_arch = "arm", not(actq_small)))]
+            #[cfg(not(actq_small))]
             _ if arguments == "stack" => stack(&mut head),
             _ if arguments == "restart" => serve(&mut head, Run::Restarts),
             (Some("poll"), Some(budget)) => serve(&mut head, Run::Polls(budget)),
@@ -148,7 +148,7 @@ mod firmware {
     }
 
     /// Prints the bytes of stack that a step takes.
-    #[cfg(all(target_arch = "arm", not(actq_small)))]
+    #[cfg(not(actq_small))]
     #[inline(never)]
     fn stack(head: &mut Head<'_, '_>) -> Result<(), Message> {
         const WORDS: usize = 4 * 1024;

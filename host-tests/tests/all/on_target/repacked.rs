@@ -50,8 +50,13 @@ fn image(group: usize) -> Result<Vec<u8>> {
 }
 
 /// The cores, with the targets that have them in QEMU.
-const CORES: [(Core, Target); 4] =
-    [(Core::M55, Target::M55), (Core::M3, Target::NoDsp), (Core::M0, Target::V6m), (Core::Rv32imac, Target::Riscv)];
+const CORES: [(Core, Target); 5] = [
+    (Core::M55, Target::M55),
+    (Core::M3, Target::NoDsp),
+    (Core::M0, Target::V6m),
+    (Core::Rv32imac, Target::Riscv),
+    (Core::Rv32zb, Target::RiscvZb),
+];
 
 /// Largest relative error of a policy's predicted step, and of one with groups or small blocks. Floats in software take other
 /// times for other values.
@@ -59,6 +64,7 @@ fn limits(core: Core) -> [f64; 2] {
     match core {
         Core::M55 => [0.01, 0.03],
         Core::M4 => [0.06, 0.06],
+        Core::Rv32zb => [0.04, 0.10],
         _ => [0.03, 0.10],
     }
 }

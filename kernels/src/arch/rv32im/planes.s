@@ -1,10 +1,13 @@
 # Bit planes on RV32IM: tables of sums, and lookups in them (arch/portable/planes.rs).
 #
-# A lookup is LBU of the index, a shift and an addition to the table's address, LHU of the entry, and an addition. Planes
-# are taken one after the other, the highest first, and the sums are doubled in between.
+# A lookup is LBU of the index, a shift and an addition to the table's address (SH1ADD with Zba), LHU of the entry, and an
+# addition. Planes are taken one after the other, the highest first, and the sums are doubled in between.
 
     .option push
     .option arch, +m, +c
+    .if     ZBA
+    .option arch, +zba
+    .endif
 
     .macro  actq_save
     addi    sp, sp, -32
@@ -31,14 +34,18 @@
     lbu     t1, (\at + 1)(a0)
     lbu     t2, (\at + 2)(a0)
     lbu     t3, (\at + 3)(a0)
-    slli    t0, t0, 1
-    slli    t1, t1, 1
-    slli    t2, t2, 1
-    slli    t3, t3, 1
-    add     t0, t0, a1
-    add     t1, t1, a1
-    add     t2, t2, a1
-    add     t3, t3, a1
+    .if     ZBA
+    .irp    t, t0, t1, t2, t3
+    sh1add  \t, \t, a1
+    .endr
+    .else
+    .irp    t, t0, t1, t2, t3
+    slli    \t, \t, 1
+    .endr
+    .irp    t, t0, t1, t2, t3
+    add     \t, \t, a1
+    .endr
+    .endif
     .if     \first
     lhu     \a, (\table)(t0)
     lhu     \b, (\table)(t1)

@@ -58,10 +58,11 @@ fn of_core(core: Core, only: Option<&str>, all: &mut BTreeMap<CostItem, Row>) ->
         Core::M0 => Target::V6m,
         Core::M3 => Target::NoDsp,
         Core::Rv32imac => Target::Riscv,
+        Core::Rv32zb => Target::RiscvZb,
         Core::M4 => Target::NoFpu,
         Core::M4f => Target::Fpu,
         Core::M55 => Target::M55,
-        Core::M7 | Core::M33 | Core::Rv32zb => {
+        Core::M7 | Core::M33 => {
             bail!("the rates of {} are those of {}", core.name(), core.measured().name())
         }
     };

@@ -150,7 +150,7 @@ enum Command {
     /// Measure the cost model's rates again (after every change of the kernels)
     Fit {
         /// The cores
-        #[arg(long, value_name = "CORE,..", value_delimiter = ',', default_value = "m4f,m4,m3,m0,rv32imac,m55", value_parser = core)]
+        #[arg(long, value_name = "CORE,..", value_delimiter = ',', default_value = "m4f,m4,m3,m0,rv32imac,rv32zb,m55", value_parser = core)]
         core: Vec<cost::Core>,
         /// Only the items of the model, and only the images, with this word in their names: `attention`
         #[arg(long, value_name = "WORD")]
