@@ -1,6 +1,6 @@
 #!/bin/sh
 # armkin 0.7.0 (kinematics of a planar arm of two links): inverse(..., elbow_up=True), the default, gives the solution with the elbow below the line from the shoulder to the target, and elbow_up=False that above it, for every target in
-# front of the arm (x > 0): an arm on a table that is told to keep its elbow up puts it 0.66 m below the shoulder, into the table. Behind the arm it is the other way round: the name
+# front of the arm (x > 0): an arm on a table that asks for its elbow up has it 0.66 m below the shoulder, into the table. Behind the arm it is the other way round: the name
 # chooses the sign of the second angle. Both solutions reach the target, so that a test by forward() sees nothing. There is no error.
 # Seen on 2026-11-30:  links of 1 m, target 1.5, 0: elbow_up=True: elbow at 0.75, -0.66, False: 0.75, 0.66   1.0, 0.5: 0.87, -0.49 and 0.13, 0.99   -1.5, 0: -0.75, 0.66 and -0.75, -0.66
 set -eu

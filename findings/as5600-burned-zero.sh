@@ -1,5 +1,5 @@
 #!/bin/sh
-# adafruit-circuitpython-as5600 1.0.3 (magnetic angle sensor AS5600): the constructor writes 0 to the sensor's zero position and 4095 to its end and its range. A zero that was burned into the sensor, which it loads by itself when it is
+# adafruit-circuitpython-as5600 1.0.3 (magnetic angle sensor AS5600): the constructor writes 0 to the sensor's zero position and 4095 to its end and its range. A zero that was burned into the sensor, which it loads when it is
 # switched on, and which zm_count counts, is gone as soon as the driver is made: a joint that shows 0 without the driver (to a motor controller on the analog output or PWM, or to another program) shows 1000 with it, 88 degrees,
 # and goes on to show that to all others until power is off. A range that was burned, of 90 degrees on the whole output, is 4095 too, so that a reading of 2048 becomes 512. No argument keeps them, and there is no error.
 # Seen on 2026-11-30:  zero burned at 1000, magnet there: angle 0 before, 1000 after (88 degrees); zm_count 1, z_position 0   range of 90 degrees burned, magnet at 45: 2048 before, 512 after   burned values again after power off: 0

@@ -1,6 +1,6 @@
 #!/bin/sh
 # dual-quaternions 0.4.0, pyquaternion 0.9.9, numpy 2.4.6 (rigid motions as dual quaternions): exp(log(x)), the way into the tangent space and back, is another motion. The logarithm of a pure translation is 0, so that the translation is
-# lost; with a turn of 60 degrees, 1 m across the axis comes back as 0.5 m in another direction, and what is along the axis as 0. And a motion whose quaternion has a negative real part, as two turns of 100 degrees multiplied
+# lost; with a turn of 60 degrees, 1 m across the axis comes back as 0.5 m in another direction, and 1 m along the axis as 0. And a motion whose quaternion has a negative real part, as two turns of 100 degrees multiplied
 # have, is mirrored by screw() and pow(): the turn of 200 degrees to the power of 1 is one of 160, and one of 350 is 10, about the axis the other way round. The translation stays right, and there is no error.
 # Seen on 2026-11-30:  exp(log): 1, 2, 3 m: 0, 0, 0   60 degrees and 1, 0, 0 m: 0.25, 0.43, 0   60 degrees and 0, 0, 1 m: 0, 0, 0   x to the power of 1: 160: 160, 200 (-160): 160, 260 (-100): 100, 350 (-10): 10 degrees
 set -eu

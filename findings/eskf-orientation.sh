@@ -35,7 +35,7 @@ fn observed(true_angles: [f32; 3], known: bool) -> (Vec<[f32; 3]>, f32, f32) {
         [roll, pitch, yaw]
     }).collect();
     let uncertainty = filter.orientation_uncertainty().max();
-    // The body rests for one second: its accelerometer shows what holds it against gravity.
+    // The body rests for one second: its accelerometer shows the support against gravity.
     let gravity = filter.gravity;
     let held = truth.inverse_transform_vector(&-gravity);
     for _ in 0..100 {

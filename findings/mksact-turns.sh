@@ -1,6 +1,6 @@
 #!/bin/sh
 # mksact 0.2.0, python-can 4.6.1 (MKS SERVO42D and 57D steppers over CAN): position() reads 48 bits and move_abs() sends 24, without a check: past 8,388,607 counts, 512 turns of the motor, the goal wraps. An axis with a gear of 1:100
-# that is at 511 turns (5.1 of its own) and is told to go 2 turns further goes back by 1,022: the frame says -511 turns. The limits that move_abs() checks see the goal before it wraps, so that one of 600 turns lets it pass.
+# that is at 511 turns (5.1 of its own) and gets a goal 2 turns further goes back by 1,022: the frame says -511 turns. The limits that move_abs() checks see the goal before it wraps, so that one of 600 turns lets it pass.
 # And the speed of one call is not checked as the default speed is: set_speed(5000) is refused, move_abs(0, speed=5000) sent; speed=66000 is sent as 464. There is no error.
 # Seen on 2026-11-30:  511 turns: sent 511   511 + 2 turns, max_pos 600 turns: sent -511   speed=5000: 5000 (the drive's greatest: 3000)   speed=66000: 464
 set -eu
@@ -18,7 +18,7 @@ moves = []
 
 
 def answer(message):
-    """The drive's part: it reports its position with 48 bits, and does what the frame of an absolute move says, whose position has 24."""
+    """The drive's part: it reports its position with 48 bits, and follows the frame of an absolute move, whose position has 24."""
     data = bytes(message.data)
     assert data[-1] == (ID + sum(data[:-1])) & 0xFF
     reply = [data[0], 1]

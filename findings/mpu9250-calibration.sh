@@ -24,7 +24,7 @@ use std::cell::RefCell;
 use std::convert::Infallible;
 use std::rc::Rc;
 
-/// What the gyroscope shows at rest without offsets (degrees/s).
+/// The gyroscope's readings at rest without offsets (degrees/s).
 const BIAS: [f64; 3] = [2.0, -1.0, 0.0];
 
 /// An MPU-9250 at rest, by its register map: a reset clears the registers, and the offsets have 32.8 codes per degree/s whatever the range.

@@ -1,7 +1,7 @@
 #!/bin/sh
 # pidgeon 0.3.1 (crates.io, PID controller): its derivative filter is 1.6 Hz by default, whatever the loop's rate and gains. derivative_filter_coeff (N, 10) is documented three ways: a cutoff of N / 2 pi relative to the sample rate, N / 2 pi
 # times the controller's bandwidth, and the textbook's filter, whose time is kd / (kp N); it is 1 / N seconds. At 1 kHz a joint's damping arrives 100 ms late: with kp = 1600 and kd = 80, which damp a mass of 1 kg critically, a step
-# overshoots by 41 % and rings for 2 s; with the textbook's filter it does not. And in DerivativeMode::OnError the derivative is taken of the error behind the deadband, where "the derivative term still sees the full signal": in a deadband of
+# overshoots by 41 % and rings for 2 s; with the textbook's filter it does not. And in DerivativeMode::OnError the derivative is taken of the error after the deadband, where "the derivative term still sees the full signal": in a deadband of
 # 0.1 rad a joint that moves at 1 rad/s gets no damping, with OnMeasurement all of it. There is no error.
 # Seen on 2026-11-30:  ramp of 1 rad/s at 1 kHz, after 10, 100, 500 ms: 0.09, 0.63, 0.99   at 100 Hz: 0.09, 0.61, 0.99   overshoot of a step: 41 % (textbook's filter: 0 %)   in the deadband: OnError 0.00, OnMeasurement -1.00
 # It needs cargo.

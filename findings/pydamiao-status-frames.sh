@@ -1,5 +1,5 @@
 #!/bin/sh
-# pydamiao 0.1.4 (Damiao motors): a motor's feedback and a register's answer are told apart by the third byte alone, which is 0x33 or 0x55 in an answer, and the lower byte of the position in a feedback. So 1 of 128 positions is taken
+# pydamiao 0.1.4 (Damiao motors): a motor's feedback and a register's answer are distinguished by the third byte only, which is 0x33 or 0x55 in an answer, and the lower byte of the position in a feedback. So 1 of 128 positions is taken
 # for a register: the joint's position, velocity and torque are not updated, and a made-up value goes to the register whose number is the upper byte of the velocity. A DM4310 that moves to 0.0196 rad and rests there is
 # reported where it was before, and a fault in such a feedback (over-current) is not seen: the next set_mit() is sent, where it is refused after the same fault one step beside. There is no error.
 # Seen on 2026-11-30:  of 65,536 positions, 512 taken for registers   moved from 0.500 to 0.0196 rad: reported 0.500   to 0.0200: 0.0200   over-current at 0.0196 rad: not seen, set_mit sent; at 0.0200: seen, set_mit refused

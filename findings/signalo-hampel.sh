@@ -45,7 +45,7 @@ fn noise(count: usize) -> Vec<f64> {
     }).sum::<f64>() - 6.0).collect()
 }
 
-/// How many spikes of a height get through, of all, by the package and by the textbook.
+/// The number of spikes of a height that get through, by the package and by the textbook, and of all.
 fn passed(height: f64, every: usize) -> (usize, usize, usize) {
     let mut signal = noise(4000);
     let spikes: Vec<usize> = (40..4000).step_by(every).collect();

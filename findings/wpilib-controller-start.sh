@@ -13,7 +13,7 @@ import types
 
 
 class SendableBase:
-    """What the controller needs of the robot's library: a name on the dashboard."""
+    """The part of the robot's library that the controller needs: a name on the dashboard."""
 
     def __init__(self, addLiveWindow=True):
         pass
