@@ -14,8 +14,13 @@ pub(super) fn found<const N: usize>(receiver: &mut Receiver<N>, bytes: &[u8]) ->
 
 /// Returns a frame of these bytes, which need not be a message.
 fn frame_of(content: &[u8]) -> Vec<u8> {
+    frame_with(content, &[])
+}
+
+/// Returns such a frame with more bytes after its checksum.
+fn frame_with(content: &[u8], more: &[u8]) -> Vec<u8> {
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(content);
-    let frame = [content, &crc.to_le_bytes()].concat();
+    let frame = [content, &crc.to_le_bytes(), more].concat();
     let mut wire = vec![0; cobs::max_encoding_length(frame.len())];
     let len = cobs::encode(&frame, &mut wire);
     wire.truncate(len);
@@ -25,6 +30,18 @@ fn frame_of(content: &[u8]) -> Vec<u8> {
 
 fn content(version: u8, kind: u8, sequence: u32, payload: &[u8]) -> Vec<u8> {
     [&[version, kind][..], &sequence.to_le_bytes(), &7u32.to_le_bytes(), payload].concat()
+}
+
+/// Its beginning alone, which fills the receiver's memory, is a frame.
+#[test]
+fn a_frame_that_goes_on_after_its_checksum_is_damaged() {
+    let disarm = content(frame::VERSION, Message::Disarm.kind(), 1, &[]);
+    let mut receiver = Receiver::<{ frame::bytes(0) }>::new();
+    for more in [1, 2, 300] {
+        assert!(found(&mut receiver, &frame_with(&disarm, &vec![7; more])).is_empty(), "{more} more bytes");
+    }
+    assert_eq!(receiver.counters().damaged, 3);
+    assert_eq!(found(&mut receiver, &frame_of(&disarm)).len(), 1);
 }
 
 const DOCUMENTATION: &str = include_str!("../../../../docs/LINK.md");
@@ -48,6 +65,12 @@ fn the_documented_example_is_sent_and_received() {
     assert!(found(&mut receiver, first).is_empty());
     let received = receiver.push(*last).expect("the frame ends");
     assert_eq!((received.sequence, received.micros, received.message), (258, 1_000_000, message));
+    let Message::Observation(values) = received.message else { panic!("{received:?}") };
+    assert_eq!((values.len(), values.is_empty(), Floats::Values(&[]).is_empty()), (3, false, true));
+    assert_ne!(values, Floats::Values(&[1.0, -0.5, -0.0]));
+    for len in 0..wire.len() {
+        assert_eq!(Sender::new(258).frame(&message, 1_000_000, &mut vec![0; len]), None, "a buffer of {len} bytes");
+    }
 }
 
 /// Each table of codes lists all codes.
