@@ -32,6 +32,29 @@ fn content(version: u8, kind: u8, sequence: u32, payload: &[u8]) -> Vec<u8> {
     [&[version, kind][..], &sequence.to_le_bytes(), &7u32.to_le_bytes(), payload].concat()
 }
 
+/// The numbers at both ends of a window. A bounded receiver takes a disarm from far ahead, and nothing else.
+#[test]
+fn numbers_outside_the_window_are_not_new() {
+    type R = Receiver<LONGEST>;
+    let is_taken = |receiver: &mut R, message: Message<'_>, sequence| {
+        !found(receiver, &frame_of(&content(frame::VERSION, message.kind(), sequence, &[]))).is_empty()
+    };
+    for (is_bounded, reach) in [(false, u32::MAX / 2), (true, R::REACH)] {
+        let mut receiver = R::new();
+        receiver.bound(is_bounded);
+        assert!(!receiver.reopen(), "open at first");
+        assert!(is_taken(&mut receiver, Message::Abort, 7));
+        for (ahead, expected) in [(0, false), (reach + 1, false), (reach, true)] {
+            let taken = is_taken(&mut receiver, Message::Abort, 7u32.wrapping_add(ahead));
+            assert_eq!(taken, expected, "{ahead} ahead of 7, bounded: {is_bounded}");
+        }
+        assert_eq!(receiver.counters().lost, reach - 1);
+        let far = 8u32.wrapping_add(2 * reach);
+        assert_eq!(is_taken(&mut receiver, Message::Disarm, far), is_bounded);
+        assert!(receiver.reopen() && is_taken(&mut receiver, Message::Abort, far.wrapping_sub(1)));
+    }
+}
+
 /// Its beginning alone, which fills the receiver's memory, is a frame.
 #[test]
 fn a_frame_that_goes_on_after_its_checksum_is_damaged() {
@@ -58,7 +81,10 @@ fn the_documented_example_is_sent_and_received() {
     let (wire, plain) = (example("wire:"), example("frame:"));
     let message = Message::Observation(Floats::Values(&[1.0, -0.5, 0.0]));
     let mut buffer = [0; 64];
-    assert_eq!(Sender::new(258).frame(&message, 1_000_000, &mut buffer), Some(&wire[..]));
+    let mut sender = Sender::new(258);
+    assert_eq!(sender.next(), 258);
+    assert_eq!(sender.frame(&message, 1_000_000, &mut buffer), Some(&wire[..]));
+    assert_eq!(sender.next(), 259);
     assert_eq!(frame_of(&plain[..plain.len() - 4]), wire, "the frame before stuffing");
     let mut receiver = Receiver::<LONGEST>::new();
     let (last, first) = wire.split_last().expect("the example is not empty");
