@@ -74,8 +74,8 @@ macro_rules! table {
             }
         }
 
-        /// Calls a function that is generic over the layout of `$shape`, and has code for those of this build alone: it
-        /// has no blocks of others.
+        /// Calls a function that is generic over the layout of `$shape`, with code for this build's layouts alone: it
+        /// refuses blocks that have another one.
         macro_rules! with_format {
             ($shape:expr, $call:ident::<_>$arguments:tt) => {{
                 use $crate::layout::lanes::Lanes;

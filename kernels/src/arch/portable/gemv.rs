@@ -16,8 +16,8 @@ pub fn gemv(product: Product<'_>) {
 /// Columns of the usual groups.
 const COLS: usize = 32;
 
-/// `true` on cores with layouts of their own: those of others, which are slow there, take little code. A strip's cells
-/// are computed one by one, and groups of 32 columns as all others.
+/// `true` on cores with layouts of their own: there, other cores' layouts are slow and take little code. A strip's cells
+/// are computed one by one, and groups of 32 columns as all groups.
 const SMALL: bool = cfg!(all(actq_loops, feature = "scalar"));
 
 /// Lengths in words.
