@@ -13,6 +13,7 @@ use actq_bench::firmware::{self, built_in, halfword_at};
 use actq_bench::networks::{Builder, with_wrong_self_test};
 use actq_bench::stack::worst_case;
 use actq_bench::{Target, bits, qemu};
+use actq_boards::Clock;
 use actq_client::client::Client;
 use actq_client::keys;
 use actq_client::push::{Package, push};
@@ -143,10 +144,13 @@ fn package(image: &[u8]) -> Package<'_> {
 
 /// At 8 kHz, with a head of 330 thousand weights in the background: no tick is lost, and none starts later or takes
 /// longer than a tenth of a period. QEMU takes 32 ns for an instruction. Twenty steps play chunks of several
-/// evaluations.
+/// evaluations. The clock waits for no host: where it does, and the host is idle, QEMU 7.2 starts a tick up to 21 µs late
+/// without a lock that masks it for as long.
 #[test]
 fn a_background_head_leaves_the_tick_undisturbed() -> Result<()> {
-    let (_controller, mut client) = start(Target::Fpu, "tick-8khz")?;
+    let elf = firmware::controller(Target::Fpu, "tick-8khz")?;
+    let controller = Controller::start_by(Target::Fpu, &elf, None, Clock::Free(5))?;
+    let mut client = controller.client()?;
     let observation = observation()?;
     for _ in 0..20 {
         act(&mut client, &observation)?;
