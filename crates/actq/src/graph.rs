@@ -27,7 +27,7 @@ mod weights;
 
 pub use denoising::Denoising;
 pub use evaluate::Evaluator;
-pub use ignored::without_ignored;
+pub use ignored::{without_effect, without_ignored};
 pub use matrix::{Factors, Matrix, MatrixStrip, STRIP};
 pub use nodes::{Graph, Node};
 pub use ops::NodeKind;

@@ -42,6 +42,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     note(calib.as_ref().and_then(notes::of_axes));
     note(policy.refused.iter().cloned());
     note(notes::default_rate(&policy));
+    note(notes::without_effect(&policy));
     note(notes::without_limits((0..policy.act_len).map(|i| policy.contract.limits(i))));
     let [calib_npz, others @ ..] = Recording::Calib.paths(&args.out);
     let names: Vec<&Path> =

@@ -48,8 +48,8 @@ pub fn how_to_record(policy: &Policy) -> String {
     )
 }
 
-/// Returns notes on a policy: actions or targets without limits, a rate that its source does not state, the source's
-/// treatment of values that are not finite, and actions of its source that it does not have.
+/// Returns notes on a policy: actions or targets without limits, a rate that its source does not state, values without
+/// effect, the source's treatment of values that are not finite, and actions of its source that it does not have.
 pub fn of_policy(policy: &Policy) -> Vec<String> {
     let limits = match &policy.around {
         Some(around) => of_targets(around),
@@ -58,6 +58,7 @@ pub fn of_policy(policy: &Policy) -> Vec<String> {
     limits
         .into_iter()
         .chain(default_rate(policy))
+        .chain(without_effect(policy))
         .chain(guards(&policy.guards))
         .chain(policy.refused.iter().cloned())
         .collect()
@@ -73,6 +74,19 @@ pub(crate) fn guards<'a>(guards: impl IntoIterator<Item = &'a String>) -> Option
             all.join("; ")
         )
     })
+}
+
+/// Returns notes that list the values of the network's observation that no action depends on, and its actions that no
+/// observation changes.
+pub(crate) fn without_effect(policy: &Policy) -> Vec<String> {
+    let [observations, actions] = actq::graph::without_effect(&policy.graph);
+    let list = |of: &str, indices: &[usize], text: &str| {
+        let s = if indices.len() == 1 { "" } else { "s" };
+        (!indices.is_empty()).then(|| format!("{text} {of}{s} {}", runs(indices)))
+    };
+    let unread = list("value", &observations, "no action of the network depends on the observation's");
+    let fixed = list("action", &actions, "no observation changes the network's");
+    unread.into_iter().chain(fixed).collect()
 }
 
 /// Returns a note if a policy has the default rate because its source states none.

@@ -22,13 +22,21 @@ type Marks = Vec<Vec<bool>>;
 /// Returns the network without what it ignores.
 pub fn without_ignored(graph: &Graph) -> Graph {
     let mut graph = with_folded_constants(graph);
-    let live = live(&graph);
+    let live = live(&graph, true);
     silence_dead_units(&mut graph, &live);
     let columns: Vec<Vec<usize>> = (0..graph.matrices.len()).map(|m| read_columns(&graph, m, &live)).collect();
     let kept: Vec<Vec<usize>> = (0..live.len()).map(|value| kept(&graph, value, &live[value])).collect();
     let is_whole = (0..live.len()).all(|value| kept[value].len() == graph.len_of(value))
         && graph.matrices.iter().zip(&columns).all(|(matrix, columns)| columns.len() == matrix.cols);
     if is_whole { graph } else { rebuilt(&graph, kept, &columns) }
+}
+
+/// Returns the values of the observation that no action depends on, and the actions that are the same for every
+/// observation. Where a node mixes all its values, as a norm does, all of them count as read.
+pub fn without_effect(graph: &Graph) -> [Vec<usize>; 2] {
+    let graph = with_folded_constants(graph);
+    let all = |marks: &[bool], mark: bool| (0..marks.len()).filter(|&e| marks[e] == mark).collect();
+    [all(&live(&graph, false)[0], false), all(&constants(&graph)[graph.output()], true)]
 }
 
 /// Moves the contribution of constant elements to the biases. Matrices that several products share stay as they are.
@@ -93,22 +101,23 @@ fn constants(graph: &Graph) -> Marks {
     constant
 }
 
-/// Marks the elements that reach the output; at least one of each value.
-fn live(graph: &Graph) -> Marks {
+/// Marks the elements that reach the output; with `keeps_one` at least one of each value and of each matrix's columns.
+fn live(graph: &Graph, keeps_one: bool) -> Marks {
     let mut live: Marks = (0..=graph.nodes.len()).map(|value| vec![false; graph.len_of(value)]).collect();
     live[graph.output()].fill(true);
     loop {
         let before = live.clone();
-        (0..graph.nodes.len()).rev().for_each(|n| mark_inputs(graph, n, &mut live));
+        (0..graph.nodes.len()).rev().for_each(|n| mark_inputs(graph, n, &mut live, keeps_one));
         if live == before {
-            let Some(dead) = live.iter_mut().find(|of_value| !of_value.contains(&true)) else { return live };
+            let dead = live.iter_mut().find(|of_value| keeps_one && !of_value.contains(&true));
+            let Some(dead) = dead else { return live };
             dead[0] = true;
         }
     }
 }
 
 /// Marks the elements that the marked ones of node `n` depend on, and those that stay because of them.
-fn mark_inputs(graph: &Graph, n: usize, live: &mut Marks) {
+fn mark_inputs(graph: &Graph, n: usize, live: &mut Marks, keeps_one: bool) {
     let (node, value) = (&graph.nodes[n], n + 1);
     for product in node.kind.products() {
         for other in makers(graph, product.matrix) {
@@ -116,7 +125,7 @@ fn mark_inputs(graph: &Graph, n: usize, live: &mut Marks) {
             live[value].iter_mut().zip(of_other).for_each(|(mark, other)| *mark |= other);
         }
         let operand = if product.operand == Operand::State { value } else { node.inputs[0] };
-        for c in read_columns_of(graph, product.matrix, node.len, &live[value]) {
+        for c in read_columns_of(graph, product.matrix, node.len, &live[value], keeps_one) {
             live[operand][c] = true;
         }
     }
@@ -182,18 +191,18 @@ fn read_columns(graph: &Graph, matrix: usize, live: &Marks) -> Vec<usize> {
     let Some(&n) = makers(graph, matrix).first() else { return all() };
     let products = graph.nodes[n].kind.products();
     let of_state = products.iter().any(|product| product.matrix == matrix && product.operand == Operand::State);
-    if of_state { all() } else { read_columns_of(graph, matrix, graph.nodes[n].len, &live[n + 1]) }
+    if of_state { all() } else { read_columns_of(graph, matrix, graph.nodes[n].len, &live[n + 1], true) }
 }
 
-/// Returns the columns of a matrix that the rows of these units read: at least one.
-fn read_columns_of(graph: &Graph, matrix: usize, hidden: usize, live: &[bool]) -> Vec<usize> {
+/// Returns the columns of a matrix that the rows of these units read; with `keeps_one` at least one.
+fn read_columns_of(graph: &Graph, matrix: usize, hidden: usize, live: &[bool], keeps_one: bool) -> Vec<usize> {
     let WeightMatrix { rows, cols, data, .. } = &graph.matrices[matrix];
     let units: Vec<usize> = (0..hidden).filter(|&unit| live[unit]).collect();
     let mut read = vec![false; *cols];
     for row in unit_rows(*rows, hidden, &units) {
         read.iter_mut().zip(&data[row * cols..]).for_each(|(read, w)| *read |= *w != 0.0);
     }
-    read[0] |= !read.contains(&true);
+    read[0] |= keeps_one && !read.contains(&true);
     (0..*cols).filter(|&c| read[c]).collect()
 }
 
@@ -378,6 +387,7 @@ mod tests {
     fn ignored_values_leave_the_matrices() {
         for graph in ignoring() {
             let without = without_ignored(&graph);
+            assert_eq!([&graph, &without].map(without_effect), [[vec![1], vec![]], [vec![1], vec![]]]);
             assert_eq!(outputs(&graph), outputs(&without));
             assert_eq!((without.obs_len, without.state_len()), (graph.obs_len, graph.state_len()));
             let is_zero = |matrix: &WeightMatrix, c: usize| matrix.data.chunks(matrix.cols).all(|row| row[c] == 0.0);
@@ -390,6 +400,7 @@ mod tests {
     fn networks_that_read_everything_stay_as_they_are() {
         for graph in [mlp(), lstm(), gru(4), residual(4, true), branches([4, 3]), iterative()] {
             let same = without_ignored(&graph);
+            assert!(without_effect(&graph).iter().all(Vec::is_empty));
             assert_eq!(same.matrices, graph.matrices);
             assert_eq!(same.nodes.len(), graph.nodes.len());
         }

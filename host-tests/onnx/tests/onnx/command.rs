@@ -103,9 +103,12 @@ fn quantize_says_what_it_takes_of_a_file() -> Result<()> {
     let dir = TempDir::new()?;
     let [model, image] = ["model.onnx", "image.actq"].map(|name| dir.path().join(name));
     let mut file = File::default();
-    [("velocity", 2), ("unused", 1), ("position", 4)].iter().for_each(|(name, n)| file.input(name, &[1, *n]));
+    [("velocity", 2), ("unused", 1), ("position", 4), ("still", 1)]
+        .iter()
+        .for_each(|(name, n)| file.input(name, &[1, *n]));
+    file.initializer(&tensor("w", &[1, 3], &[0.0; 3]));
     file.write(&[], "reaction_force := Identity(gemm(velocity, 2, 2))");
-    file.write(&[], "action_mean := Tanh(Add(gemm(velocity, 3, 2), gemm(position, 3, 4)))");
+    file.write(&[], "action_mean := Tanh(Add(Add(gemm(velocity, 3, 2), gemm(position, 3, 4)), MatMul(still, w)))");
     file.write(&[], "discrete_action := ArgMax(action_mean)");
     [("discrete_action", 1), ("reaction_force", 2), ("action_mean", 3)]
         .iter()
@@ -114,7 +117,7 @@ fn quantize_says_what_it_takes_of_a_file() -> Result<()> {
     let made = actq(&["quantize", text(&model), "--method", "rtn", "--out", text(&image)]).output()?;
     let (printed, noted) = (succeeded(&made)?, String::from_utf8_lossy(&made.stderr));
     for line in [
-        "input     obs[0:2] = velocity\n          obs[2:6] = position\n",
+        "input     obs[0:2] = velocity\n          obs[2:6] = position\n          obs[6:7] = still\n",
         "output    action_mean, 3 values\n",
         "cut       inputs unused: ",
         "cut       outputs discrete_action, reaction_force: ",
@@ -129,6 +132,7 @@ fn quantize_says_what_it_takes_of_a_file() -> Result<()> {
         noted.contains("note: the policy states no control rate, and the image has 50 Hz, the default: "),
         "{noted}"
     );
+    ensure!(noted.contains("note: no action of the network depends on the observation's value 6\n"), "{noted}");
     Ok(())
 }
 
