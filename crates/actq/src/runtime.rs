@@ -86,6 +86,12 @@ pub fn prefix_bytes(image: &Image<'_>, keys_and_values: &[[&[f32]; 2]]) -> Resul
     Ok(bytes)
 }
 
+/// Does the same as [`prefix_bytes`] from the [`prefix_len`] values of a recording's row.
+pub fn prefix_of_row(image: &Image<'_>, values: &[f32]) -> Result<Vec<u8>> {
+    let parts: Vec<_> = keys_and_values(image, values).into_iter().map(|(_, part)| part).collect();
+    prefix_bytes(image, &parts)
+}
+
 /// Refuses an image that reads a prefix, for `what` cannot set one.
 ///
 /// # Errors
@@ -110,8 +116,7 @@ pub fn take_prefix<'r>(head: &mut Head<'_, '_>, row: &'r [f32]) -> Result<(&'r [
     let (observation, rest) = row.split_at_checked(image.obs_len()).context("the row is no observation")?;
     let (prefix, noise) = rest.split_at_checked(prefix_len(&image)).context("the observation has no prefix")?;
     if !prefix.is_empty() {
-        let parts: Vec<_> = keys_and_values(&image, prefix).into_iter().map(|(_, part)| part).collect();
-        head.set_prefix(&prefix_bytes(&image, &parts)?)?;
+        head.set_prefix(&prefix_of_row(&image, prefix)?)?;
     }
     Ok((observation, noise))
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use actq::data::{Dataset, Sizes};
-use actq::runtime::{ImageBuffer, keys_and_values, prefix_bytes, prefix_len};
+use actq::runtime::{ImageBuffer, prefix_len, prefix_of_row};
 use actq::text::count;
 use actq_client::client::Client;
 use actq_client::connection::Connection;
@@ -165,8 +165,7 @@ fn prefixes(image: &Image<'_>, recording: &Dataset) -> Result<(Vec<Vec<u8>>, Vec
     for observation in recording.observations().filter(|_| len > 0) {
         let row: Vec<f32> = observation.iter().skip(image.obs_len()).take(len).copied().collect();
         if row != last {
-            let parts: Vec<_> = keys_and_values(image, &row).into_iter().map(|(_, part)| part).collect();
-            prefixes.push(prefix_bytes(image, &parts)?);
+            prefixes.push(prefix_of_row(image, &row)?);
             last = row;
         }
         of_frame.push(prefixes.len() - 1);
