@@ -2,6 +2,8 @@
 
 use core::ops::RangeInclusive;
 
+use actq_link::PREFIX_SECONDS;
+
 /// Bits per second of the serial line.
 pub const BAUD: u32 = 921_600;
 
@@ -17,9 +19,9 @@ pub const fn allowed(tick_hz: u32) -> RangeInclusive<u32> {
     tick_hz / 100..=tick_hz / 2
 }
 
-/// Returns the most ticks for which a host may let the head use a prefix: 10 s at `tick_hz` ticks per second.
+/// Returns the most ticks for which a host may let the head use a prefix, at `tick_hz` ticks per second.
 pub const fn prefix_lifetime(tick_hz: u32) -> u32 {
-    10 * tick_hz
+    PREFIX_SECONDS * tick_hz
 }
 
 #[cfg(test)]

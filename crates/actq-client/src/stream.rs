@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use actq_link::PREFIX_SECONDS;
 use actq_link::report::Status;
 use anyhow::Result;
 
@@ -22,9 +23,9 @@ pub struct Pace {
 /// Longest wait for the last action, counted from the controller's answer to a later request.
 const LAST_ACTION: Duration = Duration::from_millis(100);
 /// Time after which a prefix is sent again, half of its [`LIFETIME`].
-const RENEWAL: Duration = Duration::from_secs(5);
+const RENEWAL: Duration = Duration::from_secs(PREFIX_SECONDS as u64 / 2);
 /// The longest lifetime of a prefix that the application accepts.
-pub const LIFETIME: Duration = Duration::from_secs(10);
+pub const LIFETIME: Duration = Duration::from_secs(PREFIX_SECONDS as u64);
 /// Observations that [`stream`] sends before it arms.
 pub const BEFORE_ARMING: usize = 5;
 

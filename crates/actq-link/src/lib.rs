@@ -19,6 +19,9 @@ pub mod report;
 mod sender;
 mod window;
 
+/// Longest lifetime of a prefix that the application accepts, in seconds. A host sends the prefix again before its end.
+pub const PREFIX_SECONDS: u32 = 10;
+
 pub use floats::Floats;
 pub use message::Message;
 pub use pipe::{NO_ACTION, PREFIX, RESET, STEP};
