@@ -10,6 +10,25 @@ use crate::error::{Context, Result, bail, ensure};
 use crate::import::values::{Tensor, Values};
 use crate::text::count;
 
+/// Names by which other formats mark where episodes begin or end: Gymnasium's, D4RL's, RLDS', LeRobot's, Diffusion
+/// Policy's and Stable-Baselines3's.
+const MARKS: [&str; 14] = [
+    "done",
+    "dones",
+    "terminated",
+    "truncated",
+    "terminal",
+    "terminals",
+    "timeouts",
+    "is_first",
+    "is_last",
+    "is_terminal",
+    "episode",
+    "episode_index",
+    "episode_ends",
+    "episode_starts",
+];
+
 /// Arrays of a recording whose shapes fit each other and the sizes.
 pub(super) struct CheckedArrays {
     sizes: Sizes,
@@ -49,7 +68,16 @@ impl CheckedArrays {
             check_state(state, episodes, sizes)?;
         }
         let length = match arrays.take("length") {
-            None => vec![steps; episodes],
+            None => {
+                let mark = MARKS.iter().find(|name| arrays.has(name));
+                ensure!(
+                    mark.is_none(),
+                    "array {:?} says where episodes begin or end, and is not read: save \"obs\" as [episode, step, value], with the \
+                     steps of each episode as \"length\", or leave that array out if all steps are one episode",
+                    mark.unwrap_or(&"")
+                );
+                vec![steps; episodes]
+            }
             Some(length) => lengths(&length, episodes, steps)?,
         };
         ensure!(length.iter().any(|n| *n > 0), "the recording holds no frame: every episode has length 0");

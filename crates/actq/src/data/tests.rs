@@ -149,6 +149,11 @@ fn spoilt() -> Vec<(Vec<Named>, &'static str)> {
     vec![
         (vec![("seed", ints(&[1])), ("act", obs())], "array \"obs\" is missing; the file holds act, seed"),
         (
+            vec![("obs", obs()), ("terminated", ints(&[1]))],
+            "array \"terminated\" says where episodes begin or end, and is not read: save \"obs\" as [episode, step, value], with \
+             the steps of each episode as \"length\", or leave that array out if all steps are one episode",
+        ),
+        (
             vec![("obs", floats(&[5]))],
             "array \"obs\" has the shape [5]; use [episode, step, value], or [frame, value] for one episode",
         ),
