@@ -170,11 +170,38 @@ impl ActionContract {
             ensure!(low.iter().zip(high).all(|(l, h)| l <= h), "action.low exceeds action.high");
         }
         ensure!(self.max_step.iter().flatten().all(|s| *s >= 0.0), "action.max_step holds a negative value");
+        for (i, step) in self.max_step.iter().flatten().enumerate() {
+            let largest = self.limits(i).map_or(0.0, |[low, high]| high.max(-low));
+            ensure!(
+                *step == 0.0 || *step >= f32::EPSILON * largest,
+                "action.max_step[{i}] is {step:e}, which float32 rounds away beside the limit {largest}, so that the action would \
+                 stand still; give it a larger change in a step, or 0 to hold it"
+            );
+        }
         let share = |s: &f32| *s > 0.0 && *s <= 1.0;
         ensure!(self.smoothing.iter().flatten().all(share), "action.smoothing must be above 0 and at most 1");
         if let Some(Binarise { on, off, .. }) = &self.binarise {
             ensure!(off.iter().zip(on).all(|(off, on)| off <= on), "action.binarise.off exceeds action.binarise.on");
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_that_rounding_swallows_are_refused() {
+        let of = |step: f32| {
+            let [low, high, max_step] = [vec![-1e6], vec![4e5], vec![step]].map(Some);
+            ActionContract { low, high, max_step, ..ActionContract::default() }.check(1)
+        };
+        assert!(of(0.0).is_ok() && of(0.12).is_ok());
+        let error = format!("{:#}", of(0.1).expect_err("f32 rounds it away"));
+        assert!(
+            error.starts_with("action.max_step[0] is 1e-1, which float32 rounds away beside the limit 1000000"),
+            "{error}"
+        );
     }
 }
