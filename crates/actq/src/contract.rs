@@ -175,7 +175,7 @@ impl ActionContract {
             ensure!(
                 *step == 0.0 || *step >= f32::EPSILON * largest,
                 "action.max_step[{i}] is {step:e}, which float32 rounds away beside the limit {largest}, so that the action would \
-                 stand still; give it a larger change in a step, or 0 to hold it"
+                 stand still; give it a larger change in a step"
             );
         }
         let share = |s: &f32| *s > 0.0 && *s <= 1.0;
