@@ -1,6 +1,6 @@
 #!/bin/sh
 # adafruit-circuitpython-ina3221 1.2.3 (TI's INA3221, three channels of current): shunt_voltage_sum_limit = 0.1, the limit of the sum of the currents, is written to another register: the upper limit of the power-valid monitor (address
-# 0x10). The sum's own register (0x0E) keeps its start value, the end of its range, so that the alarm of too much current in all motors never comes, and the supply is called valid from another voltage on: 10 V become 2.5 V, so
+# 0x10). The sum's own register (0x0E) keeps its start value, the end of its range, so that the alarm of too much current in all motors never comes, and the supply is called valid from another voltage on: 10 V become 5 V, so
 # that a battery that has failed counts as good. Reading shunt_voltage_sum_limit back gives the old limit. There is no error.
 # Seen on 2026-11-30:  power_valid_limits 9 V, 10 V, then shunt_voltage_sum_limit = 0.1: limits 9.0 V, 5.0 V, sum limit 0.655 V (0.1), registers 0x0e: 0x7ffe, 0x10: 0x1388
 set -eu

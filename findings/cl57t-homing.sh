@@ -1,7 +1,7 @@
 #!/bin/sh
 # cl57t-raspberry-pi-stepper-drive 0.5.0, of its Python files as they are (closed-loop stepper driver CL57T): do_homing() drives to the switch and leaves the position as the steps have counted it: the callback that would set it to 0 is never
 # registered. The README's sequence, do_homing(), set_homing_position_mm(400), run_to_position_mm(400), which should stay at the switch, then drives by the distance that the homing covered: an arm that was switched on 300 steps
-# from its switch goes 300 steps back, past it by as much as it started off, each time somewhere else. do_homing() also leaves the speed limit of its slow approach, 50 steps/s, for all later moves. It returns True. There is no error.
+# from its switch goes 300 steps back, to where it was switched on, each time somewhere else. do_homing() also leaves the speed limit of its slow approach, 50 steps/s, for all later moves. It returns True. There is no error.
 # Seen on 2026-11-30:  start 300 steps from the switch: homed True, position -300 at the switch (0), limit 50 steps/s (was 3000)   run_to_position_mm(400): 300 steps from the switch (0)   start at 120: 120 steps
 set -eu
 dir=$(mktemp -d); trap 'rm -rf "$dir"' EXIT; cd "$dir"

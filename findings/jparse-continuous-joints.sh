@@ -1,7 +1,7 @@
 #!/bin/sh
 # jparse-robotics 0.1.0, pin 4.1.0, numpy 2.4.6 (velocities of an arm's joints near singularities): num_joints, "Number of actuated joints", is the length of Pinocchio's configuration, in which a continuous joint has two numbers, its cosine and
-# sine. The README's q = np.zeros(robot.num_joints) is then no configuration: the rotation of that joint is a matrix of zeros, the hand is at its axis, and the velocities are those of another arm. An encoder's angle in one of the two places gives
-# no error either. And the argument base_link, "Name of the base link (fixed frame)", is not read: poses and velocities are in the frame of the file's root, here turned by 90 degrees, and a name that the file does not have is taken
+# sine. The README's q = np.zeros(robot.num_joints) is then no configuration: the rotation of that joint is a matrix of zeros, the hand is at its axis, and the velocities are those of another arm.
+# And the argument base_link, "Name of the base link (fixed frame)", is not read: poses and velocities are in the frame of the file's root, here turned by 90 degrees, and a name that the file does not have is taken
 # too, where the documentation promises a ValueError. There is no error and no warning.
 # Seen on 2026-11-30:  2 joints (one continuous): num_joints 3, num_velocities 2; zeros: hand at 0.0, 0.0, 0.0, determinant of its rotation 0   cos 0, sin 0: hand at 0.0, 0.7, 0.0   base_link "shoulder", "world", "nonsense": one result, 0.0, 0.7, 0.0 (in "shoulder": 0.7, 0.0, 0.0)
 set -eu
