@@ -3,6 +3,7 @@
 use actq_controller::Guard;
 use actq_controller::guard::{Range, Refused};
 use actq_link::Floats;
+use actq_link::code::Refusal;
 use actq_testkit::Random;
 
 const RANGES: [Range; 3] =
@@ -188,4 +189,33 @@ fn reopening_resets_the_clock_tracking() {
     guard.reopen();
     assert_eq!(guard.newest(), None, "the earlier observation is dropped");
     assert_eq!(guard.take(3, Floats::Values(&[0.0; 3]), 0, 20), Ok(()));
+}
+
+#[test]
+fn the_largest_age_is_still_accepted() {
+    let (mut guard, before) = (guard(), |micros| 0u32.wrapping_sub(micros));
+    assert_eq!(guard.date(0, 0), Ok(()));
+    assert_eq!(guard.date(before(MAX_AGE), 0), Ok(()));
+    assert_eq!(guard.date(before(MAX_AGE + 1), 0), Err(Refused::Old { age: MAX_AGE + 1 }));
+    assert_eq!((guard.set_max_age(MAX_AGE + 1), guard.set_max_age(MAX_AGE)), (Err(Refusal::Range), Ok(())));
+}
+
+/// The sender's time leaps by any amount before the controller is armed, and after that by 2^20 µs at most.
+#[test]
+fn a_bounded_guard_refuses_a_leap_of_the_clock() {
+    const LEAP: u32 = 1 << 20;
+    let old = |age| Err(Refused::Old { age });
+    for (leap, is_bounded, expected, then) in [
+        (LEAP, true, Ok(()), old(LEAP)),
+        (LEAP + 1, true, Err(Refused::Ahead), Ok(())),
+        (LEAP + 1, false, Ok(()), old(LEAP + 1)),
+        // Half of the clock's range is ahead, and not behind.
+        (1 << 31, false, Ok(()), Ok(())),
+    ] {
+        let mut guard = guard();
+        assert_eq!(guard.date(0, 0), Ok(()));
+        guard.bound(is_bounded);
+        assert_eq!(guard.date(leap, 0), expected, "{leap} {is_bounded}");
+        assert_eq!(guard.date(0, 0), then, "{leap} {is_bounded}: a refused leap changes nothing");
+    }
 }
