@@ -42,6 +42,9 @@ fn the_stricter_of_two_limits_holds() {
         (Some([-1.0, 0.5]), &[], [Some("-1:0.5"); 2]),
         (Some([-1.0, 0.5]), &["-2:0.25:3"], [Some("-1:0.25:3"); 2]),
         (Some([-1.0, 0.5]), &["-0.5:2", "0.6:2"], [Some("-0.5:0.5"), None]),
+        (Some([-1.0, f32::INFINITY]), &["-2:2:3"], [Some("-1:2:3"); 2]),
+        (Some([-1.0, f32::INFINITY]), &[], [None; 2]),
+        (Some([f32::NEG_INFINITY, 0.5]), &[], [None; 2]),
     ] {
         let built: Vec<Limits> = built.iter().copied().map(of).collect();
         assert_eq!([0, 1].map(|i| Limits::of_axis(i, image, &built)), axes.map(|axis| axis.map(of)), "{built:?}");

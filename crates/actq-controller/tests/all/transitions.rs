@@ -251,6 +251,7 @@ fn invalid_axes_are_refused() {
         new(1.0, -1.0, 1.0, 0.0, SafeAction::Hold),
         new(-1.0, 1.0, 0.0, 0.0, SafeAction::Hold),
         new(-1.0, 1.0, f32::NAN, 0.0, SafeAction::Hold),
+        new(0.0, 0.0, 0.0, 0.0, SafeAction::Hold),
         new(-1.0, 1.0, 1.0, 2.0, SafeAction::Hold),
         new(-1.0, 1.0, 1.0, f32::NAN, SafeAction::Hold),
         new(-1.0, 1.0, 1.0, 0.0, SafeAction::Ramp { step: 0.0 }),
@@ -261,4 +262,13 @@ fn invalid_axes_are_refused() {
         let error = case.expect_err(&i.to_string());
         assert!(!error.to_string().is_empty());
     }
+}
+
+#[test]
+fn only_a_driven_value_may_be_outside_the_limits() {
+    let axis = Axis::new(-1.0, 0.5, 1.0, 0.0, SafeAction::Hold).expect("the axis is valid");
+    let is_within = |value| Output::Drive(value).is_within(&axis);
+    assert!([-1.0, 0.0, 0.5].into_iter().all(is_within));
+    assert!(![-1.1, 0.6, f32::NAN, f32::NEG_INFINITY].into_iter().any(is_within));
+    assert!(Output::Brake.is_within(&axis) && Output::Coast.is_within(&axis));
 }
