@@ -232,6 +232,7 @@ fn parameters_only_become_stricter_while_disarmed() {
         assert_eq!(bench.ask(&message), outcome, "{message:?}");
     }
     assert_eq!(get(&mut bench, Parameter::Low, 1), Some(Ok(-0.5)));
+    assert_eq!(get(&mut bench, Parameter::Start, 1), Some(Ok(0.25)));
     assert_eq!(get(&mut bench, Parameter::Deadline, 0), Some(Ok(9.0)));
     bench.arm();
     let changed = Message::Set { token: bench.status().token, parameter: Parameter::Low, axis: 0, value: -0.1 };
@@ -366,6 +367,7 @@ fn an_update_that_stalls_the_tick_needs_disarming() {
     };
     for flash_while_armed in [false, true] {
         let mut bench = Bench::of(Settings { status_period: 0, flash_while_armed, quiet: QUIET }, NoUpdate);
+        assert_eq!(bench.endpoint.stalls(), !flash_while_armed);
         let outcomes = |bench: &mut Bench| requests(bench.status().token).map(|request| bench.ask(&request));
         let (done, armed) = (Err(Refusal::Unsupported), Err(Refusal::Armed));
         assert_eq!(outcomes(&mut bench), [done; 3]);
@@ -414,9 +416,16 @@ fn an_update_continues_after_a_disarm() {
     };
     let announced = |token| Message::Begin { token, length: 8, crc: CRC.checksum(b"an image"), version: 0 };
     assert_eq!(after_a_disarm(&mut bench, announced), Err(Refusal::Busy), "the slot is being erased");
+    bench.observe();
+    assert_eq!(bench.ask(&Message::Arm { token: bench.safety.token() }), Err(Refusal::Busy));
     while bench.update.work() == Work::More {}
     assert_eq!(bench.ask(&announced(bench.safety.token())), Ok(()));
     assert_eq!(after_a_disarm(&mut bench, |_| Message::Chunk { offset: 0, bytes: b"an i" }), Ok(()));
+    let again = bench.send(&Message::Chunk { offset: 0, bytes: b"an i" }, |answer| match answer {
+        Message::Ack { refusal: None, written, .. } => written,
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(again, Some(4), "all that was written");
     assert_eq!(after_a_disarm(&mut bench, |_| Message::Chunk { offset: 4, bytes: b"mage" }), Ok(()));
     assert_eq!(
         after_a_disarm(&mut bench, |_| Message::Commit { signature: None }),
@@ -449,6 +458,61 @@ fn periodic_status_and_a_new_host_after_silence() {
         bench.safety.tick();
         bench.endpoint.report(0, &mut bench.safety, &mut out);
     }
+    bench.observe();
+    assert!(!bench.safety.is_stale());
+}
+
+#[test]
+fn without_a_period_only_a_new_token_is_reported() {
+    let (mut bench, mut out) = (Bench::new(), [0; 256]);
+    let mut is_reported = |bench: &mut Bench| {
+        bench.safety.tick();
+        bench.endpoint.report(0, &mut bench.safety, &mut out).is_some()
+    };
+    for _ in 0..2 {
+        assert_eq!([0; 3].map(|_| is_reported(&mut bench)), [true, false, false]);
+        bench.safety.renew();
+    }
+    let status = bench.status();
+    assert_eq!((status.axes, status.observation), (2, 3));
+    assert!(!is_reported(&mut bench), "a status that was asked for has the token, too");
+}
+
+#[test]
+fn a_host_is_forgotten_after_the_last_quiet_tick() {
+    let (mut bench, mut out) = (Bench::new(), [0; 256]);
+    let token = bench.status().token;
+    for tick in 1..=QUIET + 1 {
+        bench.safety.tick();
+        bench.endpoint.report(0, &mut bench.safety, &mut out);
+        assert_eq!(bench.safety.token() == token, tick <= QUIET, "{tick}");
+    }
+}
+
+/// The sender's time jumps back by a second.
+#[test]
+fn a_stale_controller_learns_the_clock_anew() {
+    let (mut bench, mut out) = (Bench::new(), [0; 256]);
+    bench.micros = 1_000_000;
+    let wire = bench.frame(&Message::Observation(Floats::Values(&OBSERVATION)));
+    bench.micros = 0;
+    bench.bytes(&wire);
+    bench.observe();
+    assert_eq!(bench.status().refused, 1);
+    (0..=DEADLINE).for_each(|_| _ = bench.safety.tick());
+    assert!(bench.safety.is_stale());
+    bench.endpoint.report(0, &mut bench.safety, &mut out);
+    bench.observe();
+    assert!(!bench.safety.is_stale());
+}
+
+/// Nor does a disarm: a new host's numbers may be far ahead.
+#[test]
+fn an_arm_request_that_is_refused_bounds_no_numbers() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.ask(&Message::Arm { token: bench.safety.token() ^ 1 }), Err(Refusal::Token));
+    assert_eq!(bench.ask(&Message::Disarm), Ok(()));
+    bench.host = Sender::new(1 << 20);
     bench.observe();
     assert!(!bench.safety.is_stale());
 }
