@@ -1,6 +1,6 @@
 //! Updates over a line that loses and repeats requests, and refused updates.
 
-use actq_controller::slots::{Anyone, Layout, LayoutError, Slot, Slots, TRIALS, Work};
+use actq_controller::slots::{Anyone, Layout, LayoutError, Slot, Slots, TRIALS, Updater, Work};
 use actq_controller::update::{Plan, Update};
 use actq_link::code::Refusal;
 use actq_testkit::{Nor, Random};
@@ -137,6 +137,76 @@ fn an_abort_does_not_stop_a_test() {
     assert_eq!(device.updater.abort(), Err(Refusal::Busy));
     assert!(device.updater.tested(Ok(())));
     assert_eq!(device.updater.commit(None), Ok(()));
+}
+
+/// Works until the next request, or test; returns before each step, and at the end, whether the step takes long.
+fn long_steps(updater: &mut Updater<&mut Flash, Anyone>) -> Vec<bool> {
+    let mut long = vec![updater.takes_long()];
+    while updater.work() == Work::More {
+        long.push(updater.takes_long());
+    }
+    long
+}
+
+/// Each sector's erase, the last of the two blocks, with the check of the signature, and the test. Meanwhile, the
+/// updater is busy.
+#[test]
+fn steps_that_take_long_are_known_before() {
+    let (mut flash, layout) = flash();
+    let image = Image::new(128, 1, true);
+    let mut updater = Device::start(&mut flash, &layout, Anyone).updater;
+    assert_eq!((updater.is_busy(), updater.begin(image.plan())), (false, Err(Refusal::Busy)));
+    assert_eq!((updater.is_busy(), updater.chunk(0, &[0; 4]), updater.written()), (true, Err(Refusal::Busy), 0));
+    assert_eq!(long_steps(&mut updater), [true, true, false]);
+    assert_eq!((updater.is_busy(), updater.chunk(0, &image.bytes)), (false, Ok(())));
+    assert_eq!(updater.commit(None), Err(Refusal::Busy));
+    for phase in [&[false, true, true][..], &[true]] {
+        assert_eq!(
+            (updater.is_busy(), updater.begin(image.plan()), updater.written()),
+            (true, Err(Refusal::Busy), 512)
+        );
+        assert_eq!(long_steps(&mut updater), phase);
+    }
+    assert!(updater.tested(Ok(())));
+    assert_eq!((updater.is_busy(), updater.takes_long(), updater.written()), (false, false, 512));
+}
+
+/// A repeated one continues.
+#[test]
+fn another_announcement_begins_again() {
+    let (mut flash, layout) = flash();
+    let [first, second] = [1, 2].map(|version| Image::new(100, version, true).plan());
+    let mut updater = Device::start(&mut flash, &layout, Anyone).updater;
+    for plan in [first, second] {
+        assert_eq!(updater.begin(plan), Err(Refusal::Busy));
+        assert_eq!((updater.work(), updater.begin(plan)), (Work::More, Err(Refusal::Busy)));
+        assert_eq!(long_steps(&mut updater).len(), 2, "one of two sectors is left");
+    }
+    assert_eq!((updater.begin(second), updater.begin(first)), (Ok(()), Err(Refusal::Busy)));
+    assert_eq!((updater.begin(second), long_steps(&mut updater).len()), (Err(Refusal::Busy), 3));
+    assert_eq!((updater.begin(second), updater.chunk(0, &[0; 4])), (Ok(()), Ok(())));
+    assert_eq!(updater.begin(second), Err(Refusal::Busy), "its first bytes were taken");
+}
+
+/// A failed erase is told once, to the host that asked for it.
+#[test]
+fn a_failed_erase_is_told_once() {
+    let (mut flash, layout) = flash();
+    let [first, second] = [1, 2].map(|version| Image::new(100, version, true).plan());
+    flash.power.fails_at = Some(0);
+    let mut updater = Device::start(&mut flash, &layout, Anyone).updater;
+    for (asked, told) in [(first, Refusal::Flash), (second, Refusal::Busy)] {
+        assert_eq!((updater.begin(first), updater.work()), (Err(Refusal::Busy), Work::More));
+        assert_eq!(updater.begin(asked), Err(told));
+    }
+}
+
+#[test]
+fn an_image_may_fill_its_slot() {
+    let (mut flash, layout) = flash();
+    let image = Image::new((2048 - 256) / 4, 1, true);
+    assert_eq!(Device::start(&mut flash, &layout, Anyone).update(&image, 400, None), Ok(()));
+    assert_eq!(Device::start(&mut flash, &layout, Anyone).runs, Some(image.bytes));
 }
 
 #[test]
