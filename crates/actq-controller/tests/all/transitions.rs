@@ -272,3 +272,11 @@ fn only_a_driven_value_may_be_outside_the_limits() {
     assert!(![-1.1, 0.6, f32::NAN, f32::NEG_INFINITY].into_iter().any(is_within));
     assert!(Output::Brake.is_within(&axis) && Output::Coast.is_within(&axis));
 }
+
+#[test]
+fn actions_are_limited_on_both_sides() {
+    let mut safety = in_state(State::Armed, SafeAction::Hold);
+    for (action, target) in [(7.0, 1.0), (-7.0, -1.0), (0.5, 0.5)] {
+        assert_eq!(safety.act(&[action]), Ok(Some([target])));
+    }
+}
