@@ -21,7 +21,7 @@ use crate::qemu::{in_slot, spawn};
 pub const HANG_TIMEOUT: Duration = Duration::from_secs(600);
 
 /// log2 of the nanoseconds per instruction: 32 ns.
-const INSTRUCTION: u32 = 5;
+pub const INSTRUCTION: u32 = 5;
 
 /// Period of the checks for a refused observation.
 const REFUSAL_CHECK_PERIOD: Duration = Duration::from_millis(500);

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use actq::methods::Activations;
 use actq::runtime::ImageBuffer;
-use actq_bench::controller::{Controller, HANG_TIMEOUT, act, act_in_order, wait_until};
+use actq_bench::controller::{Controller, HANG_TIMEOUT, INSTRUCTION, act, act_in_order, wait_until};
 use actq_bench::cycles::{Code, Function};
 use actq_bench::firmware::{self, built_in, halfword_at};
 use actq_bench::networks::{Builder, with_wrong_self_test};
@@ -154,7 +154,7 @@ fn a_background_head_leaves_the_tick_undisturbed() -> Result<()> {
     let observation = observation()?;
     let mut late = Vec::new();
     while late.len() < 8 {
-        let controller = Controller::start_by(Target::Fpu, &elf, None, Clock::Free(5))?;
+        let controller = Controller::start_by(Target::Fpu, &elf, None, Clock::Free(INSTRUCTION))?;
         let mut client = controller.client()?;
         for _ in 0..60 {
             act(&mut client, &observation)?;

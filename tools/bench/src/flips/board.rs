@@ -19,10 +19,9 @@ use tempfile::TempDir;
 
 use super::gdb::{CORE, Gdb};
 use super::{CYCLES, Detection, Flip, Judge, LONGEST, Outcome, PERIOD, PERIODS, Region, Sample, WINDOW};
+use crate::controller::INSTRUCTION;
 use crate::qemu::spawn;
 
-/// log2 of the nanoseconds per instruction: 32 ns.
-const INSTRUCTION: u32 = 5;
 /// Ticks per second of the application.
 const TICK_HZ: f32 = 1000.0;
 /// Time without a stop after which QEMU counts as hung: the watchdog stops it after a second of its own time.
