@@ -69,13 +69,12 @@ impl CheckedArrays {
         }
         let length = match arrays.take("length") {
             None => {
-                let mark = MARKS.iter().find(|name| arrays.has(name));
-                ensure!(
-                    mark.is_none(),
-                    "array {:?} says where episodes begin or end, and is not read: save \"obs\" as [episode, step, value], with the \
-                     steps of each episode as \"length\", or leave that array out if all steps are one episode",
-                    mark.unwrap_or(&"")
-                );
+                if let Some(mark) = MARKS.iter().find(|name| arrays.has(name)) {
+                    bail!(
+                        "array {mark:?} says where episodes begin or end, and is not read: save \"obs\" as [episode, step, value], \
+                         with the steps of each episode as \"length\", or leave that array out if all steps are one episode"
+                    );
+                }
                 vec![steps; episodes]
             }
             Some(length) => lengths(&length, episodes, steps)?,
