@@ -33,7 +33,7 @@ fn arm() -> SerialChain<f64> {
     SerialChain::from_end(&nodes[4])
 }
 
-/// How many of 200 targets are reached, which the other three joints can, and in how many of these the ignored joint has moved.
+/// Counts the targets that are reached, of 200 that the other three joints can reach, and those of them for which the ignored joint has moved.
 fn solved(ignored: usize, rotation_z: bool) -> (u32, u32) {
     let solver = JacobianIkSolver::new(0.001, 0.005, 0.5, 1000);
     let constraints = Constraints { position_z: false, rotation_x: false, rotation_y: false, rotation_z, ignored_joint_names: vec![format!("j{ignored}")], ..Default::default() };

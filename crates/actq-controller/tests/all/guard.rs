@@ -209,7 +209,7 @@ fn a_bounded_guard_refuses_a_leap_of_the_clock() {
         (LEAP, true, Ok(()), old(LEAP)),
         (LEAP + 1, true, Err(Refused::Ahead), Ok(())),
         (LEAP + 1, false, Ok(()), old(LEAP + 1)),
-        // Half of the clock's range is ahead, and not behind.
+        // Half of the clock's range counts as ahead, and not as old.
         (1 << 31, false, Ok(()), Ok(())),
     ] {
         let mut guard = guard();
