@@ -52,7 +52,7 @@ impl<'a> Products<'a> {
         while let Some(i) = head.next_op() {
             let op = &self.ops[i];
             match (op.kind, op.matrix(), self.offsets[i]) {
-                (OpKind::Linear { accumulate }, Some(matrix), Some(offset)) => head.replace_op(|arena| {
+                (OpKind::Linear { accumulate, .. }, Some(matrix), Some(offset)) => head.replace_op(|arena| {
                     multiply(op, &matrix, &self.weights[offset..], accumulate, arena);
                     Ok(())
                 })?,

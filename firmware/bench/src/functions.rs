@@ -94,7 +94,7 @@ fn product(largest: f32, y: &mut [f32; LEN]) -> Option<()> {
         core::array::from_fn(|i| u32::from(SCALES[2 * i % 8]) | u32::from(SCALES[(2 * i + 1) % 8]) << 16);
     let start: [u32; LEN] = core::array::from_fn(|i| EXTREMES[(i / 8) % EXTREMES.len()].to_bits());
     let rows = RowBlock { block, scales: &scales, steps: &[], first_row: 0 };
-    let x: [f32; COLS] = core::array::from_fn(|i| match i {
+    let mut x: [f32; COLS] = core::array::from_fn(|i| match i {
         0..4 => [largest, -largest, 1e-40, -0.0][i],
         _ => largest * (i as f32 / COLS as f32 - 0.5),
     });
@@ -102,7 +102,7 @@ fn product(largest: f32, y: &mut [f32; LEN]) -> Option<()> {
     let plan = Plan::of(&block);
     let mut apply = || {
         let scale = Scale::new(black_box(&x), 127).ok()?;
-        let prepared = scale.quantize(&x, &plan, &mut work)?;
+        let prepared = scale.quantize(&mut x, &plan, &mut work)?;
         rows.apply(&prepared, scale, Some(&start), y).ok()?;
         rows.apply(&prepared, scale, None, y).ok()
     };

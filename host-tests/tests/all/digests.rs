@@ -36,7 +36,7 @@ fn images_are(policy_dir: &Path, expected: [(usize, u32); 4]) -> Result<()> {
 
 #[test]
 fn images_of_ur3_stay_the_same() -> Result<()> {
-    images_are(&ur3(), [(362292, 0x8cf8b4fb), (195892, 0x03af1203), (154292, 0xf2e78373), (112692, 0x4e539db9)])
+    images_are(&ur3(), [(362292, 0x4a229d6b), (195892, 0xc5753b93), (154292, 0x343daae3), (112692, 0x8889b429)])
 }
 
 #[test]
@@ -44,11 +44,11 @@ fn images_of_shared_policies_stay_the_same() -> Result<()> {
     let Some(policies) = shared_policies() else { return Ok(()) };
     images_are(
         &policies.join("go1_mlp"),
-        [(210584, 0x49f34427), (111512, 0x776e2a66), (86744, 0x635d1928), (61976, 0x3d00f242)],
+        [(210584, 0x532569f7), (111512, 0x6db807b6), (86744, 0x798b34f8), (61976, 0x27d6df92)],
     )?;
     images_are(
         &policies.join("g1_lstm256"),
-        [(558388, 0xc1afd3d7), (294196, 0xa55bcb33), (228148, 0x0705d8de), (162100, 0xac5bfa68)],
+        [(558388, 0xa8aad05d), (294196, 0xcc5ec8b9), (228148, 0x6e00db54), (162100, 0xc55ef9e2)],
     )?;
     images_are(
         &policies.join("g1_lstm64"),
@@ -56,6 +56,6 @@ fn images_of_shared_policies_stay_the_same() -> Result<()> {
     )?;
     images_are(
         &policies.join("fetch_pickplace"),
-        [(149952, 0xfbbfe830), (79808, 0x4669b77b), (62272, 0x3e6d4afe), (44736, 0xe8de9c0f)],
+        [(149952, 0x48b3b745), (79808, 0xf565e80e), (62272, 0x8d61158b), (44736, 0x5bd2c37a)],
     )
 }

@@ -89,12 +89,12 @@ fn the_hex_example_reads_as_documented() {
     assert_eq!(image.source_weights(), 6);
     assert_eq!(bytes[4 * h::W_CRC..][..4], checksum(&bytes).to_le_bytes());
     assert_eq!((image.kind(), image.chunk(), image.execute()), (Kind::Step, 1, 1));
-    assert_eq!((image.obs_len(), image.act_len(), image.scratch_words()), (2, 3, 41));
+    assert_eq!((image.obs_len(), image.act_len(), image.scratch_words()), (2, 3, 18));
     assert_eq!(image.state(), Region { offset: 0, len: 0 });
     assert_eq!(image.observation(), Region { offset: 0, len: 2 });
     assert_eq!(image.output(), Region { offset: 2, len: 3 });
     assert_eq!(image.action(), Region { offset: 5, len: 3 });
-    assert_eq!(image.work(), Region { offset: 8, len: 33 });
+    assert_eq!(image.work(), Region { offset: 8, len: 10 });
     assert_eq!((image.rate_hz(), image.name()), (50.0, "tiny"));
     assert_eq!(image.digest(), std::array::from_fn(|i| i as u8));
 
@@ -104,11 +104,11 @@ fn the_hex_example_reads_as_documented() {
 
     assert_eq!(image.op_count(), 1);
     let op = image.ops().next().expect("the image has an operation");
-    assert_eq!(op.kind, OpKind::Linear { accumulate: false });
+    assert_eq!(op.kind, OpKind::Linear { accumulate: false, in_place: false });
     assert_eq!((op.src(), op.dst(), op.third()), (image.observation(), image.output(), image.work()));
     let matrix = op.matrix().expect("the operation is linear");
     assert_eq!((matrix.rows, matrix.cols, matrix.group, matrix.x_max), (3, 2, 0, 127));
-    assert_eq!(max_prepared_words(matrix.cols, matrix.group), image.work().len);
+    assert_eq!(max_prepared_words(matrix.cols, matrix.group, matrix.lanes()), image.work().len);
     let blocks: Vec<_> = matrix.blocks().collect();
     let [rows] = &blocks[..] else { panic!("the matrix has one block") };
     let shape = BlockShape { width: Width::W2, lanes: Lanes::Paired, rows: 3, cols: 2, group: 0 };
@@ -405,46 +405,52 @@ fn the_table_of_sizes_matches_the_blocks() {
 #[test]
 fn the_work_area_is_as_long_as_documented() {
     let document = document();
-    let rows = table(&document, "| group | words of the work area");
+    let rows = table(&document, "| lanes | group | words of the work area");
     assert_eq!(
         rows,
         [
-            ["0", "1 + max(ceil(c / 32) * 16, ceil(c / 8) * 5)"],
-            ["0, where 8 does not divide c", "1 + max(ceil(c / 32) * 32, ceil(c / 8) * 9)"],
-            ["0, where 8 does but 32 does not", "1 + ceil(c / 32) * 32"],
-            ["32", "ceil(c / 32) * 21"],
-            ["32, where 32 does not divide c", "max(ceil(c / 32) * 37, ceil(c / 64) * 67)"],
-            ["32, where 32 does but 64 does not", "max(ceil(c / 32) * 21, ceil(c / 64) * 67)"],
-            ["64, 128", "ceil(c / group) * (group / 2 + 1)"],
-            ["64, 128, where it does not divide c", "ceil(c / group) * (group + 1)"],
+            ["1", "0", "1 + ceil(c / 8) * 5"],
+            ["1", "0, where 8 does not divide c", "1 + ceil(c / 8) * 9"],
+            ["1", "32", "ceil(c / 32) * 21"],
+            ["1", "32, where 32 does not divide c", "max(ceil(c / 32) * 37, ceil(c / 64) * 67)"],
+            ["1", "32, where 32 does but 64 does not", "max(ceil(c / 32) * 21, ceil(c / 64) * 67)"],
+            ["0", "0", "1 + ceil(c / 32) * 16"],
+            ["0", "0, where 32 does not divide c", "1 + ceil(c / 32) * 32"],
+            ["0", "32, 64, 128", "ceil(c / group) * (group / 2 + 1)"],
+            ["0", "32, 64, 128, where it does not divide c", "ceil(c / group) * (group + 1)"],
+            ["3", "0", "1 + ceil(c / 32) * 8"],
+            ["3", "32, 64, 128", "ceil(c / group) * (group / 4 + 1)"],
         ]
     );
-    let most = |cols, group| {
-        let plans = Width::ALL
-            .into_iter()
-            .flat_map(|width| Lanes::DSP.map(|lanes| Plan::new(BlockShape { width, lanes, rows: 1, cols, group })));
-        plans.flatten().map(|plan| plan.room(cols)).max()
-    };
     for cols in (1..1200usize).chain([4095, 4096, 65535]) {
-        let thirty_twos = cols.div_ceil(32);
-        let words = match (cols % 8, cols % 32) {
-            (0, 0) => (thirty_twos * 16).max(cols / 8 * 5),
-            (0, _) => thirty_twos * 32,
-            _ => (thirty_twos * 32).max(cols.div_ceil(8) * 9),
-        };
-        assert_eq!(max_prepared_words(cols, 0), 1 + words, "{cols} columns");
-        assert_eq!(most(cols, 0), Some(1 + words), "{cols} columns");
-        for group in [32, 64, 128] {
-            let pairs = if cols.is_multiple_of(64) { 0 } else { cols.div_ceil(64) * 67 };
-            let words = match (group, cols.is_multiple_of(group)) {
-                (32, true) => pairs.max(thirty_twos * 21),
-                (32, false) => pairs.max(thirty_twos * 37),
-                (_, true) => cols.div_ceil(group) * (group / 2 + 1),
-                (_, false) => cols.div_ceil(group) * (group + 1),
+        let divides = |unit: usize| cols.is_multiple_of(unit);
+        let times = |unit: usize, words: usize| cols.div_ceil(unit) * words;
+        for (lanes, group) in [Lanes::Paired, Lanes::Single, Lanes::Helium]
+            .into_iter()
+            .flat_map(|lanes| [0, 32, 64, 128].map(|group| (lanes, group)))
+            .filter(|(lanes, group)| *lanes != Lanes::Paired || *group <= 32)
+        {
+            let words = match (lanes, group) {
+                (Lanes::Paired, 0) => 1 + times(8, if divides(8) { 5 } else { 9 }),
+                (Lanes::Paired, _) if divides(64) => times(32, 21),
+                (Lanes::Paired, _) => times(64, 67).max(times(32, if divides(32) { 21 } else { 37 })),
+                (Lanes::Single, 0) => 1 + times(32, if divides(32) { 16 } else { 32 }),
+                (Lanes::Single, _) => times(group, if divides(group) { group / 2 + 1 } else { group + 1 }),
+                (_, 0) => 1 + times(32, 8),
+                (_, _) => times(group, group / 4 + 1),
             };
-            assert_eq!(max_prepared_words(cols, group), words, "{cols} columns, groups of {group}");
-            if group > 32 || cols <= MAX_PAIRED_GROUPED {
-                assert_eq!(most(cols, group), Some(words), "{cols} columns, groups of {group}");
+            let shape = |width| BlockShape { width, lanes, rows: 1, cols, group };
+            let plans = Width::ALL.into_iter().filter_map(|width| Plan::new(shape(width)));
+            let most = plans.map(|plan| plan.room(cols)).max();
+            if lanes != Lanes::Helium {
+                assert_eq!(
+                    max_prepared_words(cols, group, lanes),
+                    words,
+                    "{cols} columns, groups of {group}, {lanes:?}"
+                );
+            }
+            if lanes != Lanes::Paired || group == 0 || cols <= MAX_PAIRED_GROUPED {
+                assert_eq!(most, Some(words), "{cols} columns, groups of {group}, {lanes:?}");
             }
         }
     }

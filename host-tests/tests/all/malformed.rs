@@ -6,13 +6,18 @@ mod attention;
 mod damaged;
 mod draft;
 
+use actq::graph::ops::Linear;
+use actq::methods::Activations;
+use actq_bench::networks::Builder;
 use actq_kernels::ImageError as E;
 use actq_kernels::image::{header as h, op};
+use actq_kernels::layout::Width;
+use anyhow::Result;
 
 use crate::draft::Draft;
 use draft::{
     ACT, CHUNK, FIRST, FUNCTION, HUGE, INPUT, LAYER_NORM, LSTM, NAN, NORMALIZE, OBS, OUTPUT, STATE, UNITS, VALID,
-    refused,
+    refused, refused_of,
 };
 
 #[test]
@@ -164,7 +169,9 @@ fn impossible_operations_are_refused() {
         ("operation code 0", E::Op, |d| d.set(d.op(FUNCTION), 0)),
         ("operation code 24", E::Op, |d| d.set(d.op(FUNCTION), 24)),
         ("an unknown function", E::Op, |d| d.set_low(d.op(FUNCTION), u32::from(op::FUNCTION) | 12 << 8)),
-        ("detail 2 in linear", E::Reserved, |d| d.set_low(d.op(FIRST), u32::from(op::LINEAR) | 2 << 8)),
+        ("detail 4 in linear", E::Reserved, |d| d.set_low(d.op(FIRST), u32::from(op::LINEAR) | 4 << 8)),
+        ("an input in place that must be padded", E::Arena, |d| d.map_low(d.op(FIRST), |half| half | 2 << 8)),
+        ("an input in place for several blocks", E::Arena, |d| d.map_low(d.op(OUTPUT), |half| half | 2 << 8)),
         ("detail 1 in layer norm", E::Reserved, |d| d.set_low(d.op(LAYER_NORM), u32::from(op::LAYER_NORM) | 1 << 8)),
         ("an operation of no length", E::Shape, |d| d.set_high(d.op(FUNCTION), 0)),
         ("destination outside", E::Unwritten, |d| d.set_low(d.op(FUNCTION) + 1, 0xffff)),
@@ -349,4 +356,34 @@ fn unused_fields_of_an_operation_are_zero() {
         ("source of a layer norm", E::Reserved, |d| d.set_high(d.op(LAYER_NORM) + 1, 1)),
         ("constants of a cell", E::Reserved, |d| d.set(d.op(LSTM) + 3, 32)),
     ]);
+}
+
+fn in_place() -> Result<Vec<u8>> {
+    let (mut builder, mut value) = (Builder::new(OBS), 0);
+    for (rows, cols) in [(64, OBS), (32, 64), (ACT, 32)] {
+        let matrix = builder.matrix(rows, cols, Activations::Int8, &vec![Some(Width::W2); rows], 0)?;
+        let bias = builder.values(rows);
+        value = builder.node(Linear { matrix, bias }, &[value])?;
+    }
+    builder.image("in-place")
+}
+
+/// Layers of which the second prepares its input in place and writes over the rest of it.
+#[test]
+fn impossible_inputs_in_place_are_refused() {
+    const SECOND: (u8, usize) = (op::LINEAR, 1);
+    let valid = Draft::of(&in_place().expect("the network fits the format"));
+    let place = |d: &Draft, at: usize| [d.low(at), d.high(at)];
+    let [dst, src] = place(&valid, valid.op(SECOND) + 1);
+    assert_eq!((valid.low(valid.op(SECOND)) >> 8, dst - src), (2, 41), "1 + 64 / 8 * 5 words are prepared");
+    refused_of(
+        &valid,
+        &[
+            ("an output over the prepared input", E::Arena, |d| d.map_low(d.op(SECOND) + 1, |dst| dst - 20)),
+            ("an output before its input", E::Overlap, |d| d.map_low(d.op(SECOND) + 1, |dst| dst - 42)),
+            ("an input apart in a work area for another", E::Arena, |d| d.map_low(d.op(SECOND), |half| half & 0xff)),
+            ("a sum over its input", E::Overlap, |d| d.map_low(d.op(SECOND), |half| half | 3 << 8)),
+            ("an output without biases over its input", E::Overlap, |d| d.set(d.op(SECOND) + 2, 0)),
+        ],
+    );
 }

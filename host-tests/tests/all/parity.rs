@@ -100,19 +100,22 @@ proptest! {
         let plan = Plan::new(shape).expect("the shape is valid");
         let mut words = vec![!0; plan.room(x.len())];
         let scale = Scale::new(&x, x_max).expect("all values are finite");
-        let prepared = scale.quantize(&x, &plan, &mut words).expect("there is room");
-        let scale = scale.get();
+        let prepared = scale.quantize(&mut x.clone(), &plan, &mut words).expect("there is room");
         // The result from integers, word for word: start words, sums and padding, too.
         let integers: Vec<i16> = (0..x.len()).map(|col| prepared.value(col)).collect();
         let mut expected = vec![!0; plan.words() + 1];
         prop_assert_eq!(prepare(&integers, &plan, &mut expected).map(|x| x.words()), Some(prepared.words()));
         prop_assert_eq!(expected.last(), Some(&!0));
+        let mut own: Vec<u32> = x.iter().map(|x| x.to_bits()).collect();
+        let in_place = scale.quantize_in_place(&plan, &mut own).map(|x| x.words().to_vec());
+        prop_assert_eq!(in_place, plan.fits_in_place().then(|| prepared.words().to_vec()));
         for (i, x) in x.iter().enumerate() {
             let q = prepared.value(i);
             prop_assert!(q.unsigned_abs() <= x_max);
             // Half a step, and the rounding of the f32 product before it.
-            let error = (f64::from(*x) - f64::from(scale) * f64::from(q)).abs();
-            prop_assert!(error <= f64::from(scale) * (0.5 + f64::from(x_max) * 2e-7), "{x} became {q}");
+            let step = f64::from(scale.get());
+            let error = (f64::from(*x) - step * f64::from(q)).abs();
+            prop_assert!(error <= step * (0.5 + f64::from(x_max) * 2e-7), "{x} became {q}");
         }
     }
 }
@@ -154,7 +157,7 @@ fn wrong_shapes_and_lengths_are_refused() {
     let plan = Plan::of(&block);
     assert!(prepare(&[1; 33], &plan, &mut vec![0; plan.words() - 1]).is_none(), "too few words");
     let scale = Scale::new(&[1.0; 33], 127).expect("all values are finite");
-    assert!(scale.quantize(&[1.0; 33], &plan, &mut vec![0; plan.room(33) - 1]).is_none(), "too little room");
+    assert!(scale.quantize(&mut [1.0; 33], &plan, &mut vec![0; plan.room(33) - 1]).is_none(), "too little room");
     assert!(Plan::new(BlockShape { cols: 0, ..shape }).is_none(), "no columns");
     let prepared = vec![0; plan.words()];
     assert!(Prepared::new(&prepared[1..], &plan).is_none(), "too few words");
@@ -210,7 +213,7 @@ fn scaling_keeps_the_documented_order_of_operations() {
             let scale = Scale::new(&x, 127).expect("all values are finite");
             let plan = Plan::of(&block.block);
             let mut prepared = vec![0; plan.room(x.len())];
-            let prepared = scale.quantize(&x, &plan, &mut prepared).expect("there is room");
+            let prepared = scale.quantize(&mut x.clone(), &plan, &mut prepared).expect("there is room");
             let expected: Vec<u32> = (0..rows)
                 .map(|i| {
                     let acc = reference::dot(&block.block, &prepared, i) as f32;
@@ -239,7 +242,7 @@ fn vectors_are_refused_if_infinite_zero_if_tiny() {
         let shape = BlockShape { width, lanes, rows: 1, cols: 3, group };
         let plan = Plan::new(shape).expect("the shape is valid");
         let mut words = vec![!0; plan.room(tiny.len())];
-        let x = scale.quantize(&tiny, &plan, &mut words).expect("there is room");
+        let x = scale.quantize(&mut tiny.clone(), &plan, &mut words).expect("there is room");
         assert!((0..3).all(|col| x.value(col) == 0));
     }
 }

@@ -16,8 +16,8 @@ pub(crate) use plan::Extent;
 pub use plan::KernelArguments;
 pub use plan::{Plan, max_prepared_words};
 pub use prepared::Prepared;
-#[cfg(any(not(actq_fpu), feature = "scalar", feature = "helium"))]
-pub(crate) use prepared::lay_out;
 pub use prepared::prepare;
+#[cfg(any(not(actq_fpu), feature = "scalar", feature = "helium"))]
+pub(crate) use prepared::{cells, lay_out};
 pub use scale::Scale;
 pub use scale::TINY;

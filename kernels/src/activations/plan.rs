@@ -1,6 +1,6 @@
 //! The plan of a prepared vector: all its lengths.
 
-use crate::layout::{Block, BlockShape, Lanes, Layout, PAD_COLS, PAIRED_GROUP, div_down, div_up, round_up};
+use crate::layout::{Block, BlockShape, Lanes, Layout, PAD_COLS, div_down, div_up, round_up};
 
 /// The lengths of a vector that is prepared for blocks of a shape, and the kernels' arguments. Zeros fill groups and
 /// chunks.
@@ -113,6 +113,13 @@ impl Plan {
         if copies { self.words + self.padded / 2 } else { self.words }
     }
 
+    /// Returns `true` if a vector of the block's columns can be prepared in its own words: the prepared one is no longer, and
+    /// needs no copy ([`Self::room`]).
+    pub const fn fits_in_place(&self) -> bool {
+        let copies = self.shape.cols != self.padded && matches!(self.shape.lanes, Lanes::Single | Lanes::Paired);
+        !copies && self.words <= self.shape.cols
+    }
+
     /// Returns the words of the work area that a product of a vector of `len` values needs: [`Self::room`], or the
     /// vector and its tables.
     pub const fn work(&self, len: usize) -> usize {
@@ -177,21 +184,22 @@ pub(crate) struct Extent {
     pub(crate) passes: usize,
 }
 
-/// Returns enough words to prepare a vector for blocks of any layout with this group size: the most that [`Plan::room`]
-/// returns. Chunks of eight columns with a sum need the most, unless single lanes or pairs of groups need more columns.
-pub const fn max_prepared_words(cols: usize, group: usize) -> usize {
+/// Returns enough words to prepare a vector for blocks of the DSP extension's layouts with these lanes and this group size:
+/// the most that [`Plan::room`] returns. Paired lanes need the most for chunks of eight columns with a sum, unless pairs of
+/// groups need more columns.
+pub const fn max_prepared_words(cols: usize, group: usize, lanes: Lanes) -> usize {
     // Pairs of the columns, rounded up to a multiple of `unit`, and of a copy, if that has more columns.
     const fn pairs(cols: usize, unit: usize) -> usize {
         let padded = round_up(cols, unit);
         if padded == cols { padded / 2 } else { padded }
     }
+    let is_paired = matches!(lanes, Lanes::Paired);
     if group == 0 {
-        let (single, paired) = (pairs(cols, PAD_COLS), pairs(cols, 8) + div_up(cols, 8));
-        return 1 + if single > paired { single } else { paired };
+        return 1 + if is_paired { pairs(cols, 8) + div_up(cols, 8) } else { pairs(cols, PAD_COLS) };
     }
-    let others = if group == PAIRED_GROUP { 5 } else { 1 };
+    let others = if is_paired { 5 } else { 1 };
     let words = pairs(cols, group) + div_up(cols, group) * others;
     // Groups in pairs: two start words and the word of the sums.
-    let in_pairs = if group == PAIRED_GROUP { pairs(cols, 2 * group) + div_up(cols, 2 * group) * 3 } else { 0 };
+    let in_pairs = if is_paired { pairs(cols, 2 * group) + div_up(cols, 2 * group) * 3 } else { 0 };
     if words > in_pairs { words } else { in_pairs }
 }

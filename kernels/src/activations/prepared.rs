@@ -1,5 +1,7 @@
 //! A prepared vector, and its preparation in Rust.
 
+use core::cell::Cell;
+
 use super::plan::Plan;
 use crate::layout::XLayout;
 
@@ -57,62 +59,93 @@ impl<'a> Prepared<'a> {
 /// Prepares integers as [`Scale::quantize`](super::Scale::quantize) prepares f32 values.
 pub fn prepare<'w>(x: &[i16], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
     let x = x.get(..plan.shape.cols).unwrap_or(x);
-    lay_out(x, plan, out.get_mut(..plan.words)?, |value| value as u16 as u32);
+    lay_out(x, plan, cells(out.get_mut(..plan.words)?), |value| *value as u16 as u32, |value| value);
     Prepared::new(out, plan)
 }
 
-/// Writes the prepared vector of any values, which `integer` converts to integers whose low 16 bits count.
-pub(crate) fn lay_out<V: Copy>(x: &[V], plan: &Plan, out: &mut [u32], integer: impl Fn(V) -> u32) {
+/// Returns the words as cells, which two slices can share.
+pub(crate) fn cells(words: &mut [u32]) -> &[Cell<u32>] {
+    Cell::from_mut(words).as_slice_of_cells()
+}
+
+/// Writes the prepared vector of any values: `read` reads one, and `integer` makes it an integer whose low 16 bits count, of 0
+/// itself. The values may be the words of `out` from its start on: no word is written before the values up to it are
+/// read.
+pub(crate) fn lay_out<V>(
+    x: &[V],
+    plan: &Plan,
+    out: &[Cell<u32>],
+    read: impl Fn(&V) -> u32,
+    integer: impl Fn(u32) -> u32,
+) {
     let mut x = x;
-    for group in out.chunks_exact_mut(plan.group_words().max(1)).take(plan.groups) {
-        let (mut chunks, sum_word) = group.split_at_mut(group.len() - usize::from(plan.layout.x.sum));
+    for group in out.chunks_exact(plan.group_words().max(1)).take(plan.groups) {
+        let (mut chunks, sum_word) = group.split_at(group.len() - usize::from(plan.layout.x.sum));
         let (mut sum, mut last) = (0i32, 0);
         let mut columns = plan.first;
         while !chunks.is_empty() {
-            let (this, rest) = chunks.split_at_mut(plan.chunk_words(columns).min(chunks.len()));
+            let (this, rest) = chunks.split_at(plan.chunk_words(columns).min(chunks.len()));
             let (this_x, rest_x) = x.split_at(columns.min(x.len()));
-            last = chunk(this_x, &plan.layout.x, this, &integer);
+            last = chunk(this_x, &plan.layout.x, this, &read, &integer);
             sum = sum.wrapping_add(last);
             (x, chunks, columns) = (rest_x, rest, plan.layout.x.chunk);
         }
-        if let Some(word) = sum_word.first_mut() {
+        if let Some(word) = sum_word.first() {
             // The groups of a pair are chunks; without pairs, both halves are the group's sum.
             let first = if plan.layout.x.pairs { sum.wrapping_sub(last) } else { sum };
             let second = if plan.layout.x.pairs { last } else { sum };
             let halves = (first & 0xffff) | second << 16;
-            *word = if !plan.shape.has_groups() { sum } else { halves } as u32;
+            word.set(if !plan.shape.has_groups() { sum } else { halves } as u32);
         }
     }
 }
 
 /// Writes a chunk of `x`, filled with zeros, and returns the sum of its integers.
-fn chunk<V: Copy>(x: &[V], format: &XLayout, out: &mut [u32], integer: &impl Fn(V) -> u32) -> i32 {
-    let (starts, pairs) = out.split_at_mut(format.start_words.min(out.len()));
+fn chunk<V>(
+    x: &[V],
+    format: &XLayout,
+    out: &[Cell<u32>],
+    read: &impl Fn(&V) -> u32,
+    integer: &impl Fn(u32) -> u32,
+) -> i32 {
+    let (starts, pairs) = out.split_at(format.start_words.min(out.len()));
+    let mut sum = 0i32;
     if format.has_bytes() {
-        let mut sum = 0i32;
-        pairs.fill(0);
-        for (i, value) in x.iter().enumerate() {
-            let byte = integer(*value) as u8;
-            sum = sum.wrapping_add(byte as i8 as i32);
-            if let Some(word) = pairs.get_mut(i / 4) {
-                *word |= u32::from(byte) << (8 * (i % 4));
+        let mut words = pairs.iter();
+        for four in x.chunks(4) {
+            let mut bytes = [0; 4];
+            for (byte, value) in bytes.iter_mut().zip(four) {
+                *byte = integer(read(value)) as u8;
+                sum = sum.wrapping_add(*byte as i8 as i32);
+            }
+            if let Some(word) = words.next() {
+                word.set(u32::from_le_bytes(bytes));
             }
         }
-        starts.iter_mut().for_each(|word| *word = sum as u32);
+        words.for_each(|word| word.set(0));
+        starts.iter().for_each(|word| word.set(sum as u32));
         return sum;
     }
     let (whole, rest) = x.as_chunks::<2>();
-    let odd = rest.first().map(|low| (integer(*low), 0));
-    let values = whole.iter().map(|[low, high]| (integer(*low), integer(*high))).chain(odd);
-    let mut sum = 0i32;
+    let (mut whole, odd) = (whole.iter(), rest.first().map_or(0, read));
     let filled = x.len().div_ceil(2).min(pairs.len());
-    for (word, (low, high)) in pairs.iter_mut().zip(values) {
+    let shift = format.shift;
+    // Two start words move the first pair to where the second is read: it is written last.
+    let first = Cell::new(0);
+    let (mut to, mut words) = (&first, pairs.iter().skip(1));
+    for _ in 0..filled {
+        let pair = whole.next().map_or([odd, 0], |[low, high]| [read(low), read(high)]);
+        let [low, high] = pair.map(integer);
         sum = sum.wrapping_add(low as i16 as i32).wrapping_add(high as i16 as i32);
-        *word = ((low << format.shift) & 0xffff) | (high << format.shift << 16);
+        to.set(((low << shift) & 0xffff) | (high << shift << 16));
+        to = words.next().unwrap_or(to);
     }
-    pairs.iter_mut().skip(filled).for_each(|word| *word = 0);
-    for (word, start) in starts.iter_mut().zip(format.starts) {
-        *word = start.bias.wrapping_add(start.factor.wrapping_mul(sum)) as u32;
+    if let Some(word) = pairs.first() {
+        word.set(first.get());
+    }
+    pairs.iter().skip(filled).for_each(|word| word.set(0));
+    for (word, start) in starts.iter().zip(format.starts) {
+        word.set(start.bias.wrapping_add(start.factor.wrapping_mul(sum)) as u32);
     }
     sum
 }

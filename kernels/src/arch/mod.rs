@@ -167,9 +167,27 @@ impl Scale {
     /// Quantizes `x` with `plan` to the first words of `out`, and returns the prepared vector. Missing values of `x`
     /// count as zeros. `None`, with nothing written, if `out` is shorter than [`Plan::room`]; it may overwrite all of
     /// these words.
+    ///
+    /// `x` stays as it is. (It is borrowed as memory that may change, for which [`Self::quantize_in_place`] has the code.)
+    pub fn quantize<'w>(self, x: &mut [f32], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
+        let len = x.len().min(plan.shape.cols);
+        self.quantize_to(x.get_mut(..len), plan, out)
+    }
+
+    /// Quantizes the bits of f32 values with `plan` to the first of their own words, and returns the prepared vector. `None`,
+    /// with nothing written, unless the vector has the plan's columns and fills its groups ([`Plan::fits_in_place`]).
+    pub fn quantize_in_place<'w>(self, plan: &'w Plan, x: &'w mut [u32]) -> Option<Prepared<'w>> {
+        if x.len() == plan.shape.cols && plan.fits_in_place() { self.quantize_to(None, plan, x) } else { None }
+    }
+
+    /// Does the same as [`Self::quantize`], or without `x` as [`Self::quantize_in_place`].
     #[inline(never)]
-    pub fn quantize<'w>(self, x: &[f32], plan: &'w Plan, out: &'w mut [u32]) -> Option<Prepared<'w>> {
-        let x = x.get(..plan.shape.cols).unwrap_or(x);
+    pub(crate) fn quantize_to<'w>(
+        self,
+        x: Option<&mut [f32]>,
+        plan: &'w Plan,
+        out: &'w mut [u32],
+    ) -> Option<Prepared<'w>> {
         // The assembler has the forms of the DSP extension's layouts.
         #[cfg(feature = "scalar")]
         if plan.shape.lanes == Lanes::Scalar {

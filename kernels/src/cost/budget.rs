@@ -137,7 +137,7 @@ impl Image<'_> {
     pub fn least_budget(&self) -> u32 {
         let of_op = |op: Op<'_>| -> u32 {
             let piece = match (op.kind, op.matrix()) {
-                (OpKind::Linear { accumulate }, Some(matrix)) => {
+                (OpKind::Linear { accumulate, .. }, Some(matrix)) => {
                     let start = matrix.start_values(accumulate).is_some();
                     let of_block = |rows: RowBlock<'_>| {
                         let (shape, in_order) = (rows.block.shape(), rows.steps.is_empty());

@@ -224,7 +224,7 @@ pub fn action(image: &Image<'_>, add: &mut dyn FnMut(CostItem, usize)) {
 
 /// Counts the items of an operation.
 pub fn items(op: &Op<'_>, add: &mut dyn FnMut(CostItem, usize)) {
-    if let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) {
+    if let (OpKind::Linear { accumulate, .. }, Some(matrix)) = (op.kind, op.matrix()) {
         linear(&matrix, accumulate, add);
     } else {
         let (operation, _, len) = values(op);

@@ -62,8 +62,8 @@ impl Watched {
         while from < self.scratch {
             let [mut end, mut after] = [self.scratch; 2];
             for region in &self.others {
-                if region.len > 0 && (from..end).contains(&region.offset) {
-                    (end, after) = (region.offset, region.end());
+                if region.len > 0 && region.end() > from && region.offset < end {
+                    (end, after) = (region.offset.max(from), region.end());
                 }
             }
             sum ^= xor(arena.get(from..end).unwrap_or_default());

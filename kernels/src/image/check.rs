@@ -17,7 +17,6 @@ use super::view::Image;
 use super::words::{low, word};
 use crate::activations::Plan;
 use crate::error::ImageError;
-use crate::layout::Block;
 
 /// The bits of infinity in bf16.
 const BF16_INFINITY: u16 = (f32::INFINITY.to_bits() >> 16) as u16;
@@ -154,7 +153,7 @@ impl<'a> Image<'a> {
             kept: None,
         };
         for i in 0..self.matrix_count() {
-            check_matrix(self.matrix_at(i), front, self.work().len)?;
+            check_matrix(self.matrix_at(i), front)?;
         }
         front.take(self.header.matrices(), self.matrix_count() * h::MATRIX_WORDS)?;
         let mut written = self.observation().end();
@@ -260,7 +259,8 @@ impl<'a> Image<'a> {
         if n == 0 {
             return Err(ImageError::Shape);
         }
-        if op.is_linear() {
+        let [dst, mut src, third] = op.regions;
+        if let OpKind::Linear { in_place, .. } = op.kind {
             let distance = op.data().wrapping_sub(self.matrix_at(0));
             if !distance.is_multiple_of(h::MATRIX_WORDS) || distance / h::MATRIX_WORDS >= self.matrix_count() {
                 return Err(ImageError::Matrix);
@@ -269,6 +269,7 @@ impl<'a> Image<'a> {
             if low(self.word(op.data())) != n {
                 return Err(ImageError::Shape);
             }
+            src = self.check_product(op, in_place)?;
             if op.bias() != 0 {
                 front.take_finite(op.bias(), n)?;
             }
@@ -295,21 +296,40 @@ impl<'a> Image<'a> {
         }
         #[cfg(feature = "attention")]
         self.check_prefix(op, front)?;
-        let [dst, src, third] = op.regions;
-        if dst.overlaps(src) || dst.overlaps(third) || src.overlaps(third) {
+        if dst.overlaps(src) || dst.overlaps(third) || op.src().overlaps(third) {
             return Err(ImageError::Overlap);
         }
         // An operation reads only words that this step has written: not what an earlier step or the caller put there,
         // nor the work area, whose content differs between backends.
         let third = if op.is_linear() { Region::default() } else { third };
         let old = if op.reads_dst() { dst.end() } else { 0 };
-        if src.end().max(third.end()).max(old) > written {
+        if op.src().end().max(third.end()).max(old) > written {
             return Err(ImageError::Unwritten);
         }
         if dst.offset > written {
             return Err(ImageError::Arena);
         }
         Ok(written.max(dst.end()))
+    }
+
+    /// Checks that a linear operation's work area has room for its prepared input and its tables, or if it is prepared in place,
+    /// that its own words have. Returns the words of its input that its output must not touch.
+    #[inline(never)]
+    fn check_product(&self, op: &Op<'_>, in_place: bool) -> Result<Region, ImageError> {
+        let matrix = op.linear_matrix();
+        let matrix = matrix.as_ref().map_err(|e| *e)?;
+        let input = op.input();
+        for record in matrix.records.as_chunks().0 {
+            let rows = row_block(matrix, record, 0);
+            let plan = Plan::of(&rows.as_ref().map_err(|e| *e)?.block);
+            let own = if in_place { plan.words() } else { 0 };
+            let fits = !in_place || plan.fits_in_place() && matrix.block_count() == 1;
+            if !fits || own > input.len || plan.work(matrix.cols) - own > self.work().len {
+                return Err(ImageError::Arena);
+            }
+        }
+        // The output may begin in its input only if every row is written once, in order, and after the input is prepared.
+        Ok(if in_place && matrix.start_values(op.reads_dst()).is_some() { input } else { op.src() })
     }
 
     /// Checks that an operation has no word of the prefix, or that it is an attention to the next cache of it, or writes the
@@ -460,10 +480,9 @@ fn check_around(kind: Around, op: &Op<'_>, front: &mut Front<'_>) -> Result<(), 
     if valid { Ok(()) } else { Err(ImageError::Around) }
 }
 
-/// Checks the matrix of the record at `at`: its blocks, their rows' outputs, their sums, and that its prepared input
-/// fits a work area of `work` words.
+/// Checks the matrix of the record at `at`: its blocks, their rows' outputs and their sums.
 #[inline(never)]
-fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), ImageError> {
+fn check_matrix(at: usize, front: &mut Front<'_>) -> Result<(), ImageError> {
     let matrix = &matrix(front.words, at, 0);
     let matrix = matrix.as_ref().map_err(|e| *e)?;
     let mut seen = [0u32; h::MAX_ROWS / 32];
@@ -502,21 +521,12 @@ fn check_matrix(at: usize, front: &mut Front<'_>, work: usize) -> Result<(), Ima
             }
             *word |= 1 << (output % 32);
         }
-        if room(&rows.block) > work {
-            return Err(ImageError::Arena);
-        }
         if !fits_i32(&rows.block, matrix.x_max) {
             return Err(ImageError::Overflow);
         }
     }
     front.take(word(front.words, at + 3) as usize, matrix.records.len())?;
     Ok(())
-}
-
-/// Returns the words that preparing an input for the block takes, with the block's tables.
-#[inline(never)]
-fn room(block: &Block<'_>) -> usize {
-    Plan::of(block).work(block.shape().cols)
 }
 
 /// Returns `true` if a number is above 0 and finite.

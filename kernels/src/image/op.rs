@@ -21,6 +21,9 @@ pub enum OpKind {
     Linear {
         /// `dst += W src + b` instead.
         accumulate: bool,
+        /// The input is prepared in its own place, not in the work area: it is lost, and `dst` may begin in `src` after the
+        /// prepared words.
+        in_place: bool,
     },
     /// `dst = f(dst)`
     Function(Function),
@@ -291,7 +294,7 @@ operations! {
     /// [`OpKind::Normalize`]
     NORMALIZE = 1 "normalize" "clip": OpKind::Normalize { added: false }, Uses { max_detail: 1, src: 1, constants: 2, arrays: 2, ..Uses::NONE };
     /// [`OpKind::Linear`]
-    LINEAR = 2 "linear": OpKind::Linear { accumulate: false }, Uses { max_detail: 1, src: 1, ..Uses::NONE };
+    LINEAR = 2 "linear": OpKind::Linear { accumulate: false, in_place: false }, Uses { max_detail: 3, src: 1, ..Uses::NONE };
     /// [`OpKind::Function`]
     FUNCTION = 3 "function": OpKind::Function(Function::Relu), Uses { max_detail: u8::MAX, reads_dst: true, ..Uses::NONE };
     /// [`OpKind::LayerNorm`]

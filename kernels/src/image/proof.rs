@@ -2,7 +2,7 @@
 
 use crate::activations::{Plan, Scale, max_prepared_words};
 use crate::arch::gemv;
-use crate::layout::{Block, BlockShape, MAX_GROUP, PAD_COLS, STRIP};
+use crate::layout::{Block, BlockShape, Lanes, MAX_GROUP, PAD_COLS, STRIP};
 
 /// Words that start values of the scalar layouts take beside those of the others.
 const SCALAR_STARTS: usize = if cfg!(feature = "scalar") { 8 } else { 0 };
@@ -21,7 +21,7 @@ pub fn worst_case(block: &Block<'_>, x_max: u16) -> i64 {
 /// codes.
 #[inline(never)]
 fn largest_sum(block: &Block<'_>) -> Option<u32> {
-    let mut work = [0; max_prepared_words(MAX_GROUP - 1, MAX_GROUP) + SCALAR_STARTS];
+    let mut work = [0; max_prepared_words(MAX_GROUP - 1, MAX_GROUP, Lanes::Single) + SCALAR_STARTS];
     let mut column = [0; STRIP];
     let (shape, mut words) = (block.shape(), block.words());
     let (mut first, mut largest) = (0, 0);
@@ -37,7 +37,7 @@ fn largest_sum(block: &Block<'_>) -> Option<u32> {
             for col in 0..cols {
                 let mut unit = [0.0; MAX_GROUP];
                 *unit.get_mut(col)? = 1.0;
-                let Some(x) = &Scale::ONE.quantize(&unit, plan, &mut work) else { return None };
+                let Some(x) = &Scale::ONE.quantize(&mut unit, plan, &mut work) else { return None };
                 gemv(piece, x, 0, column.get_mut(..piece.shape().padded_rows())?).ok()?;
                 for (sum, value) in sums.iter_mut().zip(&column).take(rows) {
                     *sum += value.unsigned_abs();

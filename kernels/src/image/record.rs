@@ -40,7 +40,8 @@ impl OpRecord {
     pub fn emit(&self) -> Result<[u32; OP_WORDS], TooLarge> {
         let code = self.kind.code();
         let detail = match self.kind {
-            OpKind::Linear { accumulate: detail } | OpKind::Normalize { added: detail } => detail.into(),
+            OpKind::Linear { accumulate, in_place } => u8::from(accumulate) | u8::from(in_place) << 1,
+            OpKind::Normalize { added } => added.into(),
             OpKind::Function(function) => function as u8,
             _ => 0,
         };
@@ -76,6 +77,14 @@ impl<'a> Op<'a> {
     /// Returns a recurrent cell's other region, the work area of a linear operation, or an empty region.
     pub fn third(&self) -> Region {
         self.regions[2]
+    }
+
+    /// Returns the words of [`Self::src`] before [`Self::dst`], or all if that does not begin among them: a linear operation
+    /// that is `in_place` prepares its input there.
+    pub(crate) fn input(&self) -> Region {
+        let [dst, src, _] = self.regions;
+        let before = dst.offset.wrapping_sub(src.offset);
+        Region { len: before.min(src.len), ..src }
     }
 
     /// Returns the matrix of a linear operation.
@@ -165,7 +174,7 @@ impl<'a> Op<'a> {
         if self.kind == OpKind::Keep && self.is_ring() {
             return true;
         }
-        self.form.uses.reads_dst || self.kind == OpKind::Linear { accumulate: true }
+        self.form.uses.reads_dst || matches!(self.kind, OpKind::Linear { accumulate: true, .. })
     }
 
     /// Returns the arena region of the work area.
@@ -226,7 +235,7 @@ impl<'a> Image<'a> {
         let kind = match form.kind {
             OpKind::Linear { .. } => {
                 (src, third) = (high(self.word(data as usize)), self.work());
-                OpKind::Linear { accumulate: detail == 1 }
+                OpKind::Linear { accumulate: detail & 1 != 0, in_place: detail & 2 != 0 }
             }
             OpKind::Normalize { .. } => OpKind::Normalize { added: detail == 1 },
             OpKind::Function(_) => {

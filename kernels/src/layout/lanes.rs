@@ -7,7 +7,7 @@ pub const GROUPS: [usize; 3] = [32, 64, 128];
 pub const MAX_GROUP: usize = GROUPS[2];
 
 /// The only group size of paired lanes.
-pub(crate) const PAIRED_GROUP: usize = GROUPS[0];
+pub(super) const PAIRED_GROUP: usize = GROUPS[0];
 
 /// Most columns of a block of paired lanes with group scales. The 2-bit kernel sums twice a row's products
 /// (`w2_paired`), `2 * 3 * 127 * 255` a column at most, in an int32.

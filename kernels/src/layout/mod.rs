@@ -104,7 +104,6 @@ pub use block::{Block, BlockShape};
 pub use format::{Cell, Start};
 pub use format::{Format, Kernel, Sums};
 pub use format::{PAD_COLS, QUAD, STRIP, XLayout};
-pub(crate) use lanes::PAIRED_GROUP;
 pub use lanes::{GROUPS, MAX_PAIRED_GROUPED};
 pub use lanes::{Lanes, MAX_GROUP, is_group};
 pub use pack::{PackError, pack};

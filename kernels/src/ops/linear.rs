@@ -12,11 +12,12 @@ use crate::activations::{Plan, Prepared, Scale};
 use crate::arch;
 use crate::arch::gemv_with;
 use crate::arch::{Mismatch, Tables};
-use crate::checksum::{Checksum, WEIGHTS, xor};
+use crate::arena::{part, regions};
+use crate::checksum::xor;
 use crate::cursor::LinearCursor;
 use crate::error::Fault;
 use crate::image::header::BLOCK_WORDS;
-use crate::image::{Matrix, RowBlock, row_block};
+use crate::image::{Matrix, Op, OpKind, Region, RowBlock, row_block};
 use crate::layout::half::bf16;
 use crate::layout::{QUAD, STRIP};
 use crate::math::{Native, Real};
@@ -75,6 +76,7 @@ impl RowBlock<'_> {
     /// Computes successive rows of the block as `apply` does. They start at a multiple of [`STRIP`], and end at another
     /// or at the block's end. With output steps, `output` is the previous row's output (0 before the first row), and
     /// becomes the last row's. `None` if `start` or `y` is too short.
+    #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "a piece of a product has no fewer")]
     pub(crate) fn apply_rows(
         &self,
@@ -92,7 +94,7 @@ impl RowBlock<'_> {
             if let Some((sums, mut tables)) = tables.lend().with_sums(rows.len()) {
                 return self.apply_runs(sums, rows, output, x, &mut tables, x_scale, start, y);
             }
-            return self.apply_runs(&mut [0; RUN], rows, output, x, tables, x_scale, start, y);
+            return self.apply_runs_of::<RUN>(rows, output, x, tables, x_scale, start, y);
         }
         // Sums of rows in order fit in y itself, except those of a last strip with padding.
         let whole = if rows.end.is_multiple_of(QUAD) { rows.end } else { rows.end & !(STRIP - 1) };
@@ -103,9 +105,25 @@ impl RowBlock<'_> {
             self.scale_in_order(rows.start, None, x_scale, start, y);
         }
         if whole < rows.end {
-            self.apply_runs(&mut [0; STRIP], whole..rows.end, output, x, tables, x_scale, start, y)?;
+            self.apply_runs_of::<STRIP>(whole..rows.end, output, x, tables, x_scale, start, y)?;
         }
         Some(())
+    }
+
+    /// Computes rows as [`Self::apply_rows`] does, `N` at a time. (Not inlined: most products do not need its stack.)
+    #[inline(never)]
+    #[expect(clippy::too_many_arguments, reason = "a piece of a product has no fewer")]
+    fn apply_runs_of<const N: usize>(
+        &self,
+        rows: Range<usize>,
+        output: &mut usize,
+        x: &Prepared<'_>,
+        tables: &mut Tables<'_>,
+        x_scale: f32,
+        start: Option<&[u32]>,
+        y: &mut [f32],
+    ) -> Option<()> {
+        self.apply_runs(&mut [0; N], rows, output, x, tables, x_scale, start, y)
     }
 
     /// Computes rows as [`Self::apply_rows`] does, with their sums in `sums`, as many at a time as it holds.
@@ -167,79 +185,82 @@ impl RowBlock<'_> {
     }
 }
 
-impl Matrix<'_> {
-    /// Computes `y = W x + b`, or `y = y + b + W x` to `accumulate`, from `at` on and as far as the budget allows.
-    /// Returns `true` when all is done. `work` has room for the prepared activations; `x` and `y` have the matrix's
-    /// lengths.
+impl Op<'_> {
+    /// Computes a linear operation, from `at` on and as far as the budget allows. Returns `true` when all is done.
     #[inline(never)]
-    pub(crate) fn resume(
+    pub(crate) fn multiply(
         &self,
+        arena: &mut [u32],
         at: &mut LinearCursor,
         budget: &mut impl Meter,
-        x: &[f32],
-        work: &mut [u32],
-        y: &mut [f32],
-        accumulate: bool,
     ) -> Result<bool, Fault> {
-        if x.len() != self.cols || y.len() != self.rows {
+        let OpKind::Linear { accumulate, in_place } = self.kind else { return Err(Fault::Damaged) };
+        let matrix = &self.linear_matrix();
+        let matrix = matrix.as_ref().map_err(|_| Fault::Damaged)?;
+        let [dst, src, work] = self.regions;
+        if src.len != matrix.cols || dst.len != matrix.rows {
             return Err(Fault::Damaged);
         }
         let x_scale = match at.scale {
             Some(scale) => scale,
-            None if budget.take(1, Work::Magnitude(self.cols)) == 0 => return Ok(false),
-            None => *at.scale.insert(Scale::new(x, self.x_max)?),
+            None if budget.take(1, Work::Magnitude(matrix.cols)) == 0 => return Ok(false),
+            None => {
+                let x = bytemuck::must_cast_slice(part(arena, &src.range()));
+                *at.scale.insert(Scale::new(x, matrix.x_max)?)
+            }
         };
         // One pass over the output is enough if every row has its bias and is written once, in order.
-        let start = self.start_values(accumulate);
-        if start.is_none() && at.started < y.len() {
-            let work = Work::Start(OutputStart::of(accumulate, !self.bias.is_empty()));
-            let end = at.started + budget.take(y.len() - at.started, work);
-            self.start(at.started..end, y, accumulate);
+        let start = matrix.start_values(accumulate);
+        if start.is_none() && at.started < dst.len {
+            let work = Work::Start(OutputStart::of(accumulate, !matrix.bias.is_empty()));
+            let end = at.started + budget.take(dst.len - at.started, work);
+            let y = bytemuck::must_cast_slice_mut(part(arena, &dst.range()));
+            matrix.start(at.started..end, y, accumulate);
             at.started = end;
-            if end < y.len() {
+            if end < dst.len {
                 return Ok(false);
             }
         }
-        let mut plan: Option<Plan> = None;
         let mut first_row = 0;
-        for (i, record) in self.records.as_chunks::<BLOCK_WORDS>().0.iter().enumerate() {
-            let rows = row_block(self, record, first_row);
+        for (i, record) in matrix.records.as_chunks::<BLOCK_WORDS>().0.iter().enumerate() {
+            let rows = row_block(matrix, record, first_row);
             let rows = rows.as_ref().map_err(|_| Fault::Damaged)?;
             let shape = rows.block.shape();
             first_row += shape.rows;
             if i < at.block {
                 continue;
             }
+            let plan = &Plan::of(&rows.block);
             // Prepared activations differ between layouts; the blocks of one width share them.
-            if !plan.as_ref().is_some_and(|plan| plan.fits(shape)) {
-                let plan = plan.insert(Plan::of(&rows.block));
-                if at.prepared != Some(shape.width) {
-                    if budget.take(1, Work::Prepare(shape)) == 0 {
-                        return Ok(false);
-                    }
-                    at.prepared = Some(shape.width);
-                    x_scale.quantize(x, plan, work).ok_or(Fault::Damaged)?;
-                    // Not for a few rows: a checksum of half a word for each column.
-                    at.input = if at.quiet.is_set() && shape.rows >= WEIGHTS / 2 {
-                        Checksum::of(|| xor(work.get(..plan.words()).unwrap_or_default()))
-                    } else {
-                        Checksum::default()
-                    };
-                }
+            let unprepared = at.prepared != Some(shape.width);
+            if unprepared && budget.take(1, Work::Prepare(shape)) == 0 {
+                return Ok(false);
             }
-            let Some(plan) = &plan else { return Err(Fault::Damaged) };
-            let (words, mut tables) = Tables::split(work, plan.words());
-            let x = Prepared::new(words, plan).ok_or(Fault::Damaged)?;
+            if unprepared && in_place {
+                // Before its words are two regions.
+                x_scale.quantize_to(None, plan, part(arena, &src.range())).ok_or(Fault::Damaged)?;
+            }
+            let [y, x, work, _] = regions(arena, &[dst, self.input(), work], Region::default());
+            let y = bytemuck::must_cast_slice_mut(y);
+            if unprepared && !in_place {
+                let x = Some(bytemuck::must_cast_slice_mut(x));
+                x_scale.quantize_to(x, plan, work).ok_or(Fault::Damaged)?;
+            }
+            let (words, mut tables) = Tables::split(work, if in_place { 0 } else { plan.words() });
+            let prepared = Prepared::new(if in_place { x } else { words }, plan).ok_or(Fault::Damaged)?;
+            if unprepared {
+                at.has_prepared(shape, prepared.words());
+            }
             let first = first_row - shape.rows;
             if at.row < shape.rows {
                 let work = Work::Strips { shape, in_order: rows.steps.is_empty(), start: start.is_some() };
                 let strips = budget.take((shape.rows - at.row).div_ceil(STRIP), work);
                 let end = shape.rows.min(at.row + strips * STRIP);
-                rows.apply_rows(at.row..end, &mut at.output, &x, &mut tables, x_scale, start, y)
+                rows.apply_rows(at.row..end, &mut at.output, &prepared, &mut tables, x_scale, start, y)
                     .ok_or(Fault::Damaged)?;
                 // With a start, every row is written once, in order. Without slices, the last ones are done just before the
                 // check.
-                if at.quiet.is_set() && start.is_some() && (first + end < self.rows || budget.is_limited()) {
+                if at.quiet.is_set() && start.is_some() && (first + end < matrix.rows || budget.is_limited()) {
                     let rows = y.get(at.started..first + end).unwrap_or_default();
                     at.rows.add(|| xor(bytemuck::must_cast_slice(rows)));
                     at.started = first + end;
@@ -249,7 +270,7 @@ impl Matrix<'_> {
                     return Ok(false);
                 }
             }
-            if !at.input.holds(words.get(..plan.words()).unwrap_or_default(), budget)? {
+            if !at.input.holds(prepared.words(), budget)? {
                 return Ok(false);
             }
             at.block += 1;
@@ -257,7 +278,9 @@ impl Matrix<'_> {
         }
         Ok(true)
     }
+}
 
+impl Matrix<'_> {
     /// Sets outputs to their biases, or adds the biases to `accumulate`.
     fn start(&self, outputs: Range<usize>, y: &mut [f32], accumulate: bool) {
         let bias = self.bias.get(outputs.clone()).unwrap_or(&[]);

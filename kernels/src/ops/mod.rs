@@ -40,14 +40,17 @@ pub fn run_whole(op: &Op<'_>, step: usize, arena: &mut [u32]) -> Result<(), Step
 /// [`Fault::Damaged`] if the operation names data that the image does not have, which a checked image excludes.
 #[inline(never)]
 pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, Fault> {
-    let f = bytemuck::must_cast_slice_mut::<u32, f32>;
-    if let OpKind::Linear { accumulate } = op.kind {
-        let matrix = &op.linear_matrix();
-        let matrix = matrix.as_ref().map_err(|_| Fault::Damaged)?;
-        let [dst, src, work, _] = regions(arena, &op.regions, Region::default());
-        return matrix.resume(&mut cursor.linear, budget, f(src), work, f(dst), accumulate);
+    if matches!(op.kind, OpKind::Linear { .. }) {
+        return op.multiply(arena, &mut cursor.linear, budget);
     }
-    // Elements of this slice, or units of a norm.
+    run_units(op, arena, cursor, budget)
+}
+
+/// Runs an operation that slices cut between its elements, or units of a norm, as [`run`] does. (Its stack frame is not that of
+/// a product.)
+#[inline(never)]
+fn run_units(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, Fault> {
+    let f = bytemuck::must_cast_slice_mut::<u32, f32>;
     let (dst, len) = (op.dst(), op.units());
     let units = budget.take(len - cursor.done, Work::Elements(op));
     if units == 0 {

@@ -51,7 +51,7 @@ pub(crate) struct Operands {
 impl Linear {
     /// Unpacks the matrix of an operation for a level; `None` if the operation is not linear.
     pub(crate) fn new(level: Level, op: &Op<'_>) -> Option<Self> {
-        let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) else { return None };
+        let (OpKind::Linear { accumulate, .. }, Some(matrix)) = (op.kind, op.matrix()) else { return None };
         let of_block = |block| {
             let outputs = RowBlock::outputs(&block).enumerate();
             outputs.map(move |(i, output)| (output, block, i))

@@ -63,10 +63,10 @@ fn build_once(key: Key, build: impl FnOnce() -> Result<PathBuf>) -> Result<PathB
     Ok(folder)
 }
 
-/// Builds the harness, which serves an image through semihosting, with the same built-in image in all runs, and returns
-/// the path of the ELF file. Other images run from the slot.
+/// Builds the harness, which serves an image through semihosting, with the same built-in image in all runs
+/// ([`built_in_of`]), and returns the path of the ELF file. Other images run from the slot.
 pub fn harness(target: Target) -> Result<PathBuf> {
-    let build = || harness_in_folder(target, "", built_in()?);
+    let build = || harness_in_folder(target, "", built_in_of(target)?);
     Ok(build_once((BENCH, HARNESS, "", target), build)?.join(HARNESS))
 }
 
@@ -210,15 +210,28 @@ fn build(
     Ok(own)
 }
 
-/// Returns the image of [`harness`]: the UR3 policy at 3 bits, rounded. `cargo xtask firmware` makes the same file.
+/// Returns the built-in image: the UR3 policy at 3 bits, rounded. `cargo xtask firmware` makes the same file.
 pub fn built_in() -> Result<&'static Path> {
-    static FILE: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| write_built_in().map_err(|e| format!("{e:#}")));
+    static FILE: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| write("firmware-example.actq", Width::W3));
     FILE.as_deref().map_err(|error| anyhow!("cannot make the built-in image: {error}"))
 }
 
-fn write_built_in() -> Result<PathBuf> {
-    let path = target_dir().join("firmware-example.actq");
-    let bytes = rtn(&Policy::load(&ur3())?, Width::W3, 32, Activations::Int8)?;
+/// Returns the image of [`harness`] on a target: at 2 bits where the flash has no room for 3.
+pub fn built_in_of(target: Target) -> Result<&'static Path> {
+    static FILE: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| write("firmware-small.actq", Width::W2));
+    if target != Target::Small {
+        return built_in();
+    }
+    FILE.as_deref().map_err(|error| anyhow!("cannot make the small image: {error}"))
+}
+
+fn write(name: &str, width: Width) -> Result<PathBuf, String> {
+    write_built_in(name, width).map_err(|error| format!("{error:#}"))
+}
+
+fn write_built_in(name: &str, width: Width) -> Result<PathBuf> {
+    let path = target_dir().join(name);
+    let bytes = rtn(&Policy::load(&ur3())?, width, 32, Activations::Int8)?;
     // Cargo rebuilds a crate that includes a newer file.
     if fs::read(&path).ok().as_ref() != Some(&bytes) {
         files::write(&path, &bytes)?;

@@ -155,7 +155,7 @@ pub(super) fn row(op: &Op<'_>) -> Vec<String> {
     let region = |r: Region| if r.len > 0 { format!("{}+{}", r.offset, r.len) } else { String::new() };
     let matrix = op.matrix();
     let detail = match (op.kind, &matrix) {
-        (OpKind::Linear { accumulate }, Some(matrix)) => {
+        (OpKind::Linear { accumulate, .. }, Some(matrix)) => {
             format!("{}x{}{}", matrix.rows, matrix.cols, if accumulate { " added" } else { "" })
         }
         (OpKind::RmsNorm, _) if op.constant(0) == Balance::FREE_EPS => "factors, by the quantizer".into(),

@@ -89,7 +89,7 @@ fn add(to: &mut Builder, named: usize, i: usize, op: &Op<'_>, step: usize) -> Re
             let scaled = to.apply("Mul", &[&centered, &factor]);
             clip(to, &scaled, op.constant(1))
         }
-        OpKind::Linear { accumulate } => {
+        OpKind::Linear { accumulate, .. } => {
             let product = linear(to, named, i, op)?;
             if accumulate {
                 let sum = to.read(dst)?;

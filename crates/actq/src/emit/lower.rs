@@ -6,14 +6,13 @@
 //! the order in which they are written, each at the lowest offset that fits. No gaps remain, so whatever a step has
 //! written is a prefix of the arena; the image's check requires this.
 
-use actq_kernels::activations::max_prepared_words;
 use actq_kernels::image::{OpKind, Region, kept_words};
 
 use crate::around::{Around, OUTPUT};
 use crate::error::{Result, ensure};
 use crate::graph::ValueId;
 use crate::graph::copies::Steps;
-use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, Step, StepData};
+use crate::graph::lowering::{Buffer, BufferId, Lifetime, Lowering, Slice, Step, StepData};
 use crate::graph::steps::{lower_nodes, readers};
 use crate::policy::Policy;
 
@@ -38,8 +37,18 @@ pub struct Program {
     pub words: usize,
 }
 
-/// Lowers the policy's graph for weights with scale groups of `group` columns, and what is `around` it.
-pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<Program> {
+/// Words that the prepared input of a matrix takes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PreparedWords {
+    /// In the work area.
+    pub apart: usize,
+    /// In the input's own words; `None` where it must not be prepared there.
+    pub in_place: Option<usize>,
+}
+
+/// Lowers the policy's graph and what is `around` it, for matrices with these prepared inputs. (Sizes of the arena do not
+/// count where there are none.)
+pub fn lower(policy: &Policy, around: Option<&Around>, prepared: &[PreparedWords]) -> Result<Program> {
     let graph = &policy.graph;
     ensure!(
         around.is_none() || graph.prefix_len == 0,
@@ -56,23 +65,21 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
         }
         None => Lowering::new(graph.own_len(), readers),
     };
-    let work_len = graph.matrices.iter().map(|m| max_prepared_words(m.cols, group)).max().unwrap_or(0);
     let (contract, act_len) = (&policy.contract, policy.act_len);
     let horizon = contract.playback.ensemble.map_or(0, |ensemble| ensemble.horizon);
     let kept = kept_words([act_len, policy.chunk, policy.execute], horizon, contract.playback.overlap);
     let kept_len = kept + if contract.binarise.is_some() { act_len } else { 0 };
     let Some(denoising) = &graph.denoising else {
         lower_nodes(&graph.nodes, &mut lowering);
-        let work_len = work_len.max(lowering.work_words);
         if let Some(around) = around {
             let output = lowering.place(graph.output());
             lowering.steps.extend(around.after.iter().map(|step| after(step, output)));
             let action = lowering.whole(around.action);
-            return Arena { lowering, kept_len, work_len }.assign(OBSERVATION, 0, action, act_len);
+            return Arena { lowering, kept_len, prepared }.assign(OBSERVATION, 0, action, act_len);
         }
         let output = lowering.private(graph.output());
         let output = lowering.whole(output);
-        return Arena { lowering, kept_len, work_len }.assign(OBSERVATION, 0, output, act_len);
+        return Arena { lowering, kept_len, prepared }.assign(OBSERVATION, 0, output, act_len);
     };
     let iterate = lowering.noise(graph.noise_len(), denoising.len);
     let (before, of_step) = graph.nodes.split_at(denoising.first);
@@ -82,14 +89,13 @@ pub fn lower(policy: &Policy, group: usize, around: Option<&Around>) -> Result<P
     read.retain(|value| *value <= denoising.first);
     let first_denoising_op = lowering.begin_steps(iterate, &read);
     lower_nodes(of_step, &mut lowering);
-    let work_len = work_len.max(lowering.work_words);
     let mut constants = vec![denoising.limit, f32::from_bits(0)];
     constants.extend(denoising.steps.iter().flat_map(|step| step.to_array()));
     let (velocity, read_next) = (lowering.place(graph.output()), lowering.whole(lowering.iterate()));
     let data =
         StepData::Denoise { constants, noise: denoising.draws().then_some(Slice { offset: denoising.len, ..iterate }) };
     lowering.emit(OpKind::Denoise, iterate, Some(velocity), Some(read_next), data);
-    Arena { lowering, kept_len, work_len }.assign(OBSERVATION, first_denoising_op, iterate, act_len)
+    Arena { lowering, kept_len, prepared }.assign(OBSERVATION, first_denoising_op, iterate, act_len)
 }
 
 /// Returns an operation after the network, whose output has its place now.
@@ -117,11 +123,12 @@ fn placed_data(data: &StepData, region: impl Fn(Slice) -> Region) -> StepData {
 const OBSERVATION: BufferId = 0;
 
 /// Buffers without offsets.
-struct Arena {
+struct Arena<'a> {
     lowering: Lowering,
     /// Words that contract and playback keep beside the last action.
     kept_len: usize,
-    work_len: usize,
+    /// By matrix.
+    prepared: &'a [PreparedWords],
 }
 
 /// Offsets of the buffers in the arena.
@@ -138,7 +145,7 @@ impl Placement {
     }
 }
 
-impl Arena {
+impl Arena<'_> {
     /// Assigns every buffer its offset. What is in `output` is read after the last operation, and by later steps of a
     /// chunk.
     fn assign(
@@ -161,7 +168,10 @@ impl Arena {
         let state_len = placement.state_len;
         let action = Region { offset: placement.end, len: act_len };
         let work_offset = action.offset + action.len + self.kept_len;
-        let words = work_offset + self.work_len;
+        let apart = steps.steps.iter().filter(|step| matches!(step.kind, OpKind::Linear { in_place: false, .. }));
+        let prepared = apart.map(|step| self.prepared(step).apart);
+        let work_len = prepared.max().unwrap_or(0).max(self.lowering.work_words);
+        let words = work_offset + work_len;
         ensure!(
             words <= usize::from(u16::MAX),
             "the policy needs {words} words of scratch memory, but at most 65535 are supported; use a smaller network"
@@ -182,7 +192,7 @@ impl Arena {
             first_denoising_op,
             output: region(output),
             action,
-            work: Region { offset: work_offset, len: self.work_len },
+            work: Region { offset: work_offset, len: work_len },
             words,
         })
     }
@@ -191,25 +201,70 @@ impl Arena {
     fn placed(&self, first_denoising_op: usize) -> (Steps<'_>, Placement) {
         let Lowering { steps, buffers, .. } = &self.lowering;
         let with_copies = || Steps { steps: steps.clone(), first_denoising_op, buffers };
-        let most = place(&with_copies()).end;
+        let placed = |mut steps| {
+            self.prepare_in_place(&mut steps);
+            let placement = self.place(&steps);
+            (steps, placement)
+        };
+        let all = placed(with_copies());
+        let most = all.1.end;
         let mut apart = vec![false; buffers.len()];
         for _ in 0..MAX_TRIES {
-            let steps = with_copies().without_copies(&|buffer| apart[buffer]);
-            let placement = place(&steps);
+            let (steps, placement) = placed(with_copies().without_copies(&|buffer| apart[buffer]));
             match gap(&steps, &placement) {
                 None if placement.end <= most => return (steps, placement),
                 Some(Some(partial)) if !apart[partial] => apart[partial] = true,
                 _ => break,
             }
         }
-        let steps = with_copies().without_copies(&|_| true);
-        let placement = place(&steps);
-        if placement.end <= most && gap(&steps, &placement).is_none() {
-            return (steps, placement);
+        let (steps, placement) = placed(with_copies().without_copies(&|_| true));
+        if placement.end <= most && gap(&steps, &placement).is_none() { (steps, placement) } else { all }
+    }
+
+    /// Lets products prepare their input in its own place, if nothing reads it after them.
+    fn prepare_in_place(&self, steps: &mut Steps<'_>) {
+        let lives = lifetimes(steps);
+        let buffers = steps.buffers;
+        for (at, step) in steps.steps.iter_mut().enumerate() {
+            let fits = self.prepared(step).in_place.is_some();
+            if let (OpKind::Linear { in_place, .. }, Some(src)) = (&mut step.kind, step.src) {
+                let is_last = lives.iter().any(|(buffer, (_, last))| *buffer == src.buffer && *last == at);
+                *in_place = fits && is_last && src.len == buffers[src.buffer].len;
+            }
         }
-        let steps = with_copies();
-        let placement = place(&steps);
-        (steps, placement)
+    }
+
+    /// Places the buffers in as few words as it finds: with all outputs beginning in their inputs that may, or with none, and
+    /// then with each of them the other way if that takes fewer.
+    fn place(&self, steps: &Steps<'_>) -> Placement {
+        let lives = lifetimes(steps);
+        let left: Vec<_> = steps.steps.iter().map(|step| self.left_of_input(step)).collect();
+        let [all, none] =
+            [left.clone(), vec![None; left.len()]].map(|left| (place(steps.buffers, &lives, &left), left));
+        let (mut best, mut kept) = if none.0.end < all.0.end { none } else { all };
+        for at in (0..left.len()).filter(|at| left[*at].is_some()) {
+            let mut other = kept.clone();
+            other[at] = if kept[at].is_some() { None } else { left[at] };
+            let placement = place(steps.buffers, &lives, &other);
+            if placement.end < best.end {
+                (best, kept) = (placement, other);
+            }
+        }
+        best
+    }
+
+    /// Returns the words of its input that a product still needs when it writes the first output; `None` if it needs all.
+    fn left_of_input(&self, step: &Step<Slice>) -> Option<usize> {
+        let StepData::Product { bias, .. } = &step.data else { return None };
+        let writes_once = step.kind == OpKind::Linear { accumulate: false, in_place: true };
+        if writes_once && bias.iter().any(|bias| *bias != 0.0) { self.prepared(step).in_place } else { None }
+    }
+
+    fn prepared(&self, step: &Step<Slice>) -> PreparedWords {
+        match step.data {
+            StepData::Product { matrix, .. } => self.prepared.get(matrix).copied().unwrap_or_default(),
+            _ => PreparedWords::default(),
+        }
     }
 }
 
@@ -240,9 +295,9 @@ fn gap(steps: &Steps<'_>, placement: &Placement) -> Option<Option<BufferId>> {
     None
 }
 
-/// Places the buffers: first the state, then the prefix and the observation, then the values by their lifetimes.
-fn place(steps: &Steps<'_>) -> Placement {
-    let buffers = steps.buffers;
+/// Places the buffers: first the state, then the prefix and the observation, then the values by their lifetimes. An output may
+/// begin where its operation has this much `left` of its input.
+fn place(buffers: &[Buffer], lives: &[(BufferId, (usize, usize))], left: &[Option<usize>]) -> Placement {
     let mut offsets = vec![0; buffers.len()];
     let mut top = 0;
     let mut state_len = 0;
@@ -257,14 +312,19 @@ fn place(steps: &Steps<'_>) -> Placement {
     }
     let mut ends = vec![top];
     let mut placed: Vec<(usize, (usize, usize))> = Vec::new();
-    for (buffer, life) in lifetimes(steps) {
+    for &(buffer, life) in lives {
         let len = buffers[buffer].len;
+        // Of what a placed buffer still needs when this one begins.
+        let end = |other: BufferId, (_, last): (usize, usize)| {
+            let len = if last == life.0 { left.get(last).copied().flatten() } else { None };
+            offsets[other] + len.unwrap_or(buffers[other].len)
+        };
         let taken = |offset: usize| {
             let clash = |&&(other, span): &&(usize, (usize, usize))| {
                 let meets = span.0 <= life.1 && life.0 <= span.1;
-                meets && offset < offsets[other] + buffers[other].len && offsets[other] < offset + len
+                meets && offset < end(other, span) && offsets[other] < offset + len
             };
-            placed.iter().find(clash).map(|&(other, _)| offsets[other] + buffers[other].len)
+            placed.iter().find(clash).map(|&(other, span)| end(other, span))
         };
         let mut offset = top;
         while let Some(next) = taken(offset) {
@@ -278,8 +338,8 @@ fn place(steps: &Steps<'_>) -> Placement {
 }
 
 /// Returns the first and last operation that needs each value's buffer, in order of the first.
-fn lifetimes(steps: &Steps<'_>) -> Vec<(usize, (usize, usize))> {
-    let mut lives: Vec<(usize, (usize, usize))> = Vec::new();
+fn lifetimes(steps: &Steps<'_>) -> Vec<(BufferId, (usize, usize))> {
+    let mut lives: Vec<(BufferId, (usize, usize))> = Vec::new();
     for (at, step) in steps.steps.iter().enumerate() {
         for slice in step.operands().into_iter().flatten() {
             let last = match steps.buffers[slice.buffer].lifetime {

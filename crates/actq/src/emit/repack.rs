@@ -2,7 +2,9 @@
 
 use actq_kernels::activations::{Plan, max_prepared_words};
 use actq_kernels::cost::Core;
-use actq_kernels::image::{BlockRecord, Image, Matrix, MatrixRecord, OpKind, Port, Records, RowBlock, header as h, op};
+use actq_kernels::image::{
+    BlockRecord, Image, Matrix, MatrixRecord, Op, OpKind, Port, Records, RowBlock, header as h, op,
+};
 use actq_kernels::layout::{BlockShape, Lanes, pack};
 
 use super::writer::sealed;
@@ -43,9 +45,6 @@ struct Repacked {
 impl Repacked {
     fn of(image: &Image<'_>, core: Core) -> Result<Self> {
         let (mut words, mut records) = (vec![0; h::WORDS], Vec::new());
-        // Attention needs as much on every core.
-        let attention = image.ops().filter(|op| op.kind == OpKind::Attend);
-        let mut work = attention.map(|op| op.cache().work_words()).max().unwrap_or(0);
         for matrix in image.matrices() {
             let mut blocks = Vec::new();
             for block in matrix.blocks() {
@@ -60,17 +59,13 @@ impl Repacked {
                 let steps = if block.steps.is_empty() { 0 } else { push(&mut words, little_endian(block.steps)) };
                 let record = BlockRecord { width: shape.width, lanes, rows: shape.rows, weights, scales, steps };
                 blocks.extend(record.emit()?);
-                let plan = Plan::new(shape).context("a block has no plan")?;
-                work = work.max(match lanes {
-                    Lanes::Scalar | Lanes::Helium => plan.work(shape.cols),
-                    Lanes::Single | Lanes::Paired => max_prepared_words(shape.cols, shape.group),
-                });
             }
             let blocks = Records { count: blocks.len() / h::BLOCK_WORDS, offset: push(&mut words, blocks) };
             let Matrix { rows, cols, group, x_max, .. } = matrix;
             records.extend(MatrixRecord { rows, cols, group, x_max, blocks }.emit()?);
         }
         let records = push(&mut words, records) as usize;
+        let work = image.ops().map(|op| work_words(&op, core)).max().unwrap_or(0);
         Ok(Self { words, records, work })
     }
 
@@ -119,6 +114,24 @@ impl Repacked {
         words[h::W_WORK_FLAGS] = words[h::W_WORK_FLAGS] & 0xffff_0000 | self.work as u32;
         Ok(words)
     }
+}
+
+/// Returns the words of the work area that an operation needs in the layouts of `core`.
+fn work_words(op: &Op<'_>, core: Core) -> usize {
+    // Attention needs as much on every core.
+    let attention = if op.kind == OpKind::Attend { op.cache().work_words() } else { 0 };
+    let Some(matrix) = op.matrix() else { return attention };
+    let in_place = matches!(op.kind, OpKind::Linear { in_place: true, .. });
+    let lanes = core.lanes(matrix.x_max, matrix.group);
+    let of_block = |block: RowBlock<'_>| {
+        let plan = Plan::new(BlockShape { lanes, ..block.block.shape() })?;
+        Some(match lanes {
+            Lanes::Scalar | Lanes::Helium => plan.work(matrix.cols) - if in_place { plan.words() } else { 0 },
+            Lanes::Single | Lanes::Paired if in_place => 0,
+            Lanes::Single | Lanes::Paired => max_prepared_words(matrix.cols, matrix.group, lanes),
+        })
+    };
+    matrix.blocks().filter_map(of_block).max().unwrap_or(0)
 }
 
 /// Returns the codes and the group scales of a block, row-major.

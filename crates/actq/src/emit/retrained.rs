@@ -94,7 +94,8 @@ impl Trained {
                 }
                 let old = || (0..matrix.rows).map(|row| matrix.bias(row)).collect();
                 let biases = self.biases.get(&i).cloned().unwrap_or_else(old);
-                let has_bias = biases.iter().any(|bias| *bias != 0.0);
+                // Biases of zero stay: without them, no output may begin in the input.
+                let has_bias = matrix.has_bias() || biases.iter().any(|bias| *bias != 0.0);
                 record[2] = if has_bias { place_constants(&mut words, &mut shared, &biases) } else { 0 };
             } else {
                 record[3] = self.place_data(i, &op, image, old, &mut words, &mut shared);

@@ -3,13 +3,15 @@
 use std::iter;
 use std::path::Path;
 
+use actq_kernels::activations::{Plan, max_prepared_words};
+use actq_kernels::cost::Core;
 use actq_kernels::image::{
     BlockRecord, Header, Kind, MatrixRecord, OpKind, OpRecord, Port, PortKind, Records, Region, half_words,
     header as h, quarter_words, seal,
 };
 use actq_kernels::layout::{self, BlockShape};
 
-use super::lower::lower;
+use super::lower::{PreparedWords, lower};
 use super::raw_values::raw_values;
 use crate::around::{Around, NamedPort};
 use crate::contract::ActionContract;
@@ -54,10 +56,9 @@ fn policy_around(policy: &Policy, around: &Around) -> Result<Policy> {
 }
 
 fn emit(policy: &Policy, matrices: &[Outcome], around: Option<&Around>) -> Result<Vec<u8>> {
-    let group = matrices.first().map_or(0, |m| m.quantized.group);
     let mut writer = Writer::new();
     let records = matrices.iter().map(|m| writer.matrix(m)).collect::<Result<Vec<_>>>()?;
-    let Draft { mut words, self_test, observations } = writer.finish(policy, group, &records, around)?;
+    let Draft { mut words, self_test, observations } = writer.finish(policy, &records, around)?;
     let unfit = "no image can hold the result; recorded observations near the limits of f32 are a common cause";
     let actions = self_test_actions(&sealed(&words)?, &observations, unfit)?;
     let obs_len = obs_len(policy, around);
@@ -75,8 +76,8 @@ fn emit(policy: &Policy, matrices: &[Outcome], around: Option<&Around>) -> Resul
 pub fn bytes_beside_blocks(policy: &Policy) -> Result<usize> {
     let records = vec![[0; h::MATRIX_WORDS]; policy.graph.matrices.len()];
     let draft = match &policy.around {
-        Some(around) => Writer::new().finish(&policy_around(policy, around)?, 0, &records, Some(around))?,
-        None => Writer::new().finish(policy, 0, &records, None)?,
+        Some(around) => Writer::new().finish(&policy_around(policy, around)?, &records, Some(around))?,
+        None => Writer::new().finish(policy, &records, None)?,
     };
     Ok(4 * draft.words.len())
 }
@@ -141,6 +142,8 @@ struct Writer {
     words: Vec<u32>,
     /// Offset of the matrix records.
     matrices: u32,
+    /// By matrix.
+    prepared: Vec<PreparedWords>,
     /// Offset from which on all words are finite constants of operations, which other operations may share.
     shared_constants: usize,
 }
@@ -148,18 +151,17 @@ struct Writer {
 impl Writer {
     /// Makes an image with room for its header.
     fn new() -> Self {
-        Self { words: vec![0; h::WORDS], matrices: 0, shared_constants: 0 }
+        Self { words: vec![0; h::WORDS], matrices: 0, prepared: Vec::new(), shared_constants: 0 }
     }
 
     /// Appends everything after the matrices' blocks; `matrices` are their records.
     fn finish(
         mut self,
         policy: &Policy,
-        group: usize,
         matrices: &[[u32; h::MATRIX_WORDS]],
         around: Option<&Around>,
     ) -> Result<Draft> {
-        let program = lower(policy, group, around)?;
+        let program = lower(policy, around, &self.prepared)?;
         let obs_len = obs_len(policy, around);
         self.matrices = self.push(matrices.iter().flatten().copied());
         self.shared_constants = self.words.len();
@@ -289,6 +291,7 @@ impl Writer {
         );
         let blocks = outcome.blocks();
         let in_order = Quantized::in_order(&blocks);
+        self.prepared.push(prepared_words(outcome, &blocks));
         let mut records = Vec::new();
         for (shape, rows) in &blocks {
             let codes: Vec<u8> =
@@ -336,6 +339,25 @@ impl Writer {
         let (src, third) = (offset(step.src), offset(step.third));
         Ok(OpRecord { kind: step.kind, dst: step.dst, src, third, bias, data }.emit()?)
     }
+}
+
+/// Returns the words that the prepared input of a matrix with these blocks takes. It may be prepared in place for one block with
+/// all rows, in the layouts of every core ([`super::repack`]).
+fn prepared_words(outcome: &Outcome, blocks: &[(BlockShape, Vec<usize>)]) -> PreparedWords {
+    let Quantized { rows, cols, group, .. } = outcome.quantized;
+    let apart = max_prepared_words(cols, group, outcome.lanes());
+    let words_on = |shape: &BlockShape, core: Core| {
+        let plan = Plan::new(BlockShape { lanes: core.lanes(outcome.x_max, group), ..*shape })?;
+        plan.fits_in_place().then(|| apart.max(plan.words()))
+    };
+    let in_place = match blocks {
+        [(shape, _)] if shape.rows == rows => {
+            let words: Option<Vec<usize>> = Core::ALL.into_iter().map(|(_, core)| words_on(shape, core)).collect();
+            words.and_then(|words| words.into_iter().max()).filter(|words| *words <= cols)
+        }
+        _ => None,
+    };
+    PreparedWords { apart, in_place }
 }
 
 /// Returns the offset of an operation's constants: of equal ones from `shared` on if present, else appends them to `to`.

@@ -209,7 +209,7 @@ impl Step<Slice> {
     fn reads(&self, slice: Slice) -> bool {
         let overwrites = matches!(
             self.kind,
-            OpKind::Linear { accumulate: false }
+            OpKind::Linear { accumulate: false, in_place: false }
                 | OpKind::Normalize { .. }
                 | OpKind::Copy
                 | OpKind::Attend
@@ -249,7 +249,7 @@ mod tests {
         all
     };
     const WHOLE: [usize; 2] = [0, 4];
-    const LINEAR: OpKind = OpKind::Linear { accumulate: false };
+    const LINEAR: OpKind = OpKind::Linear { accumulate: false, in_place: false };
     const RELU: OpKind = OpKind::Function(Function::Relu);
 
     fn step(kind: OpKind, dst: usize, at: [usize; 2], src: Option<(usize, [usize; 2])>) -> Step<Slice> {

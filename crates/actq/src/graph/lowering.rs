@@ -212,6 +212,6 @@ impl Lowering {
     /// Emits `dst = W src + bias`, or adds it to `dst`.
     pub fn product(&mut self, (matrix, bias): (usize, &[f32]), src: Slice, dst: BufferId, accumulate: bool) {
         let data = StepData::Product { matrix, bias: bias.to_vec() };
-        self.emit(OpKind::Linear { accumulate }, self.whole(dst), Some(src), None, data);
+        self.emit(OpKind::Linear { accumulate, in_place: false }, self.whole(dst), Some(src), None, data);
     }
 }

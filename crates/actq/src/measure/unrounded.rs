@@ -77,7 +77,9 @@ impl<'a> Unrounded<'a> {
             let first = if step == 0 { 0 } else { self.image.first_denoising_op() };
             for (op, weights) in self.ops[first..].iter().zip(&self.weights[first..]) {
                 match (op.kind, op.matrix()) {
-                    (OpKind::Linear { accumulate }, Some(matrix)) => multiply(op, &matrix, weights, accumulate, arena),
+                    (OpKind::Linear { accumulate, .. }, Some(matrix)) => {
+                        multiply(op, &matrix, weights, accumulate, arena)
+                    }
                     (OpKind::Keep, _) => keep(op, arena, &mut self.caches)?,
                     (OpKind::Attend, _) => attend(op, arena, &self.caches),
                     _ => run_whole(op, step, arena)?,

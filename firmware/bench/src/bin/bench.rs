@@ -71,14 +71,14 @@ mod firmware {
         b.bias.iter_mut().for_each(|x| *x = (random() as i32 as f32).to_bits());
         b.row_scales.fill(0x3c00_3c80);
         for (rows, cols) in SHAPES {
-            let x = ram.x.get(..cols)?;
+            let x = ram.x.get_mut(..cols)?;
             let (bias, y) = (b.bias.get(..rows)?, ram.y.get_mut(..rows)?);
             let weights = b.weights.get(..rows * cols)?;
-            count::region(|| naive(weights, black_box(x), bias, y));
+            count::region(|| naive(weights, black_box(&*x), bias, y));
             writeln!(out, "naive-f32 32 0 {rows} {cols}").ok()?;
             let codes = b.codes.get(..rows * cols)?;
             let pairs = ram.prepared.get_mut(..cols / 2)?;
-            count::region(|| int8(codes, black_box(x), &b.row_scales, bias, pairs, y))?;
+            count::region(|| int8(codes, black_box(&*x), &b.row_scales, bias, pairs, y))?;
             writeln!(out, "int8-smlad 8 0 {rows} {cols}").ok()?;
             for (name, x_max) in [("gemv-a8", 127), ("gemv-a16", 2047)] {
                 for width in Width::ALL {
@@ -89,7 +89,7 @@ mod firmware {
                         let block = Block::new(shape, words)?;
                         let scales = b.row_scales.get(..rows.div_ceil(2))?;
                         let block = RowBlock { block, scales, steps: &[], first_row: 0 };
-                        count::region(|| product(&block, black_box(x), x_max, bias, &mut ram.prepared, y))?;
+                        count::region(|| product(&block, black_box(&mut *x), x_max, bias, &mut ram.prepared, y))?;
                         black_box(&y);
                         writeln!(out, "{name} {} {group} {rows} {cols}", width.bits()).ok()?;
                     }
@@ -102,7 +102,7 @@ mod firmware {
     #[inline(never)]
     fn product(
         rows: &RowBlock<'_>,
-        x: &[f32],
+        x: &mut [f32],
         x_max: u16,
         bias: &[u32],
         prepared: &mut [u32],

@@ -49,7 +49,7 @@ mod firmware {
         let mut random = random_words();
         b.codes.iter_mut().for_each(|c| *c = random() as u8);
         b.scales.iter_mut().for_each(|s| *s = random() as u8);
-        let x: [f32; COLS] = core::array::from_fn(|_| random() as i32 as f32);
+        let mut x: [f32; COLS] = core::array::from_fn(|_| random() as i32 as f32);
         let bias: [u32; ROWS] = core::array::from_fn(|_| (random() as i32 as f32).to_bits());
         let row_scales: [u32; ROWS / 2] = core::array::from_fn(|_| 0x3c00_3c00 | random() & 0x7f_007f);
         for lanes in Lanes::ALL {
@@ -63,7 +63,7 @@ mod firmware {
                     let rows = RowBlock { block, scales: &row_scales, steps: &[], first_row: 0 };
                     let (plan, prepared) = (Plan::of(&block), &mut b.prepared);
                     let mut y = [0.0; ROWS];
-                    let scale = count::region(|| product(&rows, black_box(&x), x_max, &bias, prepared, &mut y))?;
+                    let scale = count::region(|| product(&rows, black_box(&mut x), x_max, &bias, prepared, &mut y))?;
                     let prepared = Prepared::new(prepared, &plan)?;
                     for (i, (y, bias)) in y.iter().zip(&bias).enumerate() {
                         let acc = reference::dot(&rows.block, &prepared, i) as f32;
@@ -83,7 +83,7 @@ mod firmware {
     #[inline(never)]
     fn product(
         rows: &RowBlock<'_>,
-        x: &[f32],
+        x: &mut [f32],
         x_max: u16,
         bias: &[u32],
         prepared: &mut [u32],

@@ -9,7 +9,7 @@ use actq::methods::Activations;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
 use actq_bench::cycles::Code;
-use actq_bench::firmware::{self, built_in};
+use actq_bench::firmware::{self, built_in, built_in_of};
 use actq_bench::qemu;
 pub(crate) use actq_bench::qemu::same_bits;
 use actq_bench::{Target, golden, rtn, shared_policies, ur3};
@@ -108,15 +108,16 @@ fn a_wrong_sum_fails_the_golden_run() -> Result<()> {
 
 #[test]
 fn the_built_in_image_replays_its_self_test() -> Result<()> {
-    let buffer = ImageBuffer::read(built_in()?)?;
-    let image = buffer.image(built_in()?)?;
-    let mut expected = format!("{}: crc32 {:08x}, self-test passed\n", image.name(), image.crc());
-    for step in 0..image.self_test_steps() {
-        let (_, action) = image.self_test(step).context("a self-test step is missing")?;
-        let bits: String = action.iter().map(|w| format!(" {:08x}", u32::from_le(*w))).collect();
-        expected += &format!("step {step}:{bits}\n");
-    }
     for target in Target::ALL {
+        let path = built_in_of(target)?;
+        let buffer = ImageBuffer::read(path)?;
+        let image = buffer.image(path)?;
+        let mut expected = format!("{}: crc32 {:08x}, self-test passed\n", image.name(), image.crc());
+        for step in 0..image.self_test_steps() {
+            let (_, action) = image.self_test(step).context("a self-test step is missing")?;
+            let bits: String = action.iter().map(|w| format!(" {:08x}", u32::from_le(*w))).collect();
+            expected += &format!("step {step}:{bits}\n");
+        }
         let elf = firmware::harness(target)?;
         let output = qemu::run(qemu::command_on(target, &elf, None, "")?, &[])?;
         assert_eq!(String::from_utf8_lossy(&output.stdout), expected, "{target:?}");

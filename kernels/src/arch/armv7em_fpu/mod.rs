@@ -39,23 +39,24 @@ unsafe extern "C" {
 }
 
 /// Quantizes `x` with the plan to the first words of `out`; `None`, with nothing written, if `out` is shorter than
-/// [`Plan::room`].
+/// [`Plan::room`]. Without `x`, the values are the first words of `out`, which fill all groups.
 #[inline(always)]
-pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
-    let room = out.get_mut(..plan.room(x.len()))?;
+pub(crate) fn quantize(x: Option<&mut [f32]>, inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
+    let room = out.get_mut(..x.as_ref().map_or(plan.padded.max(plan.words()), |x| plan.room(x.len())))?;
     let (out, words) = (room.as_mut_ptr(), room.len());
-    let (x, inverse) = if x.len() == plan.padded {
-        (NonNull::from(x).cast(), inverse)
-    } else {
+    let (x, inverse) = match x {
+        None => (NonNull::new(out)?.cast(), inverse),
+        Some(x) if x.len() == plan.padded => (NonNull::from(x).cast(), inverse),
         // SAFETY: the room has `words` words.
-        unsafe { filled(x, inverse, plan, out, words)? }
+        Some(x) => unsafe { filled(x, inverse, plan, out, words)? },
     };
     let XLayout { shift, chunk, starts: [start, second], .. } = plan.layout.x;
     let (kernel, first, eights) = (quantizer(shift), plan.first / 8, chunk / 8);
     let (x, bias, factor, second) = (x.as_ptr(), start.bias, start.factor, second.factor);
-    // SAFETY: x is the plan's padded columns, the caller's or a copy at the end of the room, and the room has at least
-    // the plan's words. The written words never reach the unread part of the copy: after `n` of its columns
-    // they are `n / 2` words, start words and sums, of which there are in all as many as words before the copy.
+    // SAFETY: x is the plan's padded columns, the caller's, the room's first words or a copy at the end of the room, and the
+    // room has at least the plan's words. The written words never reach the unread part of the copy: after `n` of its columns
+    // they are `n / 2` words, start words and sums, of which there are in all as many as words before the copy. Nor
+    // that of the room's first words: chunks have eight columns or more, and at most two start words and a sum.
     // `of_valid` makes all counts 1 or more and all lengths multiples of 8 columns. The kernel reads eight columns
     // before it writes them. It writes as many start words and sums as the layout has, which `table` asserts, and if
     // it takes eight columns for a chunk, that is the layout's limit and so `first` and `eights`.

@@ -120,28 +120,36 @@ pub(super) fn magnitude(x: &[f32]) -> u32 {
 }
 
 /// Quantizes `x` with the plan, of a layout for Helium, to the first words of `out`; `None` if `out` is shorter than
-/// [`Plan::room`].
+/// [`Plan::room`]. Without `x`, the values are the first words of `out`, the plan's columns.
 #[inline(never)]
-pub(super) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
+pub(super) fn quantize(x: Option<&mut [f32]>, inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
     if inverse != 0.0 && !inverse.is_normal() {
         // Helium would take the factor for 0.
         return super::portable::quantize(x, inverse, plan, out);
     }
-    let out = out.get_mut(..plan.room(x.len()))?;
+    let cols = plan.shape.cols;
+    let room = out.get_mut(..x.as_ref().map_or(cols.max(plan.words()), |x| plan.room(x.len())))?;
     let columns = plan.padded.checked_div(plan.groups)?;
-    let mut x = x;
-    for words in out.chunks_exact_mut(1 + columns / 4) {
-        let (now, rest) = x.split_at(columns.min(x.len()));
-        x = rest;
-        let (sum, bytes) = words.split_first_mut()?;
-        // The kernel leaves the last word's other bytes as they are.
-        bytes.iter_mut().skip(now.len() / 4).for_each(|word| *word = 0);
-        *sum = match now.len() {
-            0 => 0,
-            // SAFETY: it reads `len` values and writes as many bytes, which `bytes` has: four times its length is
-            // `columns`. There is at least one value.
-            len => unsafe { actq_helium_quantize(now.as_ptr(), len, bytes.as_mut_ptr(), inverse.to_bits()) as u32 },
-        };
+    let (group_words, to) = (1 + columns / 4, room.as_mut_ptr());
+    let (from, mut left) = x.map_or((to.cast_const().cast(), cols), |x| (x.as_ptr(), x.len()));
+    for group in 0..plan.groups.min(room.len() / group_words) {
+        let (len, x) = (left.min(columns), from.wrapping_add(group * columns));
+        left -= len;
+        // SAFETY: the room has the group's words: a sum, and a word for four columns. The kernel reads `len` values, at least
+        // one, and writes as many bytes; it leaves the last word's other bytes as they are. Where the values are the
+        // room's words, it reads four before it writes their bytes, to words before the next four.
+        unsafe {
+            let sum = to.add(group * group_words);
+            let bytes = sum.add(1);
+            *sum = match len {
+                0 => 0,
+                _ => actq_helium_quantize(x, len, bytes, inverse.to_bits()) as u32,
+            };
+            if !len.is_multiple_of(4) {
+                *bytes.add(len / 4) &= (1 << (8 * (len % 4))) - 1;
+            }
+            (len.div_ceil(4)..columns / 4).for_each(|word| bytes.add(word).write(0));
+        }
     }
     Some(())
 }

@@ -1,7 +1,10 @@
 //! Conversion of vectors between f32 and integers.
 
 #[cfg(any(not(actq_fpu), feature = "scalar", feature = "helium"))]
-use crate::activations::{Plan, lay_out};
+use core::cell::Cell;
+
+#[cfg(any(not(actq_fpu), feature = "scalar", feature = "helium"))]
+use crate::activations::{Plan, cells, lay_out};
 use crate::layout::half::{bf16, half_word};
 use crate::math::{Native, Real};
 
@@ -23,10 +26,16 @@ pub fn copy(from: &[u32], to: &mut [u32]) {
 }
 
 /// Quantizes `x` with the plan to the first words of `out`; `None`, with nothing written, if `out` is shorter than
-/// [`Plan::room`].
+/// [`Plan::room`]. Without `x`, the values are the first words of `out`, the plan's columns.
 #[cfg(any(not(actq_fpu), feature = "scalar", feature = "helium"))]
-pub(crate) fn quantize(x: &[f32], inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
-    lay_out(x, plan, out.get_mut(..plan.room(x.len()))?, |value: f32| Native::of(value).rounded(inverse));
+pub(crate) fn quantize(x: Option<&mut [f32]>, inverse: f32, plan: &Plan, out: &mut [u32]) -> Option<()> {
+    let room = x.as_ref().map_or(plan.shape.cols.max(plan.words()), |x| plan.room(x.len()));
+    let out = cells(out.get_mut(..room)?);
+    let x = match x {
+        Some(x) => cells(bytemuck::must_cast_slice_mut(x)),
+        None => out.get(..plan.shape.cols)?,
+    };
+    lay_out(x, plan, out, Cell::get, |bits| Native::of(f32::from_bits(bits)).rounded(inverse));
     Some(())
 }
 

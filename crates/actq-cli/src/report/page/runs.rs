@@ -407,7 +407,8 @@ fn rounding(image: Image<'_>, dataset: &Dataset) -> Result<Vec<Option<f64>>> {
                 });
                 let (x, before) = (floats(head, op.src().range()), floats(head, op.dst().range()));
                 head.run_op()?;
-                let (OpKind::Linear { accumulate }, Some(weights), Some(matrix)) = (op.kind, &weights[i], op.matrix())
+                let (OpKind::Linear { accumulate, .. }, Some(weights), Some(matrix)) =
+                    (op.kind, &weights[i], op.matrix())
                 else {
                     continue;
                 };

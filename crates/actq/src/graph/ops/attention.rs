@@ -539,7 +539,7 @@ mod tests {
             let kind = actq_kernels::image::Kind::Flow;
             Policy { kind, chunk: 1, execute: 1, act_len: 2, ..Policy::of("flow", graph) }
         };
-        let program = emit::lower(&policy(graph.clone()), 32, None).expect("a program");
+        let program = emit::lower(&policy(graph.clone()), None, &[]).expect("a program");
         let keep = program.steps.iter().position(|step| step.kind == OpKind::Keep);
         assert!(keep.is_some_and(|keep| keep < program.first_denoising_op), "{keep:?}");
         let (off, most) = off_image(&graph, policy);
@@ -590,7 +590,7 @@ mod tests {
                     Policy { kind, chunk: 1, execute: 1, act_len: 2, ..Policy::of("prefix", graph) }
                 }
             };
-            let program = emit::lower(&policy(graph.clone()), 32, None).expect("a program");
+            let program = emit::lower(&policy(graph.clone()), None, &[]).expect("a program");
             assert_eq!(program.steps.iter().filter(|step| step.kind == OpKind::Keep).count(), 1);
             let cache = Cache { heads: 2, dim: 2, slots: 4, own: 0 };
             assert_eq!(program.observation.offset, cache.words() + Cache { slots: 6, own: 2, ..cache }.words());
@@ -607,7 +607,7 @@ mod tests {
         let matrix = WeightMatrix { name: "m".into(), rows: 1, cols: 2, data: vec![1.0; 2] };
         let matrix = graph.add_matrix(matrix).expect("a matrix");
         graph.add(Linear { matrix, bias: vec![0.0] }, &[1]).expect("it fits");
-        let error = emit::lower(&Policy::of("wrong", graph), 32, None).expect_err("it has no keys").to_string();
+        let error = emit::lower(&Policy::of("wrong", graph), None, &[]).expect_err("it has no keys").to_string();
         assert!(error.contains("only attention can read them"), "{error}");
     }
 

@@ -242,7 +242,7 @@ fn items(list: impl FnOnce(&mut dyn FnMut(CostItem, usize))) -> BTreeMap<CostIte
 
 /// Pieces of an operation under an ample budget.
 fn pieces(op: &Op<'_>) -> usize {
-    let (OpKind::Linear { accumulate }, Some(matrix)) = (op.kind, op.matrix()) else { return 1 };
+    let (OpKind::Linear { accumulate, .. }, Some(matrix)) = (op.kind, op.matrix()) else { return 1 };
     let bias = matrix.start_values(accumulate).is_none();
     let mut widths: Vec<Width> = matrix.blocks().map(|rows| rows.block.shape().width).collect();
     let blocks = widths.len();
