@@ -12,7 +12,7 @@ use crate::activations::{Plan, Prepared, Scale};
 use crate::arch;
 use crate::arch::gemv_with;
 use crate::arch::{Mismatch, Tables};
-use crate::arena::{part, regions};
+use crate::arena::regions;
 use crate::checksum::xor;
 use crate::cursor::LinearCursor;
 use crate::error::Fault;
@@ -205,8 +205,8 @@ impl Op<'_> {
             Some(scale) => scale,
             None if budget.take(1, Work::Magnitude(matrix.cols)) == 0 => return Ok(false),
             None => {
-                let x = bytemuck::must_cast_slice(part(arena, &src.range()));
-                *at.scale.insert(Scale::new(x, matrix.x_max)?)
+                let x = arena.get(src.range()).unwrap_or_default();
+                *at.scale.insert(Scale::new(bytemuck::must_cast_slice(x), matrix.x_max)?)
             }
         };
         // One pass over the output is enough if every row has its bias and is written once, in order.
@@ -214,7 +214,7 @@ impl Op<'_> {
         if start.is_none() && at.started < dst.len {
             let work = Work::Start(OutputStart::of(accumulate, !matrix.bias.is_empty()));
             let end = at.started + budget.take(dst.len - at.started, work);
-            let y = bytemuck::must_cast_slice_mut(part(arena, &dst.range()));
+            let y = bytemuck::must_cast_slice_mut(arena.get_mut(dst.range()).unwrap_or_default());
             matrix.start(at.started..end, y, accumulate);
             at.started = end;
             if end < dst.len {
@@ -238,7 +238,8 @@ impl Op<'_> {
             }
             if unprepared && in_place {
                 // Before its words are two regions.
-                x_scale.quantize_to(None, plan, part(arena, &src.range())).ok_or(Fault::Damaged)?;
+                let x = arena.get_mut(src.range()).unwrap_or_default();
+                x_scale.quantize_to(None, plan, x).ok_or(Fault::Damaged)?;
             }
             let [y, x, work, _] = regions(arena, &[dst, self.input(), work], Region::default());
             let y = bytemuck::must_cast_slice_mut(y);

@@ -38,7 +38,7 @@ pub fn run_whole(op: &Op<'_>, step: usize, arena: &mut [u32]) -> Result<(), Step
 /// # Errors
 ///
 /// [`Fault::Damaged`] if the operation names data that the image does not have, which a checked image excludes.
-#[inline(never)]
+#[inline(always)]
 pub(crate) fn run(op: &Op<'_>, arena: &mut [u32], cursor: &mut Cursor, budget: &mut impl Meter) -> Result<bool, Fault> {
     if matches!(op.kind, OpKind::Linear { .. }) {
         return op.multiply(arena, &mut cursor.linear, budget);
