@@ -1,6 +1,6 @@
 #!/bin/sh
 # pyfabrik 0.4.0 (inverse kinematics by FABRIK, vectormath 0.2.2, numpy 1.26.4): angles and angles_deg of Fabrik3D, which the README's 3D example
-# prints, leave out z: an arm that stands upright and one that lies along x have the same angles, all 0, and one that moves to 12, 0, 9 keeps them at
+# prints, leave out z: an upright arm and one along x have the same angles, all 0, and one that moves to 12, 0, 9 keeps them at
 # 0, while its hand is there. The first angle is that of the second joint's place, not of the link, so that with a base that is not at the origin a
 # straight arm has 18.4 and -18.4 degrees; solvable() measures from the origin too and refuses a point 19 from the base of an arm of 20. Angles
 # between links are not wrapped: 343 degrees for -17. There is no error.

@@ -1,6 +1,6 @@
 #!/bin/sh
 # robot-kinematics 1.1.0 (numpy 2.4.6, scipy 1.17.1): PandaManipulator, "with accurate DH parameters", is another arm: its table is Franka's, which
-# has the modified convention of Craig, and it is multiplied by the standard one. At Franka's usual pose the flange stands at 0.116, 0.545, 0.395
+# has the modified convention of Craig, and it is multiplied by the standard one. At Franka's usual pose the flange is at 0.116, 0.545, 0.395
 # instead of 0.307, 0.000, 0.590, more than half a metre to the side, though the arm is in its plane of symmetry. The same table by the modified
 # convention gives the right place. UR5Manipulator, whose table is a standard one, is right. There is no error.
 # Seen on 2026-11-30:  joints 0, -45, 0, -135, 0, 90, 45 degrees: 0.116, 0.545, 0.395   the same table by the modified convention: 0.307, 0.000,

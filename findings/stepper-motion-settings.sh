@@ -53,7 +53,7 @@ target_degrees = 90.0
 velocity_percent = 100
 "#;
 
-/// What the driver saw: steps, the direction, and the time that it waited in ns.
+/// The driver's steps, its direction, and its waiting time in ns.
 #[derive(Default)]
 struct Seen {
     clockwise: bool,
