@@ -373,9 +373,9 @@ fn in_place() -> Result<Vec<u8>> {
 fn impossible_inputs_in_place_are_refused() {
     const SECOND: (u8, usize) = (op::LINEAR, 1);
     let valid = Draft::of(&in_place().expect("the network fits the format"));
-    let place = |d: &Draft, at: usize| [d.low(at), d.high(at)];
-    let [dst, src] = place(&valid, valid.op(SECOND) + 1);
-    assert_eq!((valid.low(valid.op(SECOND)) >> 8, dst - src), (2, 41), "1 + 64 / 8 * 5 words are prepared");
+    let op = valid.op(SECOND);
+    let (detail, dst, src) = (valid.low(op) >> 8, valid.low(op + 1), valid.high(op + 1));
+    assert_eq!((detail, dst - src), (2, 41), "1 + 64 / 8 * 5 words are prepared");
     refused_of(
         &valid,
         &[

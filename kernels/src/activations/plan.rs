@@ -114,7 +114,7 @@ impl Plan {
     }
 
     /// Returns `true` if a vector of the block's columns can be prepared in its own words: the prepared one is no longer, and
-    /// needs no copy ([`Self::room`]).
+    /// no assembler of the DSP extension's layouts needs a copy, as it does to fill groups.
     pub const fn fits_in_place(&self) -> bool {
         let copies = self.shape.cols != self.padded && matches!(self.shape.lanes, Lanes::Single | Lanes::Paired);
         !copies && self.words <= self.shape.cols

@@ -212,21 +212,19 @@ fn build(
 
 /// Returns the built-in image: the UR3 policy at 3 bits, rounded. `cargo xtask firmware` makes the same file.
 pub fn built_in() -> Result<&'static Path> {
-    static FILE: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| write("firmware-example.actq", Width::W3));
-    FILE.as_deref().map_err(|error| anyhow!("cannot make the built-in image: {error}"))
+    built_in_of(Target::Fpu)
 }
 
 /// Returns the image of [`harness`] on a target: at 2 bits where the flash has no room for 3.
 pub fn built_in_of(target: Target) -> Result<&'static Path> {
-    static FILE: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| write("firmware-small.actq", Width::W2));
-    if target != Target::Small {
-        return built_in();
+    type File = LazyLock<Result<PathBuf, String>>;
+    fn write(name: &str, width: Width) -> Result<PathBuf, String> {
+        write_built_in(name, width).map_err(|error| format!("{error:#}"))
     }
-    FILE.as_deref().map_err(|error| anyhow!("cannot make the small image: {error}"))
-}
-
-fn write(name: &str, width: Width) -> Result<PathBuf, String> {
-    write_built_in(name, width).map_err(|error| format!("{error:#}"))
+    static EXAMPLE: File = LazyLock::new(|| write("firmware-example.actq", Width::W3));
+    static SMALL: File = LazyLock::new(|| write("firmware-small.actq", Width::W2));
+    let file = if target == Target::Small { &SMALL } else { &EXAMPLE };
+    file.as_deref().map_err(|error| anyhow!("cannot make the built-in image: {error}"))
 }
 
 fn write_built_in(name: &str, width: Width) -> Result<PathBuf> {

@@ -202,8 +202,9 @@ impl Arena<'_> {
         let Lowering { steps, buffers, .. } = &self.lowering;
         let with_copies = || Steps { steps: steps.clone(), first_denoising_op, buffers };
         let placed = |mut steps| {
-            self.prepare_in_place(&mut steps);
-            let placement = self.place(&steps);
+            let lives = lifetimes(&steps);
+            self.prepare_in_place(&mut steps, &lives);
+            let placement = self.place(&steps, &lives);
             (steps, placement)
         };
         let all = placed(with_copies());
@@ -222,8 +223,7 @@ impl Arena<'_> {
     }
 
     /// Lets products prepare their input in its own place, if nothing reads it after them.
-    fn prepare_in_place(&self, steps: &mut Steps<'_>) {
-        let lives = lifetimes(steps);
+    fn prepare_in_place(&self, steps: &mut Steps<'_>, lives: &[Life]) {
         let buffers = steps.buffers;
         for (at, step) in steps.steps.iter_mut().enumerate() {
             let fits = self.prepared(step).in_place.is_some();
@@ -236,16 +236,14 @@ impl Arena<'_> {
 
     /// Places the buffers in as few words as it finds: with all outputs beginning in their inputs that may, or with none, and
     /// then with each of them the other way if that takes fewer.
-    fn place(&self, steps: &Steps<'_>) -> Placement {
-        let lives = lifetimes(steps);
+    fn place(&self, steps: &Steps<'_>, lives: &[Life]) -> Placement {
         let left: Vec<_> = steps.steps.iter().map(|step| self.left_of_input(step)).collect();
-        let [all, none] =
-            [left.clone(), vec![None; left.len()]].map(|left| (place(steps.buffers, &lives, &left), left));
+        let [all, none] = [left.clone(), vec![None; left.len()]].map(|left| (place(steps.buffers, lives, &left), left));
         let (mut best, mut kept) = if none.0.end < all.0.end { none } else { all };
         for at in (0..left.len()).filter(|at| left[*at].is_some()) {
             let mut other = kept.clone();
             other[at] = if kept[at].is_some() { None } else { left[at] };
-            let placement = place(steps.buffers, &lives, &other);
+            let placement = place(steps.buffers, lives, &other);
             if placement.end < best.end {
                 (best, kept) = (placement, other);
             }
@@ -297,7 +295,7 @@ fn gap(steps: &Steps<'_>, placement: &Placement) -> Option<Option<BufferId>> {
 
 /// Places the buffers: first the state, then the prefix and the observation, then the values by their lifetimes. An output may
 /// begin where its operation has this much `left` of its input.
-fn place(buffers: &[Buffer], lives: &[(BufferId, (usize, usize))], left: &[Option<usize>]) -> Placement {
+fn place(buffers: &[Buffer], lives: &[Life], left: &[Option<usize>]) -> Placement {
     let mut offsets = vec![0; buffers.len()];
     let mut top = 0;
     let mut state_len = 0;
@@ -337,9 +335,12 @@ fn place(buffers: &[Buffer], lives: &[(BufferId, (usize, usize))], left: &[Optio
     Placement { offsets, state_len, end: ends.into_iter().max().unwrap_or(top) }
 }
 
+/// A buffer, with the first and the last operation that needs it.
+type Life = (BufferId, (usize, usize));
+
 /// Returns the first and last operation that needs each value's buffer, in order of the first.
-fn lifetimes(steps: &Steps<'_>) -> Vec<(BufferId, (usize, usize))> {
-    let mut lives: Vec<(BufferId, (usize, usize))> = Vec::new();
+fn lifetimes(steps: &Steps<'_>) -> Vec<Life> {
+    let mut lives: Vec<Life> = Vec::new();
     for (at, step) in steps.steps.iter().enumerate() {
         for slice in step.operands().into_iter().flatten() {
             let last = match steps.buffers[slice.buffer].lifetime {

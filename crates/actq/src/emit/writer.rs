@@ -346,15 +346,14 @@ impl Writer {
 fn prepared_words(outcome: &Outcome, blocks: &[(BlockShape, Vec<usize>)]) -> PreparedWords {
     let Quantized { rows, cols, group, .. } = outcome.quantized;
     let apart = max_prepared_words(cols, group, outcome.lanes());
-    let words_on = |shape: &BlockShape, core: Core| {
-        let plan = Plan::new(BlockShape { lanes: core.lanes(outcome.x_max, group), ..*shape })?;
-        plan.fits_in_place().then(|| apart.max(plan.words()))
+    let on_every_core = |shape: BlockShape| {
+        Core::ALL.into_iter().try_fold(apart, |words, (_, core)| {
+            let plan = Plan::new(BlockShape { lanes: core.lanes(outcome.x_max, group), ..shape })?;
+            plan.fits_in_place().then(|| words.max(plan.words()))
+        })
     };
     let in_place = match blocks {
-        [(shape, _)] if shape.rows == rows => {
-            let words: Option<Vec<usize>> = Core::ALL.into_iter().map(|(_, core)| words_on(shape, core)).collect();
-            words.and_then(|words| words.into_iter().max()).filter(|words| *words <= cols)
-        }
+        [(shape, _)] if shape.rows == rows => on_every_core(*shape).filter(|words| *words <= cols),
         _ => None,
     };
     PreparedWords { apart, in_place }
