@@ -110,7 +110,8 @@ impl RowBlock<'_> {
         Some(())
     }
 
-    /// Computes rows as [`Self::apply_rows`] does, `N` at a time. (Not inlined: most products do not need its stack.)
+    /// Computes rows as [`Self::apply_rows`] does, `N` at a time. (Not inlined: most products do not need
+    /// its stack. Its parameters are those of the others, because a closure instead takes 16 bytes more of it.)
     #[inline(never)]
     #[expect(clippy::too_many_arguments, reason = "a piece of a product has no fewer")]
     fn apply_runs_of<const N: usize>(
