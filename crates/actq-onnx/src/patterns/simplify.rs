@@ -69,12 +69,21 @@ pub(crate) fn simplify(exprs: &mut Exprs, root: Id, instead: &HashMap<Id, Id>) -
                 let runs: Vec<Run> = runs.iter().map(moved).collect();
                 match exprs.get(runs[0].of) {
                     Expr::Linear(y, w, bias) if same && is_only_reader(&readers, id, exprs, instead) => {
-                        let rows: Vec<usize> = runs.iter().flat_map(|run| run.from..run.from + run.len).collect();
+                        // A row that is read several times, as one added to all tokens, is computed once.
+                        let (mut rows, mut place_of) = (Vec::new(), HashMap::new());
+                        let mut place = |row: usize| {
+                            *place_of.entry(row).or_insert_with(|| {
+                                rows.push(row);
+                                rows.len() - 1
+                            })
+                        };
+                        let places: Vec<usize> =
+                            runs.iter().flat_map(|run| run.from..run.from + run.len).map(&mut place).collect();
                         let data = rows.iter().flat_map(|&r| &w.data[r * w.cols..(r + 1) * w.cols]).copied().collect();
                         let bias = rows.iter().map(|&r| bias[r]).collect();
                         let w = Matrix { name: w.name.clone(), rows: rows.len(), cols: w.cols, data };
-                        let y = *y;
-                        exprs.put(Expr::Linear(y, Arc::new(w), bias), len)
+                        let linear = exprs.linear(*y, Arc::new(w), bias);
+                        exprs.vector(&places.iter().map(|&at| (linear, at)).collect::<Vec<_>>())
                     }
                     _ => exprs.put(Expr::Pick(runs), len),
                 }

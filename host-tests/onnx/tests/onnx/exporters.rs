@@ -21,6 +21,17 @@ fn sums_of_equal_length_share_their_row_of_ones() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn a_layer_added_to_all_tokens_is_computed_once() -> Result<()> {
+    let added = "tokens = Reshape(gemm(obs, 24, 11), [1, 4, 6])
+                 shift = Reshape(gemm(Tanh(obs), 6, 11), [1, 1, 6])
+                 Reshape(Tanh(tokens + shift), [1, 24])";
+    let found = same(&network(added, 24))?;
+    let shapes: Vec<&[usize]> = found.source.tensors.values().map(|tensor| &tensor.shape[..]).collect();
+    assert!(shapes.contains(&&[6, 11][..]), "{shapes:?}");
+    Ok(())
+}
+
 fn node(op: &str, inputs: &[&str], outputs: &[&str], attributes: &[proto::Attribute]) -> Bytes {
     encoded(&proto::Node {
         op_type: Some(op.to_owned()),
