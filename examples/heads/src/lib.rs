@@ -9,7 +9,7 @@ pub mod oft;
 use std::fs;
 use std::path::Path;
 
-use actq::data::Dataset;
+use actq::data::{Dataset, Sizes};
 use actq::policy::Policy;
 use actq::random::Random;
 use anyhow::{Context, Result};
@@ -38,10 +38,10 @@ impl Head {
     /// Writes the policy's folder, with standard normal observations as `calib.npz`.
     pub fn write(&self, dir: &Path) -> Result<()> {
         let mut random = Random::new(1);
-        let obs_len = self.policy()?.graph.obs_len;
+        let sizes = Sizes::of(&self.policy()?);
         let calib = Dataset {
             path: "calib.npz".into(),
-            obs: Array3::from_shape_simple_fn((FRAMES, 1, obs_len), || random.normal()),
+            obs: Array3::from_shape_simple_fn((FRAMES, 1, sizes.obs), || random.normal()),
             action: None,
             length: vec![1; FRAMES],
             state: None,
@@ -49,7 +49,7 @@ impl Head {
         fs::create_dir_all(dir).with_context(|| dir.display().to_string())?;
         let json = serde_json::to_vec_pretty(&self.json)?;
         for (name, bytes) in
-            [("policy.json", json), ("policy.safetensors", self.weights.clone()), ("calib.npz", calib.npz()?)]
+            [("policy.json", json), ("policy.safetensors", self.weights.clone()), ("calib.npz", calib.npz(sizes)?)]
         {
             let path = dir.join(name);
             fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;

@@ -67,7 +67,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
     };
     let mut contents = imported.source.files()?.to_vec();
     if let Some(calib) = &calib {
-        contents.push(calib.npz()?);
+        contents.push(calib.npz(Sizes::of(&policy))?);
     }
     outputs.write(&contents)?;
     print(&imported::summary(&imported, &policy))?;

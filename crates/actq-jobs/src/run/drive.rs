@@ -3,7 +3,6 @@
 use actq::data::{Dataset, Sizes, joined};
 use actq::error::{Result, ensure};
 use actq::pipeline::driven::DriveOutcome;
-use ndarray::s;
 
 use super::inputs::{self, Kept, path_of};
 use crate::digest::of_bytes;
@@ -79,10 +78,5 @@ fn npz(parts: &mut [Dataset], sizes: Sizes) -> Result<Vec<u8>> {
     ensure!(!parts.is_empty(), "the drive command recorded nothing; it must run POLICY_CMD as its policy");
     // Policies that ran at the same time may have written their files in any order.
     parts.sort_by_cached_key(|part| part.obs.iter().map(|value| value.to_bits()).collect::<Vec<u32>>());
-    let mut all = joined(parts, sizes.state)?;
-    if sizes.noise > 0 {
-        // A reader draws the noise itself, and labels the observations with it.
-        (all.obs, all.action) = (all.obs.slice(s![.., .., ..sizes.obs]).to_owned(), None);
-    }
-    all.npz()
+    joined(parts, sizes.state)?.npz(sizes)
 }

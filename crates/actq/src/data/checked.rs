@@ -90,7 +90,7 @@ impl CheckedArrays {
             let noise = match &self.noise {
                 Some(noise) => self.rows("noise", noise)?,
                 None => Array3::from_shape_fn((self.episodes, self.steps, self.sizes.noise), |(e, s, i)| {
-                    normal(0, (e * self.steps + s) as u32, i as u32)
+                    drawn_noise(e * self.steps + s, i)
                 }),
             };
             obs = concatenate(Axis(2), &[obs.view(), noise.view()])?.as_standard_layout().into_owned();
@@ -125,6 +125,11 @@ impl CheckedArrays {
         }
         Ok(Array2::from_shape_vec((self.episodes, self.sizes.state), values)?)
     }
+}
+
+/// Returns a value of the noise of a frame, of a recording without noise.
+pub(super) fn drawn_noise(frame: usize, i: usize) -> f32 {
+    normal(0, frame as u32, i as u32)
 }
 
 /// Returns the episodes and the steps of each.

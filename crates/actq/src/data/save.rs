@@ -2,11 +2,14 @@
 
 use std::io::{self, BufWriter, Cursor, Seek, Write};
 
+use ndarray::Axis;
 use zip::CompressionMethod;
 use zip::write::{SimpleFileOptions, ZipWriter};
 
+use super::checked::drawn_noise;
 use super::dataset::Dataset;
 use super::npy::npy_header;
+use super::sizes::Sizes;
 use crate::error::Result;
 
 /// An element of an array, with its name in numpy.
@@ -98,14 +101,19 @@ impl<W: Write + Seek> NpzWriter<W> {
 }
 
 impl Dataset {
-    /// Returns the recording as an .npz archive, uncompressed.
+    /// Returns the recording, of these sizes, as an .npz archive, uncompressed. Noise that a reader draws again is left out.
     ///
     /// # Errors
     ///
     /// If it takes more bytes than an archive may have.
-    pub fn npz(&self) -> Result<Vec<u8>> {
+    pub fn npz(&self, sizes: Sizes) -> Result<Vec<u8>> {
         let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
-        npz.array("obs", self.obs.shape(), self.obs.iter().copied())?;
+        let (obs, noise) = self.obs.view().split_at(Axis(2), sizes.obs);
+        npz.array("obs", obs.shape(), obs.iter().copied())?;
+        let is_drawn = |(i, value): (usize, &f32)| value.to_bits() == drawn_noise(0, i).to_bits();
+        if self.action.is_some() || !noise.iter().take(sizes.noise).enumerate().all(is_drawn) {
+            npz.array("noise", noise.shape(), noise.iter().copied())?;
+        }
         if let Some(action) = &self.action {
             npz.array("action", action.shape(), action.iter().copied())?;
         }

@@ -6,6 +6,7 @@ use actq_testkit::{Dtype, Random, safetensors};
 use ndarray::{Array1, Array2, Array3, ArrayD, IxDyn, ShapeBuilder as _, s};
 use tempfile::TempDir;
 
+use super::arrays::Arrays;
 use super::*;
 use crate::calibrate::moments;
 use crate::calibrate::windows::Windows;
@@ -18,6 +19,7 @@ const SIZES: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 0 };
 const RECURRENT: Sizes = Sizes { obs: 3, noise: 0, out: 2, state: 4 };
 
 /// An array of a file to be written: its type and shape, and its bytes in numpy's format and alone.
+#[derive(Clone)]
 struct Array {
     dtype: Dtype,
     shape: Vec<usize>,
@@ -328,6 +330,23 @@ fn too_few_frames_are_named() {
     assert!(dataset.require_frames(10, "this").is_ok());
     let error = dataset.require_frames(11, "fewer repeat themselves").expect_err("ten").to_string();
     assert!(error.ends_with("calib.npz: it has 10 frames, but 11 are needed: fewer repeat themselves"), "{error}");
+}
+
+/// As `actq import --calib` does for a flow or diffusion policy.
+#[test]
+fn a_recording_with_noise_is_written_as_it_was_read() {
+    let dir = TempDir::new().expect("a folder");
+    let sizes = Sizes { noise: 4, ..SIZES };
+    let stated = [("noise", Array::from(count(&[2, 5, 4]))), ("action", Array::from(count(&[2, 5, 2])))];
+    for others in [&stated[..], &stated[..1], &[]] {
+        let arrays: Vec<Named> = [("obs", obs())].into_iter().chain(others.iter().cloned()).collect();
+        let read = Dataset::load(&write(&dir, "read.npz", &arrays), sizes).expect("a recording");
+        let path = dir.path().join("written.npz");
+        fs::write(&path, read.npz(sizes).expect("an archive")).expect("a file");
+        assert_eq!(Arrays::read(&path).expect("arrays").has("noise"), !others.is_empty());
+        let again = Dataset::load(&path, sizes).expect("a recording");
+        assert_eq!((&again.obs, &again.action), (&read.obs, &read.action));
+    }
 }
 
 /// Cuts the same steps into windows, with the state at the start of each.

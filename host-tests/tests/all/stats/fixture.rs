@@ -5,7 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Output;
 
-use actq::data::Dataset;
+use actq::data::{Dataset, Sizes};
 use actq::policy::Policy;
 use actq_bench::command::{actq, research, run, succeeded};
 use actq_bench::golden::Random;
@@ -52,7 +52,7 @@ impl Fixture {
             let obs = Array3::from_shape_simple_fn((2, 150, OBS), || 2.0 * random.unit());
             let mut recording = Dataset { path: name.into(), obs, action: None, length: vec![150; 2], state: None };
             recording.fill_actions(&policy.graph);
-            fs::write(dir.join(name), recording.npz()?)?;
+            fs::write(dir.join(name), recording.npz(Sizes::of(&policy))?)?;
         }
         Ok(fixture)
     }
