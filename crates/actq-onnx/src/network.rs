@@ -214,7 +214,12 @@ impl Imported {
             text += &format!("prefix    {}; {order}\n", from_host.join("; "));
         }
         if let Some(Denoiser { time, iterate, times, .. }) = &self.denoiser {
-            text += &format!("sampler   {iterate} from noise in {}, at {time}\n", count(times.len(), "evaluation"));
+            let unscaled = "; actions as the network has them, since the sampler states no mean and std in \"action\"";
+            let unscaled = if self.source.json.action == Some(JsonContract::default()) { unscaled } else { "" };
+            text += &format!(
+                "sampler   {iterate} from noise in {}, at {time}{unscaled}\n",
+                count(times.len(), "evaluation")
+            );
         }
         for (from, to, len) in &self.states {
             text += &format!("state     {from} -> {to}, {}; kept by the policy, zero at reset\n", count(*len, "value"));
@@ -290,11 +295,25 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         refuse_column(model, &observed, output)?;
         actions(&output.value.shape, values)?
     };
+    if let Some(execute) = options.sampler.as_ref().and_then(|sampler| sampler.execute) {
+        let shape = &output.value.shape;
+        ensure!(
+            execute <= chunk,
+            "execute is {execute}, and an output of shape {shape:?} has {chunk}: a chunk is [1, actions, values]"
+        );
+    }
     // The last nodes of a denoiser are not those of its actions.
     let is_inner = options.is_inner || places.is_some();
     let (root, contract) = if is_inner { (root, None) } else { action::contract(&exprs, root, act_len) };
     let last = contract.iter().flat_map(keys).collect();
-    let (contract, bounded) = if is_inner { (None, 0) } else { action::bounded(&exprs, root, contract, act_len) };
+    let (contract, bounded) = match &options.sampler {
+        Some(sampler) => (sampler.action.clone(), 0),
+        None if is_inner => (None, 0),
+        None => action::bounded(&exprs, root, contract, act_len),
+    };
+    if let Some(contract) = &contract {
+        contract.contract(act_len)?;
+    }
     let contract = match options.limits.is_empty() {
         true => contract,
         false => Some(contract.unwrap_or_default().limited(&options.limits, act_len)?),

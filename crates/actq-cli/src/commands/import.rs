@@ -55,11 +55,13 @@ pub(crate) fn run(args: &ImportArgs) -> Result<()> {
         other.map_or("".into(), |p| p.display().to_string())
     );
     let _folder = OutputFolder::new(&args.out)?;
+    let is_scaled = options.sampler.as_ref().is_some_and(|sampler| sampler.action.is_some());
     let outputs = reserve(&names, Onnx.files(&args.model).into_iter().chain(args.calib.clone()))?;
     let checked = match args.check {
-        // Another program runs the file without the limits that the caller adds.
-        true if !options.limits.is_empty() => {
-            let own = import(&args.model, &ImportOptions { limits: StatedLimits::default(), ..options })?;
+        // Another program runs the file without the limits and scales that the caller adds.
+        true if !options.limits.is_empty() || is_scaled => {
+            let sampler = options.sampler.map(|sampler| Sampler { action: None, ..sampler });
+            let own = import(&args.model, &ImportOptions { limits: StatedLimits::default(), sampler, ..options })?;
             Some(check(&args.model, &own, &own.policy(&args.out, &args.model)?, calib.as_ref())?)
         }
         true => Some(check(&args.model, &imported, &policy, calib.as_ref())?),

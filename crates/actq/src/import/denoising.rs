@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::error::{Context, Result, bail, ensure};
 use crate::graph::Denoising;
+use crate::import::contract::JsonContract;
 use crate::numbers::positive;
 use crate::numbers::square;
 use crate::strict_json;
@@ -136,6 +137,8 @@ pub struct Sampler {
     pub iterate: Option<String>,
     /// Input that is the time; `None` for the only one of a single value.
     pub time: Option<String>,
+    /// From the network's actions to the robot's, which packages keep beside the network.
+    pub action: Option<JsonContract>,
     /// The steps, for a network that reads the time itself.
     pub steps: JsonDenoising,
 }
@@ -148,7 +151,7 @@ impl Sampler {
     /// For another kind, an unknown key, one of the wrong type, or without a key in which packages differ.
     pub fn parse(bytes: &[u8]) -> Result<Self> {
         /// Keys beside those of denoising steps. The network itself has the time's features and the normalization.
-        const OWN: [&str; 4] = ["kind", "execute", "iterate_input", "time_input"];
+        const OWN: [&str; 5] = ["kind", "execute", "iterate_input", "time_input", "action"];
         /// Keys without a default, by kind.
         const STATED: [(&str, &[&str]); 2] = [
             ("flow", &["steps", "time"]),
@@ -169,7 +172,7 @@ impl Sampler {
             }
         }
         object.retain(|_, value| !value.is_null());
-        let [of_kind, execute, iterate, time] = OWN.map(|key| object.remove(key));
+        let [of_kind, execute, iterate, time, action] = OWN.map(|key| object.remove(key));
         let text = |key: &str, value: Option<Value>| match value {
             None => Ok(None),
             Some(Value::String(text)) => Ok(Some(text)),
@@ -193,6 +196,7 @@ impl Sampler {
             execute: execute.map(serde_json::from_value).transpose().context("execute")?,
             iterate: text(OWN[2], iterate)?,
             time: text(OWN[3], time)?,
+            action: action.map(serde_json::from_value).transpose().context("action")?,
             steps,
         })
     }

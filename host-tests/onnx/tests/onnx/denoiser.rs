@@ -89,6 +89,24 @@ fn a_flow_adds_the_networks_outputs() -> Result<()> {
     Ok(())
 }
 
+/// Packages keep the scales of actions beside the network.
+#[test]
+fn a_sampler_states_the_scales_of_actions() -> Result<()> {
+    let import = |action: &str| -> Result<(Imported, Policy)> {
+        let sampler = format!(r#"{{"kind": "flow", "steps": 5, "time": {{"from": 0, "to": 1}}{action}}}"#);
+        imported(&network(), &with(&sampler)?)
+    };
+    let (found, policy) = import("")?;
+    ensure!(found.ports().contains("actions as the network has them"), "{}", found.ports());
+    ensure!(policy.contract.scale.is_none() && policy.contract.low.is_none(), "{:?}", policy.contract);
+    let (found, policy) = import(r#", "action": {"mean": [1, 2], "std": [3, 4], "low": [-5, -6], "high": [5, 6]}"#)?;
+    ensure!(!found.ports().contains("actions as the network has them"), "{}", found.ports());
+    let contract = policy.contract;
+    ensure!(contract.scale == Some(vec![3.0, 4.0]) && contract.offset == Some(vec![1.0, 2.0]), "{contract:?}");
+    ensure!(contract.low == Some(vec![-5.0, -6.0]) && contract.high == Some(vec![5.0, 6.0]), "{contract:?}");
+    Ok(())
+}
+
 /// With few steps, the layer over a function of time and observation is a table, and a layer of the observation that runs
 /// once. With many, the table would be longer than the layer's weights.
 #[test]
@@ -139,6 +157,14 @@ fn what_a_sampler_does_not_fit_is_refused_by_name() -> Result<()> {
         (
             r#"{"kind": "diffusion", "train_steps": 9, "schedule": "linear", "solver": "ddim", "prediction": "v"}"#,
             r#"the key "clip_sample" is missing"#,
+        ),
+        (
+            r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "execute": 5}"#,
+            "execute is 5, and an output of shape [1, 4, 2] has 4: a chunk is [1, actions, values]",
+        ),
+        (
+            r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "action": {"mean": [1], "std": [1]}}"#,
+            "action.mean has 1 values, but act_dim is 2",
         ),
         (
             r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "time_input": "t"}"#,
