@@ -119,35 +119,17 @@ impl From<Code> for Failure {
     }
 }
 
-impl From<ImageError> for Failure {
-    fn from(error: ImageError) -> Self {
-        Self::of(error.code().into())
-    }
+macro_rules! failures {
+    ($($error:ident)*) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::of(error.code().into())
+            }
+        })*
+    };
 }
 
-impl From<HeadError> for Failure {
-    fn from(error: HeadError) -> Self {
-        Self::of(error.code().into())
-    }
-}
-
-impl From<PrefixError> for Failure {
-    fn from(error: PrefixError) -> Self {
-        Self::of(error.code().into())
-    }
-}
-
-impl From<SavedError> for Failure {
-    fn from(error: SavedError) -> Self {
-        Self::of(error.code().into())
-    }
-}
-
-impl From<StepError> for Failure {
-    fn from(error: StepError) -> Self {
-        Self::of(error.code().into())
-    }
-}
+failures!(ImageError HeadError PrefixError SavedError StepError);
 
 pub(crate) fn status(outcome: Result<(), Failure>) -> ActqStatus {
     outcome.err().map_or(0, |failure| failure.0.get())

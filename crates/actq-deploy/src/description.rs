@@ -29,7 +29,7 @@ pub use value::{From, Op, Operand, Order, Orientation, Value};
 pub const SCHEMA: u32 = 1;
 
 /// A policy's deployment.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Description {
     /// Version of the schema: 1.

@@ -39,8 +39,8 @@ mod tests {
 
     #[test]
     fn letters_are_units() {
-        let sizes = ["98304", "96K", "96k", "1M"].map(|text| bytes(text).expect("a size"));
-        assert_eq!(sizes, [98304, 98304, 98304, 1 << 20]);
+        let sizes = ["98304", "96K", "96k", "1M", "1m"].map(|text| bytes(text).expect("a size"));
+        assert_eq!(sizes, [98304, 98304, 98304, 1 << 20, 1 << 20]);
         let clocks = ["168M", "84000k", "1", "0.5K"].map(|text| hertz(text).expect("a clock"));
         assert_eq!(clocks, [168e6, 84e6, 1.0, 500.0]);
         for text in ["", "K", "0", "-1", "1.5K", "1G", "18446744073709551615K"] {

@@ -28,7 +28,7 @@ pub struct Clock {
 
 impl Clock {
     /// Makes a clock of one phase that starts at 0 and has no end.
-    pub(crate) fn from_zero(name: &str, advance: f64, when: When) -> Self {
+    pub fn from_zero(name: &str, advance: f64, when: When) -> Self {
         let (name, start) = (name.to_owned(), vec![0.0]);
         Self { name, start, advance, when, wrap: None, restart_above: None, standing: None }
     }

@@ -1,5 +1,7 @@
 //! Descriptions without files: what they compute, and what is refused.
 
+use std::collections::BTreeMap;
+
 use actq::error::{Result, bail};
 use actq_deploy::description::{Description, Network};
 use actq_deploy::{Array, Compute, Plan, Runner, Sources};
@@ -160,76 +162,9 @@ fn the_table_counts_one_in_the_singular() -> Result<()> {
 
 #[test]
 fn mistakes_are_refused_by_their_keys() {
-    let cases = [
-        ("schema = 1", "schema = 2", "schema = 2: this version reads schema 1"),
-        ("rate_hz = 50.0", "rate_hz = 0.0", "rate_hz = 0"),
-        ("rate_hz = 50.0", "rate_hz = nan", "rate_hz = NaN"),
-        ("rate_hz = 50.0", "rate = 50.0", "unknown field `rate`"),
-        ("action = \"net.out\"", "action = \"net.none\"", "there is no output"),
-        ("action = \"net.out\"", "action = \"none\"", "there is no value of this name; expected one of"),
-        ("[\"right\", \"left\"]", "[\"right\", \"right\"]", "joints.policy: \"right\" occurs twice"),
-        ("[\"right\", \"left\"]", "[\"right\", \"center\"]", "joints.robot has no \"center\""),
-        (
-            "default = [1.0, 2.0]",
-            "default = [1.0, 2.0, 3.0]",
-            "value \"relative\": do[0]: it has 3 numbers, and the value 2",
-        ),
-        ("default = [1.0, 2.0]", "default = [1.0, inf]", "number 1 is inf"),
-        ("joints = \"robot\"\n\n[[state]]", "\n[[state]]", "give len or joints"),
-        ("joints = \"robot\"\n\n[[state]]", "joints = \"human\"\n[[state]]", "there is no list joints.human"),
-        ("joints = \"robot\"\n\n[[state]]", "len = 2\n[[state]]", "its values are in no order of joints"),
-        ("name = \"q\"", "name = \"last\"", "name \"last\" occurs twice"),
-        ("name = \"q\"", "name = \"q\\u001b\"", "without control characters"),
-        ("len = 2\nnext", "len = 3\nnext", "\"last\" has 3 values, and the value 2"),
-        ("next = \"net.out\"", "next = \"nothing\"", "state \"last\": next = \"nothing\""),
-        ("start = [0.0, 0.5]", "start = []", "clock \"phase\": start is empty"),
-        ("array = \"rows\"", "array = \"other\"", "there is no array \"other\""),
-        ("{ add = \"phase\" }", "{ add = \"target\" }, { add = \"sum\" }", "\"sum\" depends on itself"),
-        ("{ add = \"phase\" }", "{ divide = 0.0 }", "it divides by 0"),
-        (
-            "{ add = \"phase\" }",
-            "{ clip = [[-1.0, 1.0], 0.5] }",
-            "value \"sum\": do[1]: clip = [1, 0.5]; give the lowest number first",
-        ),
-        ("{ add = \"phase\" }", "{ add = 1e39 }", "do[1]: number 0 is 1e39; give numbers from -3.4e38"),
-        (
-            "advance = 0.25",
-            "advance = 0.25\nstanding = { of = [], below = 0.1, at = [0.0, 0.0] }",
-            "clock \"phase\": standing.of is empty",
-        ),
-        (
-            "value = \"target\"\njoints = \"robot\"",
-            "value = \"target\"\nlimits = [[0.0, 2.0], 1.0]",
-            "target \"target\": limits: value 1: [2, 1]; give the lowest number first",
-        ),
-        ("{ add = \"phase\" }", "{ select = [0, 2] }", "place 2 (from 0) is not in 2 values"),
-        ("{ add = \"phase\" }", "{ place = [1, 1] }", "not a permutation"),
-        ("{ add = \"phase\" }", "{ gravity = \"wxyz\" }", "an orientation has 4 values; this value has 2"),
-        ("{ add = \"phase\" }", "{ history = { length = 0 } }", "length and stride must be at least 1"),
-        ("{ add = \"phase\" }", "{ history = { length = 99999999999 } }", "it keeps more than"),
-        ("{ add = \"phase\" }", "{ history = { length = 2 } }", "\"motion\" has 2 values, and the value 4"),
-        ("{ add = \"phase\" }", "{ tanh = 1 }", "tanh"),
-        ("inputs = { x = \"sum\" }", "inputs = {}", "inputs.x is missing"),
-        ("inputs = { x = \"sum\" }", "inputs = { x = \"sum\", z = \"sum\" }", "has no input \"z\""),
-        ("inputs = { x = \"sum\" }", "inputs = { x = \"sum\", y = \"sum\" }", "it is a state, too"),
-        (
-            "value = \"target\"\njoints = \"robot\"",
-            "value = \"target\"\njoints = \"policy\"",
-            "add { place = \"policy\" }",
-        ),
-        (
-            "stiffness = [1.0, 2.0]",
-            "stiffness = [1.0]",
-            "gains: stiffness has 1 values, damping 2; give one each for a joint",
-        ),
-        ("stiffness = [1.0, 2.0]", "stiffness = [1.0, -2.0]", "gains: stiffness: gain 1 is below 0"),
-        (
-            "joints = \"robot\"\nstiffness = [1.0, 2.0]\ndamping = [0.1, 0.2]",
-            "stiffness = [1.0]\ndamping = [0.1]",
-            "gains: they have 1 values, and the target 2",
-        ),
-    ];
-    for (from, to, expected) in cases {
+    let table: BTreeMap<String, Vec<[String; 3]>> =
+        toml::from_str(include_str!("../cases/mistakes.toml")).expect("a table");
+    for [from, to, expected] in &table["cases"] {
         assert_eq!(WHOLE.matches(from).count(), 1, "{from:?} must occur once");
         let error = plan(&WHOLE.replace(from, to)).map_or_else(|error| format!("{error:#}"), |_| "accepted".to_owned());
         assert!(error.contains(expected), "{to}: {error}");

@@ -176,42 +176,22 @@ impl Case<'_> {
     }
 }
 
-#[test]
-fn layers() -> Result<()> {
-    check(include_str!("cases/layers.txt"))
+macro_rules! files {
+    ($($test:ident: $file:literal,)*) => {
+        $(#[test]
+        fn $test() -> Result<()> {
+            check(include_str!(concat!("cases/", $file, ".txt")))
+        })*
+    };
 }
 
-#[test]
-fn activations() -> Result<()> {
-    check(include_str!("cases/activations.txt"))
-}
-
-#[test]
-fn recurrent_cells_and_states() -> Result<()> {
-    check(include_str!("cases/states.txt"))
-}
-
-#[test]
-fn attention() -> Result<()> {
-    check(include_str!("cases/attention.txt"))
-}
-
-#[test]
-fn inputs_and_outputs() -> Result<()> {
-    check(include_str!("cases/ports.txt"))
-}
-
-#[test]
-fn rows_and_positions() -> Result<()> {
-    check(include_str!("cases/rows.txt"))
-}
-
-#[test]
-fn values_that_are_not_finite() -> Result<()> {
-    check(include_str!("cases/guards.txt"))
-}
-
-#[test]
-fn refusals() -> Result<()> {
-    check(include_str!("cases/refusals.txt"))
+files! {
+    layers: "layers",
+    activations: "activations",
+    recurrent_cells_and_states: "states",
+    attention: "attention",
+    inputs_and_outputs: "ports",
+    rows_and_positions: "rows",
+    values_that_are_not_finite: "guards",
+    refusals: "refusals",
 }

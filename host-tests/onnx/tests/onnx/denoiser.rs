@@ -40,6 +40,11 @@ fn with(sampler: &str) -> Result<ImportOptions> {
     Ok(ImportOptions { sampler: Some(Sampler::parse(sampler.as_bytes())?), ..ImportOptions::default() })
 }
 
+/// A flow of five steps, with more keys.
+fn flow(more: &str) -> String {
+    format!(r#"{{"kind": "flow", "steps": 5, "time": {{"from": 0, "to": 1}}{more}}}"#)
+}
+
 /// Imports the network alone.
 fn alone() -> Result<Policy> {
     let options = ImportOptions { observed: vec!["noisy".to_owned()], ..ImportOptions::default() };
@@ -92,10 +97,7 @@ fn a_flow_adds_the_networks_outputs() -> Result<()> {
 /// Packages keep the scales of actions beside the network.
 #[test]
 fn a_sampler_states_the_scales_of_actions() -> Result<()> {
-    let import = |action: &str| -> Result<(Imported, Policy)> {
-        let sampler = format!(r#"{{"kind": "flow", "steps": 5, "time": {{"from": 0, "to": 1}}{action}}}"#);
-        imported(&network(), &with(&sampler)?)
-    };
+    let import = |action: &str| imported(&network(), &with(&flow(action))?);
     let (found, policy) = import("")?;
     ensure!(found.ports().contains("actions as the network has them"), "{}", found.ports());
     ensure!(policy.contract.scale.is_none() && policy.contract.low.is_none(), "{:?}", policy.contract);
@@ -111,7 +113,7 @@ fn a_sampler_states_the_scales_of_actions() -> Result<()> {
 /// once. With many, the table would be longer than the layer's weights.
 #[test]
 fn what_does_not_change_in_a_chunk_is_computed_once() -> Result<()> {
-    let (_, policy) = imported(&network(), &with(r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}}"#)?)?;
+    let (_, policy) = imported(&network(), &with(&flow(""))?)?;
     let first = policy.graph.denoising.as_ref().context("no steps")?.first;
     let reads_observation = |node: &Node| node.inputs.contains(&0);
     ensure!(policy.graph.nodes[..first].iter().any(reads_observation), "{:?}", policy.graph.nodes);
@@ -159,21 +161,12 @@ fn what_a_sampler_does_not_fit_is_refused_by_name() -> Result<()> {
             r#"the key "clip_sample" is missing"#,
         ),
         (
-            r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "execute": 5}"#,
+            &flow(r#", "execute": 5"#),
             "execute is 5, and an output of shape [1, 4, 2] has 4: a chunk is [1, actions, values]",
         ),
-        (
-            r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "action": {"mean": [1], "std": [1]}}"#,
-            "action.mean has 1 values, but act_dim is 2",
-        ),
-        (
-            r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "time_input": "t"}"#,
-            r#"the sampler's time_input names "t", which is none of them"#,
-        ),
-        (
-            r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "time_input": "state"}"#,
-            r#"time_input "state" has the shape"#,
-        ),
+        (&flow(r#", "action": {"mean": [1], "std": [1]}"#), "action.mean has 1 values, but act_dim is 2"),
+        (&flow(r#", "time_input": "t""#), r#"the sampler's time_input names "t", which is none of them"#),
+        (&flow(r#", "time_input": "state""#), r#"time_input "state" has the shape"#),
     ] {
         let error = format!("{:#}", import(sampler).expect_err(expected));
         ensure!(error.contains(expected), "{error} instead of {expected}");
@@ -184,13 +177,9 @@ fn what_a_sampler_does_not_fit_is_refused_by_name() -> Result<()> {
     file.input("time", &[1, 1]);
     file.write(&[], "velocity := MatMul(Tanh(Concat(a, b, time, axis=1)), drawn(5, 2))");
     file.output("velocity", &[1, 2]);
-    let error = format!(
-        "{:#}",
-        imported(&file.bytes(), &with(r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}}"#)?)
-            .expect_err("two")
-    );
+    let error = format!("{:#}", imported(&file.bytes(), &with(&flow(""))?).expect_err("two"));
     ensure!(error.contains("the sampler's iterate_input is missing, and may be a, b"), "{error}");
-    let named = with(r#"{"kind": "flow", "steps": 5, "time": {"from": 0, "to": 1}, "iterate_input": "b"}"#)?;
+    let named = with(&flow(r#", "iterate_input": "b""#))?;
     let (found, _) = imported(&file.bytes(), &named)?;
     ensure!(found.inputs == [("a".to_owned(), 2)], "{:?}", found.inputs);
     Ok(())

@@ -88,18 +88,6 @@ fn a_text_file_is_not_an_image() -> Result<()> {
 }
 
 #[test]
-fn flash_accepts_mebibytes() -> Result<()> {
-    let fixture = Fixture::new()?;
-    for size in ["1M", "1m", "1024K", "1024k"] {
-        let out = fixture.out(&format!("{size}.actq"));
-        succeeded(&fixture.quantize(&out, &format!("--flash {size}"))?)?;
-    }
-    let (mega, kilo) = (fs::read(fixture.out("1M.actq"))?, fs::read(fixture.out("1024K.actq"))?);
-    ensure!(mega == kilo, "the units differ");
-    Ok(())
-}
-
-#[test]
 fn damaged_images_are_refused_by_every_command() -> Result<()> {
     let fixture = Fixture::new()?;
     let good = fs::read(fixture.image("")?)?;

@@ -35,23 +35,8 @@ pub(super) struct Draw {
 
 impl Draw {
     pub(super) fn description(seed: u64) -> Self {
-        let description = Description {
-            schema: SCHEMA,
-            name: format!("seed {seed}"),
-            rate_hz: 50.0,
-            action: String::new(),
-            joints: BTreeMap::new(),
-            constants: BTreeMap::new(),
-            rounding: BTreeMap::new(),
-            inputs: Vec::new(),
-            states: Vec::new(),
-            clocks: Vec::new(),
-            motions: Vec::new(),
-            values: Vec::new(),
-            networks: Vec::new(),
-            targets: Vec::new(),
-            gains: None,
-        };
+        let name = format!("seed {seed}");
+        let description = Description { schema: SCHEMA, name, rate_hz: 50.0, ..Description::default() };
         let mut draw = Self { random: Random::new(seed), values: Vec::new(), description, files: Vec::new() };
         draw.inputs();
         draw.states();
@@ -204,15 +189,7 @@ impl Draw {
     fn clock(&mut self) {
         let (name, legs) = (self.name("clock"), 1 + self.below(2));
         let when = [When::Before, When::After][self.below(2)];
-        let mut clock = Clock {
-            name: name.clone(),
-            start: self.numbers(legs),
-            advance: 0.02,
-            when,
-            wrap: None,
-            restart_above: None,
-            standing: None,
-        };
+        let mut clock = Clock { start: self.numbers(legs), ..Clock::from_zero(&name, 0.02, when) };
         let mut is_fed = true;
         match self.below(3) {
             // Slow, as 8 bits of a weight are few for phases that grow.

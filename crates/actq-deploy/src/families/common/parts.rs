@@ -25,17 +25,7 @@ impl Parts {
             name: name.to_owned(),
             rate_hz,
             action: ACTION.to_owned(),
-            joints: [].into(),
-            constants: [].into(),
-            rounding: [].into(),
-            inputs: Vec::new(),
-            states: Vec::new(),
-            clocks: Vec::new(),
-            motions: Vec::new(),
-            values: Vec::new(),
-            networks: Vec::new(),
-            targets: Vec::new(),
-            gains: None,
+            ..Description::default()
         };
         Self { description, terms: Vec::new() }
     }
@@ -197,13 +187,8 @@ impl Parts {
 
     /// Adds the policy's network, which reads the observation, and its action's name everywhere.
     pub(crate) fn network(&mut self, file: &str, input: &str, output: &str) {
-        self.description.networks.push(Network {
-            name: "policy".to_owned(),
-            file: file.to_owned(),
-            inputs: [(input.to_owned(), "observation".to_owned())].into(),
-            states: [].into(),
-        });
-        self.act(&format!("policy.{output}"));
+        let action = self.network_of("policy", &(input.to_owned(), output.to_owned()), file, "observation");
+        self.act(&action);
     }
 
     /// Names the policy's output.
