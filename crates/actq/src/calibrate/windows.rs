@@ -1,7 +1,7 @@
 //! Batches of recorded observations: single frames for a feed-forward network, windows with the f32 network's own state
 //! at their start for a recurrent one.
 
-use ndarray::{Array2, Axis, s};
+use ndarray::{Array2, ArrayView2, Axis, s};
 use rayon::prelude::*;
 
 use super::imagined::{Imagined, Recorded, Rollout};
@@ -13,6 +13,8 @@ use crate::random::Random;
 
 /// Steps of a recurrent network's window.
 const WINDOW: usize = 64;
+/// Frames of a feed-forward network that run at once, so that their values stay in the cache.
+const ROWS: usize = 32;
 /// Share of the windows that start from the zero state, wherever they are.
 const FROM_ZERO: f32 = 0.15;
 /// Episodes that a thread runs at once.
@@ -71,26 +73,33 @@ impl Windows {
         let weights = Weights::of(&graph);
         let network = Network::new(&graph);
         let recurrent = graph.state_len() > 0;
-        let mut episodes = Vec::new();
-        let mut states = Vec::new();
-        let mut outputs = Vec::new();
-        for (e, &length) in dataset.length.iter().enumerate().filter(|(_, n)| **n > 0) {
+        let length = |e: usize| dataset.length[e];
+        let recorded: Vec<usize> = (0..dataset.length.len()).filter(|&e| length(e) > 0).collect();
+        let shaped = |&e: &usize| {
             let rows: Vec<f32> = dataset.episode(e).flatten().collect();
-            let episode = Array2::from_shape_vec((length, graph.input_len()), rows).unwrap_or_default();
-            if recurrent {
+            Array2::from_shape_vec((length(e), graph.input_len()), rows).unwrap_or_default()
+        };
+        let mut episodes: Vec<Array2<f32>> = recorded.iter().map(shaped).collect();
+        let (mut states, mut outputs) = (Vec::new(), Vec::new());
+        if recurrent {
+            for (&e, episode) in recorded.iter().zip(&episodes) {
                 let mut state = start_state(&graph, &[dataset.start(e)]);
-                let mut kept = zero_state(&graph, length);
+                let mut kept = zero_state(&graph, length(e));
                 for (t, obs) in episode.axis_chunks_iter(Axis(0), 1).enumerate() {
                     copy_sample(&state, 0, &mut kept, t);
                     outputs.push(network.forward(&weights, obs.to_owned(), &mut state).output().clone());
                 }
                 states.push(kept);
-            } else {
-                let some = episode.slice(s![..;every, ..]).to_owned();
-                let mut state = zero_state(&graph, some.nrows());
-                outputs.push(network.forward(&weights, some, &mut state).output().clone());
             }
-            episodes.push(episode);
+        } else {
+            let of_some = |some: ArrayView2<'_, f32>| {
+                let mut state = zero_state(&graph, some.nrows());
+                network.forward(&weights, some.to_owned(), &mut state).into_output()
+            };
+            let of_episode = |episode: &Array2<f32>| -> Vec<Array2<f32>> {
+                episode.slice(s![..;every, ..]).axis_chunks_iter(Axis(0), ROWS).map(of_some).collect()
+            };
+            outputs = episodes.par_iter().flat_map_iter(of_episode).collect();
         }
         let deviation = column_variances(&episodes).into_iter().map(root).collect();
         let output_variance = column_variances(&outputs).into_iter().map(|v| v as f32).collect();
@@ -228,6 +237,18 @@ impl Windows {
     pub fn teach(&self, batch: &Batch) -> Array2<f32> {
         let mut state = batch.state.clone();
         Network::new(&self.graph).forward(&self.weights, batch.frames.clone(), &mut state).into_output()
+    }
+
+    /// Draws a batch, and runs the f32 network on it.
+    pub fn taught_batch(
+        &self,
+        samples: usize,
+        widening: Option<Widening>,
+        random: &mut Random,
+    ) -> (Batch, Array2<f32>) {
+        let batch = self.batch(samples, widening, random);
+        let target = self.teach(&batch);
+        (batch, target)
     }
 }
 

@@ -19,6 +19,7 @@ pub mod schedule;
 mod shape;
 pub mod size;
 mod statistics;
+mod tied;
 pub mod train;
 mod trials;
 mod units;

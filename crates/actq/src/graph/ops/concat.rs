@@ -1,5 +1,5 @@
 use actq_kernels::image::OpKind;
-use ndarray::{Array2, ArrayView2, Axis, concatenate, s};
+use ndarray::{Array2, s};
 
 use crate::error::{Result, ensure};
 use crate::graph::lowering::{BufferId, Lifetime, Lowering, Slice, StepData};
@@ -35,11 +35,14 @@ impl Operation for Concat {
     }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {
-        let parts = run.inputs().zip(&self.0);
-        let views: Vec<ArrayView2<'_, f32>> =
-            parts.map(|(x, span)| x.slice_axis(Axis(1), (span.from..span.from + span.len).into())).collect();
-        let joined = concatenate(Axis(1), &views).unwrap_or_default();
-        (joined.as_standard_layout().into_owned(), Saved::default())
+        let mut joined = Array2::zeros((run.samples(), self.0.iter().map(|span| span.len).sum()));
+        let mut at = 0;
+        for (x, span) in run.inputs().zip(&self.0) {
+            let part = x.slice(s![.., span.from..span.from + span.len]);
+            joined.slice_mut(s![.., at..at + span.len]).assign(&part);
+            at += span.len;
+        }
+        (joined, Saved::default())
     }
 
     fn backward(&self, run: &mut Backward<'_>, _: Saved, dy: Array2<f32>, _: &mut NodeState) {

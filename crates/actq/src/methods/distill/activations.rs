@@ -1,13 +1,14 @@
 //! Choice between int8 and int16 activations for each matrix.
 
 use actq_kernels::Width;
+use ndarray::Array2;
 
 use super::allocate::{Rows, allocate};
 use super::dimension::Widths;
 use super::size::Size;
 use super::train::losses;
 use crate::calibrate::allowance::Allowance;
-use crate::calibrate::windows::Windows;
+use crate::calibrate::windows::{Batch, Windows};
 use crate::error::Result;
 use crate::graph::{Graph, Network};
 use crate::methods::options::Options;
@@ -116,11 +117,12 @@ pub fn choose_activations(
     seed: u64,
 ) -> Vec<u16> {
     let weights = dequantized(graph, quantized);
+    let samples = (BATCH_SAMPLES / windows.window).max(8);
+    let taught: Vec<(Batch, Array2<f32>)> =
+        (0..ERROR_BATCHES as u64).map(|i| windows.taught_batch(samples, None, &mut Random::new(seed + i))).collect();
     let error = |x_max: &[u16], measured: usize| -> f32 {
         let network = Network::rounded(graph, x_max);
-        let samples = (BATCH_SAMPLES / windows.window).max(8);
-        let batches = (0..measured).map(|i| windows.batch(samples, None, &mut Random::new(seed + i as u64)));
-        losses(&network, &weights, windows, batches).sum()
+        losses(&network, &weights, windows, taught[..measured].iter().cloned()).sum()
     };
     let choices = 1 + quantized.len();
     let measured = allowance.map_or(ERROR_BATCHES, |allowance| {

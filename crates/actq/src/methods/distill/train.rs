@@ -14,6 +14,7 @@ use super::latent::{Latent, LearningRates, RateScaling};
 use super::lessons::{Lessons, Source, TrainingBatch};
 use super::objective::{Frames, Objective};
 use super::schedule::{Bounds, Schedule, most_steps};
+use super::tied::Tied;
 use crate::calibrate::widening::Widening;
 use crate::calibrate::windows::{Batch, Windows};
 use crate::data::mean_and_variance;
@@ -144,7 +145,9 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Base
     let mut weights = Weights::of(task.graph);
     let mut latents = task.latents();
     let mut adam_vectors: Vec<Adam> = weights.vectors.iter().flatten().map(|v| Adam::new(v.len())).collect();
-    let units = units_of_vectors(task.graph, windows, task.seed);
+    let tied = Tied::of(task.graph);
+    let mut units = units_of_vectors(task.graph, windows, task.seed);
+    tied.take_first(&mut units);
     latents.iter_mut().zip(&mut weights.matrices).for_each(|(latent, matrix)| latent.write(matrix));
     let mut lessons = Lessons::new(task.seed);
     let (size, shards) = batch_size(task.graph, windows);
@@ -184,6 +187,7 @@ pub fn distill(task: &Task<'_>, windows: &Windows, progress: &mut dyn FnMut(Base
             lesson.into_iter().for_each(|lesson| lessons.keep(lesson));
         }
         let (mut of_matrices, mut of_vectors) = Derivatives::sum(task.graph, of_shards);
+        tied.sum(&mut of_vectors);
         if windows.recurrent() {
             clip(&mut of_matrices, &mut of_vectors);
         }
@@ -284,18 +288,19 @@ pub fn gradient(
     (loss, network.backward(weights, pass, error, &mut lesson.zero_state()))
 }
 
-/// Returns the mean of each batch over samples and outputs of squared error over variance, against the f32 network.
+/// Returns the mean of each batch over samples and outputs of squared error over variance, against the f32 network's
+/// outputs beside it.
 pub fn losses<'b>(
     network: &'b Network<'_>,
     weights: &'b Weights,
     windows: &'b Windows,
-    batches: impl IntoIterator<Item = Batch> + 'b,
+    taught: impl IntoIterator<Item = (Batch, Array2<f32>)> + 'b,
 ) -> impl Iterator<Item = f32> + 'b {
     let objective = Objective::new(&windows.output_variance, Frames::Even);
     let states = windows.states_of(network, weights);
-    batches.into_iter().map(move |batch| {
-        let lesson = TrainingBatch::of(windows, batch, network.graph, &states);
-        objective.measure(lesson.pass(network, weights).output(), &lesson.target).1
+    taught.into_iter().map(move |(batch, target)| {
+        let mut state = batch.state_of(network.graph, &states);
+        objective.measure(network.forward(weights, batch.frames, &mut state).output(), &target).1
     })
 }
 
@@ -309,8 +314,8 @@ pub fn recorded_error(
 ) -> f64 {
     let size = (ERROR_FRAMES / windows.window).max(1);
     let mut random = Random::new(seed);
-    let batches = (0..ERROR_BATCHES).map(|_| windows.batch(size, widening, &mut random));
-    losses(network, weights, windows, batches).map(f64::from).sum::<f64>() / ERROR_BATCHES as f64
+    let taught = (0..ERROR_BATCHES).map(|_| windows.taught_batch(size, widening, &mut random));
+    losses(network, weights, windows, taught).map(f64::from).sum::<f64>() / ERROR_BATCHES as f64
 }
 
 /// Scales the derivatives so that their norm is at most 1.
