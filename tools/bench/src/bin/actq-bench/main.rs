@@ -65,6 +65,12 @@ enum Command {
         /// Show the functions in which the heads spend their instructions
         #[arg(long)]
         by_function: bool,
+        /// Instead, run this image on the first episode of a recording: bits, and the prediction of its time
+        #[arg(long, value_name = "FILE", requires = "recording")]
+        image: Option<PathBuf>,
+        /// The observations for --image: .npz, .npy or .safetensors
+        #[arg(long, value_name = "FILE", requires = "image")]
+        recording: Option<PathBuf>,
     },
     /// Compare the executions of random descriptions: in f64, and as images in f32 and at 8 bits, also in QEMU
     Descriptions {
@@ -211,7 +217,8 @@ fn main() -> ExitCode {
         Command::Flips { seed, count, region, list } => {
             flips::run(seed, count, if region.is_empty() { &Region::ALL } else { &region }, list)
         }
-        Command::Bench { json, wait_states, by_function } => bench::run(json.as_deref(), wait_states, by_function),
+        Command::Bench { image: Some(image), recording: Some(recording), .. } => bench::image(&image, &recording),
+        Command::Bench { json, wait_states, by_function, .. } => bench::run(json.as_deref(), wait_states, by_function),
         Command::Budgets { update } => budgets::run(update),
         Command::Fit { core, only } => fit::run(&core, only.as_deref()),
         Command::Gallery { out, robots, quick } => gallery::build(&out, &robots, quick),
