@@ -346,6 +346,10 @@ fn a_recording_with_noise_is_written_as_it_was_read() {
         assert_eq!(Arrays::read(&path).expect("arrays").has("noise"), !others.is_empty());
         let again = Dataset::load(&path, sizes).expect("a recording");
         assert_eq!((&again.obs, &again.action), (&read.obs, &read.action));
+        // No array without values of another policy.
+        let plain = Dataset { obs: read.obs.slice(s![.., .., ..3]).to_owned(), ..read };
+        fs::write(&path, plain.npz(SIZES).expect("an archive")).expect("a file");
+        assert!(!Arrays::read(&path).expect("arrays").has("noise"));
     }
 }
 
