@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use actq::data::NpzWriter;
-use actq_testkit::{Dtype, Random, TWO_JOINTS, onnx, safetensors};
+use actq_testkit::{Dtype, Random, TWO_JOINTS, onnx, safetensors, snapshot};
 use anyhow::{Context as _, Result, bail, ensure};
 use expect_test::expect_file;
 use rayon::prelude::*;
@@ -84,26 +84,6 @@ impl Folder {
         npz.finish()?;
         Ok(())
     }
-
-    /// Returns the content of all files, and the names of folders.
-    fn snapshot(&self) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
-        let (mut found, mut folders) = (BTreeMap::new(), vec![self.0.path().to_owned()]);
-        while let Some(folder) = folders.pop() {
-            for entry in fs::read_dir(&folder)? {
-                let entry = entry?;
-                let content = match entry.file_type()? {
-                    kind if kind.is_dir() => {
-                        folders.push(entry.path());
-                        Vec::new()
-                    }
-                    kind if kind.is_symlink() => fs::read_link(entry.path())?.into_os_string().into_encoded_bytes(),
-                    _ => fs::read(entry.path())?,
-                };
-                found.insert(entry.path(), content);
-            }
-        }
-        Ok(found)
-    }
 }
 
 #[test]
@@ -152,21 +132,21 @@ fn answer(folder: &Folder, words: &str) -> Result<String> {
         let indented = |line: &str| format!("    {}\n", if line.is_empty() { "." } else { line.trim_end() });
         Ok((output.status.code(), lines.map(indented).collect()))
     };
-    let before = folder.snapshot()?;
+    let before = snapshot(folder.0.path())?;
     let (status, said) = answer()?;
     if status == Some(0) {
         return Ok(String::new());
     }
-    ensure!(folder.snapshot()? == before, "files changed");
+    ensure!(snapshot(folder.0.path())? == before, "files changed");
     // An image that is in use stays, too.
     let is_new = |path: &PathBuf| !path.exists() && path.parent().is_some_and(Path::is_dir);
     let out = words.iter().position(|word| *word == "--out").and_then(|at| words.get(at + 1));
     let out = out.map(|name| folder.path(name)).filter(is_new);
     if let Some(image) = out.filter(|_| words[0] == "quantize" && !words.contains(&"--save-stats")) {
         fs::write(&image, "ACTQ: an image that is in use")?;
-        let before = folder.snapshot()?;
+        let before = snapshot(folder.0.path())?;
         ensure!(
-            answer()? == (status, said.clone()) && folder.snapshot()? == before,
+            answer()? == (status, said.clone()) && snapshot(folder.0.path())? == before,
             "another answer with an old image"
         );
         fs::remove_file(image)?;

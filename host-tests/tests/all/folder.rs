@@ -1,8 +1,7 @@
-//! Policy folders and recordings, and the content of folders.
+//! Policy folders and recordings.
 
-use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use actq::data::NpzWriter;
 use actq_testkit::{Dtype, f32_tensors, safetensors};
@@ -38,25 +37,4 @@ pub(crate) fn write_observations<D: Dimension>(path: &Path, observations: &Array
     npz.array("obs", observations.shape(), observations.iter().copied())?;
     npz.finish()?;
     Ok(())
-}
-
-/// Returns the content of everything in a folder: a file's bytes, a link's target, nothing of a folder.
-pub(crate) fn snapshot(folder: &Path) -> Result<BTreeMap<PathBuf, Option<Vec<u8>>>> {
-    let mut found = BTreeMap::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder)? {
-            let (path, kind) = entry.and_then(|entry| Ok((entry.path(), entry.file_type()?)))?;
-            let content = if kind.is_dir() {
-                folders.push(path.clone());
-                None
-            } else if kind.is_symlink() {
-                Some(fs::read_link(&path)?.into_os_string().into_encoded_bytes())
-            } else {
-                Some(fs::read(&path)?)
-            };
-            found.insert(path, content);
-        }
-    }
-    Ok(found)
 }

@@ -7,6 +7,7 @@ mod nor;
 pub mod onnx;
 mod power;
 mod random;
+mod snapshot;
 #[cfg(feature = "tensors")]
 mod tensors;
 
@@ -16,6 +17,7 @@ pub use power::{Change, Power};
 pub use random::Random;
 #[cfg(feature = "tensors")]
 pub use safetensors::Dtype;
+pub use snapshot::snapshot;
 #[cfg(feature = "tensors")]
 pub use tensors::{f32_tensors, safetensors};
 

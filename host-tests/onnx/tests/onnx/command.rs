@@ -17,7 +17,7 @@ use anyhow::{Result, ensure};
 use ndarray::{Array, Array2, Array3, Dimension};
 use tempfile::TempDir;
 
-use super::file::{File, encoded, tensor};
+use super::file::{File, external, tensor};
 
 const OBS: usize = 6;
 
@@ -138,13 +138,7 @@ fn quantize_says_what_it_takes_of_a_file() -> Result<()> {
 
 /// Writes a network that replaces NaN, then has one layer of 4 by 4 with its weights in another file, from `offset` on.
 fn write_layer(model: &Path, [input, output]: [&str; 2], location: &str, offset: usize) -> Result<()> {
-    let entry = |key: &str, value: String| encoded(&proto::Entry { key: Some(key.to_owned()), value: Some(value) });
-    let weights = proto::Tensor {
-        raw_data: None,
-        external_data: vec![entry("location", location.to_owned()), entry("offset", offset.to_string())],
-        data_location: Some(1),
-        ..tensor("w", &[4, 4], &[])
-    };
+    let weights = external(&[4, 4], &[("location", location), ("offset", &offset.to_string())]);
     let mut file = File::default();
     file.input(input, &[1, 4]);
     file.initializer(&weights);

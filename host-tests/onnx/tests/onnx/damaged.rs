@@ -33,13 +33,7 @@ fn whole() -> Vec<u8> {
 }
 
 fn external_tensor(location: &str) -> proto::Tensor {
-    let entry = proto::Entry { key: Some("location".to_owned()), value: Some(location.to_owned()) };
-    proto::Tensor {
-        raw_data: None,
-        external_data: vec![encoded(&entry)],
-        data_location: Some(1),
-        ..tensor("w", &[4, 4], &[0.0; 16])
-    }
+    super::file::external(&[4, 4], &[("location", location)])
 }
 
 fn external(location: &str) -> Vec<u8> {

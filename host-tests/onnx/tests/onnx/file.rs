@@ -31,6 +31,15 @@ pub(super) fn tensor(name: &str, dims: &[usize], data: &[f32]) -> proto::Tensor 
     }
 }
 
+/// A tensor whose data is in another file, with the keys of the place.
+pub(super) fn external(dims: &[usize], place: &[(&str, &str)]) -> proto::Tensor {
+    let entry = |(key, value): &(&str, &str)| {
+        encoded(&proto::Entry { key: Some((*key).to_owned()), value: Some((*value).to_owned()) })
+    };
+    let external_data = place.iter().map(entry).collect();
+    proto::Tensor { raw_data: None, external_data, data_location: Some(1), ..tensor("w", dims, &[]) }
+}
+
 pub(super) fn encoded(message: &impl prost::Message) -> Bytes {
     message.encode_to_vec().into()
 }

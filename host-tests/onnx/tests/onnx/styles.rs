@@ -6,7 +6,7 @@ use actq_onnx::{ImportOptions, Onnx};
 use anyhow::{Context as _, Result};
 use proptest::prelude::*;
 
-use super::file::{File, encoded, tensor};
+use super::file::{File, external};
 use super::{by_tract, compare, drawn, imported, refused, same};
 use actq::import::Importer as _;
 use actq::measure::actions::actions;
@@ -42,15 +42,7 @@ fn weights_of_other_files_are_imported() -> Result<()> {
     let dir = tempfile::TempDir::new()?;
     let data: Vec<f32> = (0..3 * OBS).map(|i| i as f32 / 20.0 - 0.7).collect();
     let mut file = begun();
-    let entry = |key: &str, value: &str| {
-        encoded(&actq_onnx::proto::Entry { key: Some(key.to_owned()), value: Some(value.to_owned()) })
-    };
-    let outside = actq_onnx::proto::Tensor {
-        raw_data: None,
-        external_data: vec![entry("location", "model.data"), entry("offset", "16")],
-        data_location: Some(1),
-        ..tensor("w", &[OBS, 3], &data)
-    };
+    let outside = external(&[OBS, 3], &[("location", "model.data"), ("offset", "16")]);
     file.initializer(&outside);
     file.nodes("MatMul", &["obs", "w"], &["actions"], &[]);
     file.output("actions", &[1, 3]);

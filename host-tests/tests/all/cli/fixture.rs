@@ -16,7 +16,7 @@ use ndarray::Array3;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::folder::{self, snapshot};
+use crate::folder;
 
 pub(super) const OBS: usize = 40;
 pub(super) const HIDDEN: usize = 64;
@@ -93,7 +93,7 @@ impl Fixture {
 
     /// Every file's content and every folder.
     pub(super) fn snapshot(&self) -> Result<BTreeMap<PathBuf, Option<Vec<u8>>>> {
-        snapshot(self.0.path())
+        Ok(actq_testkit::snapshot(self.0.path())?)
     }
 }
 

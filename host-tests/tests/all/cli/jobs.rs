@@ -12,12 +12,12 @@ use actq::data::NpzWriter;
 use actq::runtime::ImageBuffer;
 use actq_bench::command::{actq, binary, failed, run, succeeded};
 use actq_bench::root;
+use actq_testkit::snapshot;
 use anyhow::{Context as _, Result, ensure};
 use serde_json::Value;
 use tempfile::TempDir;
 
 use super::fixture::{Fixture, OBS};
-use crate::folder::snapshot;
 
 /// A simulator of short episodes, whose observations depend on the seed.
 const SIMULATOR: &str = r#"

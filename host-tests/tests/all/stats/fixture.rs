@@ -91,6 +91,6 @@ impl Fixture {
 
     /// Returns the content of everything in the folder.
     pub(super) fn files(&self) -> Result<BTreeMap<PathBuf, Option<Vec<u8>>>> {
-        folder::snapshot(self.0.path())
+        Ok(actq_testkit::snapshot(self.0.path())?)
     }
 }
