@@ -8,7 +8,8 @@ use actq::measure::time::CLOCK;
 use actq::runtime::{ImageBuffer, with_head};
 use actq_bench::profile::Harness;
 use actq_bench::qemu::Counter;
-use actq_bench::{Target, firmware};
+use actq_bench::{Target, bits};
+use actq_kernels::cost::Cost;
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 
@@ -49,25 +50,30 @@ pub(crate) fn run(json: Option<&Path>, wait_states: u64, by_function: bool) -> R
     Ok(())
 }
 
+/// The feature that the harness of other images does not have.
+const ATTENTION: &str = "attention";
+
 /// Runs an image on the first episode of a recording, compares its actions with the host's, and the cost of its steps with
 /// the prediction.
 pub(crate) fn image(path: &Path, recording: &Path) -> Result<()> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let buffer = ImageBuffer::new(&bytes);
+    let buffer = ImageBuffer::read(path)?;
     let image = buffer.image(path)?;
     let recorded = Dataset::load(recording, Sizes::of_image(&image))?;
     let frames: Vec<Vec<f32>> = recorded.episode(0).map(|row| row[..image.obs_len()].to_vec()).collect();
-    let harness = Harness::of(Target::Fpu, firmware::harness_with(Target::Fpu, path)?)?;
-    let (costs, actions) = harness.regions(&bytes, "serve", &frames)?;
+    let needs_attention = image.features().any(|feature| feature == ATTENTION);
+    let harness = match needs_attention {
+        true => Harness::build_with(Target::Fpu, ATTENTION)?,
+        false => Harness::build(Target::Fpu)?,
+    };
+    let (costs, actions) = harness.regions(buffer.bytes(), "serve", &frames)?;
     let expected: Vec<Vec<f32>> = with_head(image, |head| {
         frames.iter().map(|frame| Ok(head.step(frame)?.to_vec())).collect::<Result<_, Error>>()
     })?;
-    let bits = |action: &[f32]| action.iter().map(|value| value.to_bits()).collect::<Vec<u32>>();
     let other = actions.iter().zip(&expected).position(|(found, expected)| bits(found) != bits(expected));
     ensure!(other.is_none(), "step {}: another action than on the host", other.unwrap_or(0));
     println!("{} actions have the host's bits, on a Cortex-M4 with FPU in QEMU", actions.len());
-    let evaluations: Vec<f64> = costs.iter().step_by(image.execute()).map(|cost| cost.instructions as f64).collect();
-    let mean = evaluations.iter().sum::<f64>() / evaluations.len() as f64;
+    let evaluations: Vec<Cost> = costs.into_iter().step_by(image.execute()).collect();
+    let mean = evaluations.iter().map(|cost| cost.instructions).sum::<u64>() as f64 / evaluations.len() as f64;
     let predicted = image.step_cost();
     println!(
         "{mean:.0} instructions in a step that evaluates the network, the mean of {}; predicted {} ({:+.2} %)",
@@ -75,7 +81,7 @@ pub(crate) fn image(path: &Path, recording: &Path) -> Result<()> {
         predicted.instructions,
         100.0 * (predicted.instructions as f64 / mean - 1.0)
     );
-    let cycles = costs.iter().step_by(image.execute()).map(|cost| cost.cycles).max().unwrap_or(0);
+    let cycles = evaluations.iter().map(|cost| cost.cycles).max().unwrap_or(0);
     println!("{:.3} ms at {} MHz at most, modelled", 1e3 * cycles as f64 / CLOCK, CLOCK / 1e6);
     Ok(())
 }
