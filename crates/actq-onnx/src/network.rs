@@ -215,7 +215,9 @@ impl Imported {
         }
         if let Some(Denoiser { time, iterate, times, .. }) = &self.denoiser {
             let unscaled = "; actions as the network has them, since the sampler states no mean and std in \"action\"";
-            let unscaled = if self.source.json.action == Some(JsonContract::default()) { unscaled } else { "" };
+            let is_scaled =
+                |action: &JsonContract| [&action.mean, &action.q01, &action.scale].into_iter().any(Option::is_some);
+            let unscaled = if self.source.json.action.as_ref().is_some_and(is_scaled) { "" } else { unscaled };
             text += &format!(
                 "sampler   {iterate} from noise in {}, at {time}{unscaled}\n",
                 count(times.len(), "evaluation")
@@ -311,9 +313,6 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         None if is_inner => (None, 0),
         None => action::bounded(&exprs, root, contract, act_len),
     };
-    if let Some(contract) = &contract {
-        contract.contract(act_len)?;
-    }
     let contract = match options.limits.is_empty() {
         true => contract,
         false => Some(contract.unwrap_or_default().limited(&options.limits, act_len)?),

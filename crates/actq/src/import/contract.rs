@@ -140,8 +140,9 @@ impl JsonContract {
     ///
     /// # Errors
     ///
-    /// As [`StatedLimits::within`], and for a `max_step` that is not above 0.
+    /// As [`Self::contract`] and [`StatedLimits::within`], and for a `max_step` that is not above 0.
     pub fn limited(mut self, stated: &StatedLimits, act_dim: usize) -> Result<Self> {
+        self.contract(act_dim)?;
         let known = |array: &Array, i: usize, none: f64| array.as_ref().and_then(|array| array[i]).unwrap_or(none);
         let unlimited = f64::from(f32::MAX);
         let own = |i: usize| [known(&self.low, i, -unlimited), known(&self.high, i, unlimited)];

@@ -98,6 +98,8 @@ fn a_flow_adds_the_networks_outputs() -> Result<()> {
 #[test]
 fn a_sampler_states_the_scales_of_actions() -> Result<()> {
     let import = |action: &str| imported(&network(), &with(&flow(action))?);
+    let (found, _) = import(r#", "action": {"low": [-5, -6], "high": [5, 6]}"#)?;
+    ensure!(found.ports().contains("actions as the network has them"), "{}", found.ports());
     let (found, policy) = import("")?;
     ensure!(found.ports().contains("actions as the network has them"), "{}", found.ports());
     ensure!(policy.contract.scale.is_none() && policy.contract.low.is_none(), "{:?}", policy.contract);
