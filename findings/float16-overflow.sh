@@ -14,7 +14,7 @@ const assert = require("node:assert");
 const { float16ToByte, byteToFloat16 } = require("float16");
 const { f16round } = require("@petamoriken/float16");
 
-// What a reader of 16 bits gets.
+// The number that a reader of 16 bits gets.
 const stored = (value) => byteToFloat16(Uint16Array.of(float16ToByte(value))[0]);
 const values = [65504, 65520, 70000, 131072, 200000, -200000, 1e7, 1 + 1 / 2048, 1e-5];
 const seen = new Map(values.map((value) => [value, stored(value)]));

@@ -1,6 +1,6 @@
 """Drives the task: 100 episodes with the f32 network, or with images.
 
-Usage: python evaluate.py policy.onnx [IMAGE ...]
+Usage: python evaluate.py POLICY.onnx|IMAGE.actq ...
 """
 
 import json
@@ -41,9 +41,8 @@ class Network:
 
 
 def main():
-    path, *images = sys.argv[1:]
     task = Task()
-    for name in [path, *images]:
+    for name in sys.argv[1:]:
         policy = actq.Head(actq.Image.load(name)) if name.endswith(".actq") else Network(name)
         successes = 0
         for seed in range(FIRST_SEED, FIRST_SEED + EPISODES):
