@@ -1,7 +1,7 @@
 //! Small networks and recordings of them, for the unit tests of this crate and, by path, of `actq-research`.
 
 use actq::data::Dataset;
-use actq::graph::ops::{Add, Attention, Concat, Gru, LayerNorm, Linear, Lstm, Pointwise, Span};
+use actq::graph::ops::{Add, Attention, Concat, Gru, LayerNorm, Linear, Lstm, Pointwise, Rotary, Span};
 use actq::graph::{Evaluator, Graph, WeightMatrix};
 use actq::random::Random;
 use actq_kernels::math::Function;
@@ -151,6 +151,42 @@ pub(crate) fn transformer(context: usize) -> Graph {
         x = added(&mut graph, &x, &y);
     }
     layer(&mut graph, &x[tokens - 1..], 2);
+    graph
+}
+
+/// Makes attention over two tokens of three values, whose four heads of eight values read these heads of keys: one layer
+/// makes queries, keys and values, of which the first two are rotated or not, and one reads the outputs, 2 for each token.
+pub(crate) fn attention(kv_heads: usize, is_rotated: bool) -> Graph {
+    let mut random = Random::new(23);
+    let (dim, widths) = (8, [4, kv_heads, kv_heads].map(|heads| 8 * heads));
+    let mut graph = Graph::new(6);
+    let part = |from: usize, len: usize| Span { from, len };
+    let rows = widths.iter().sum();
+    graph.matrices.extend([matrix("qkv", rows, 3, &mut random), matrix("out", 2, widths[0], &mut random)]);
+    let bias = vector(rows, &mut random);
+    let tokens = [0, 3].map(|from| {
+        let token = graph.join(vec![(0, part(from, 3))]).expect("a part");
+        graph.add(Linear { matrix: 0, bias: bias.clone() }, &[token]).expect("it fits")
+    });
+    let from = [0, widths[0], widths[0] + widths[1]];
+    let mut inputs = [0, 1, 2].map(|i| {
+        let parts = tokens.iter().map(|token| (*token, part(from[i], widths[i]))).collect();
+        graph.join(parts).expect("parts")
+    });
+    if is_rotated {
+        for (i, input) in inputs.iter_mut().take(2).enumerate() {
+            let angles: Vec<f32> = (0..dim).map(|j| 0.3 * j as f32).collect();
+            let [cos, sin] = [f32::cos, f32::sin].map(|of| angles.iter().map(|angle| of(*angle)).collect());
+            *input = graph.add(Rotary { heads: widths[i] / dim, dim, cos, sin }, &[*input]).expect("it fits");
+        }
+    }
+    let of = Attention { heads: 4, kv_heads, dim, factor: 0.5, causal: false, context: 0 };
+    let y = graph.add(of, &inputs).expect("it fits");
+    let outputs = [0, 1].map(|token| {
+        let token = graph.join(vec![(y, part(token * widths[0], widths[0]))]).expect("a part");
+        graph.add(Linear { matrix: 1, bias: vec![0.1; 2] }, &[token]).expect("it fits")
+    });
+    graph.join(outputs.map(|token| (token, part(0, 2))).to_vec()).expect("parts");
     graph
 }
 

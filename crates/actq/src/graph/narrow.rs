@@ -15,8 +15,7 @@ pub struct Narrowed {
     pub columns: Vec<Vec<usize>>,
 }
 
-/// Keeps these elements of each group of `ties`, in their order: at least one, and in parts of a concatenation
-/// ascending.
+/// Keeps these elements of each group of `ties`, in their order: at least one of every vector.
 pub fn narrowed(graph: &Graph, ties: &Ties, kept: &[Vec<usize>]) -> Narrowed {
     let matrices = || 0..graph.matrices.len();
     let rows: Vec<Vec<usize>> = matrices().map(|m| ties.row_places(m, kept)).collect();
@@ -29,7 +28,7 @@ pub fn narrowed(graph: &Graph, ties: &Ties, kept: &[Vec<usize>]) -> Narrowed {
         if let NodeKind::Concat(concat) = &mut node.kind {
             for (span, &input) in concat.0.iter_mut().zip(&node.inputs) {
                 let of_input = ties.places(&ties.values[input], kept);
-                let before = |end: usize| of_input.partition_point(|place| *place < end);
+                let before = |end: usize| of_input.iter().filter(|place| **place < end).count();
                 let from = before(span.from);
                 *span = Span { from, len: before(span.from + span.len) - from };
             }
@@ -50,11 +49,13 @@ pub(super) fn part(matrix: &WeightMatrix, rows: &[usize], columns: &[usize]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{branches, gru, lstm, mlp, outputs, residual};
+    use crate::graph::ops::Linear;
+    use crate::graph::ties::Heads;
+    use crate::testing::{attention, branches, gru, lstm, mlp, outputs, residual, transformer};
 
     #[test]
     fn all_elements_make_the_same_network() {
-        for graph in [mlp(), lstm(), residual(4, true), branches([4, 3])] {
+        for graph in [mlp(), lstm(), residual(4, true), branches([4, 3]), transformer(0), attention(2, true)] {
             let ties = Ties::of(&graph);
             assert_eq!(outputs(&graph), outputs(&narrowed(&graph, &ties, &ties.whole()).graph));
         }
@@ -93,5 +94,40 @@ mod tests {
         assert_eq!(shapes, [(8, 2), (8, 2), (2, 2)]);
         assert_eq!(narrow.matrices[2].data[1], graph.matrices[2].data[2]);
         assert_eq!(narrow.state_len(), 4);
+    }
+
+    #[test]
+    fn heads_and_elements_that_add_nothing_go_without_a_trace() {
+        for (kv_heads, is_rotated) in [(4, false), (2, false), (2, true)] {
+            let mut graph = attention(kv_heads, is_rotated);
+            let ties = Ties::of(&graph);
+            let mut kept = ties.whole();
+            let Heads { keys, values } = &ties.heads[0];
+            [keys[1], values[1]].into_iter().for_each(|group| kept[group].clear());
+            // Every head loses two other elements.
+            for (head, group) in values.iter().chain(keys).enumerate().filter(|(_, group)| ties.lens[**group] == 8) {
+                kept[*group].retain(|element| is_rotated || element / 2 != head % 4);
+            }
+            let read = ties.places(&ties.cols[1], &kept);
+            let WeightMatrix { cols, data, .. } = &mut graph.matrices[1];
+            data.iter_mut().enumerate().filter(|(i, _)| !read.contains(&(i % *cols))).for_each(|(_, w)| *w = 0.0);
+            let made = ties.row_places(0, &kept);
+            let queries: Vec<usize> = (0..32).filter(|row| !made.contains(row)).collect();
+            for node in &mut graph.nodes {
+                if let NodeKind::Linear(Linear { matrix: 0, bias }) = &mut node.kind {
+                    queries.iter().for_each(|&row| bias[row] = 0.0);
+                }
+            }
+            queries.iter().for_each(|&row| graph.matrices[0].data[3 * row..][..3].fill(0.0));
+            let narrow = narrowed(&graph, &ties, &kept).graph;
+            let attention = narrow.nodes.iter().find_map(|node| match node.kind {
+                NodeKind::Attention(attention) => Some([attention.heads, attention.kv_heads, attention.dim]),
+                _ => None,
+            });
+            assert_eq!(attention, Some([4 - 4 / kv_heads, kv_heads - 1, if is_rotated { 8 } else { 6 }]));
+            for (a, b) in outputs(&graph).iter().flatten().zip(outputs(&narrow).iter().flatten()) {
+                assert!((a - b).abs() < 1e-6, "{a} and {b}");
+            }
+        }
     }
 }

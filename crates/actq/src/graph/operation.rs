@@ -44,6 +44,12 @@ pub enum Elements {
     Inputs,
     /// These parts of the inputs, one after the other.
     Parts(Vec<Range<usize>>),
+    /// Each from those of its head in the input, `[.., head, element]` with this many elements: only whole heads can be
+    /// removed.
+    Heads(usize),
+    /// From attention, with these heads of queries and of keys, and elements of a head: inputs are `[token, head, element]`
+    /// of queries, keys and values.
+    Attention([usize; 3]),
     /// Together from outside the network, or from all elements of the inputs: neither they nor those can be removed.
     Whole,
 }

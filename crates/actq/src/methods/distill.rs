@@ -11,6 +11,7 @@ pub mod compact;
 mod cut;
 pub mod dimension;
 pub mod feedback;
+mod heads;
 mod latent;
 pub mod lessons;
 pub mod objective;

@@ -331,7 +331,14 @@ impl Operation for Attention {
     }
 
     fn elements(&self) -> Elements {
-        Elements::Whole
+        Elements::Attention([self.heads, self.kv_heads, self.dim])
+    }
+
+    fn keep_units(&mut self, _: usize, units: &[usize]) {
+        let [width, _] = self.widths();
+        let of_token: Vec<usize> = units.iter().copied().take_while(|unit| *unit < width).collect();
+        let heads = of_token.chunk_by(|a, b| a / self.dim == b / self.dim).count();
+        *self = Self { heads, kv_heads: heads * self.kv_heads / self.heads, dim: of_token.len() / heads, ..*self };
     }
 
     /// Keys with the number of tokens since the reset before them, and values: rings of `context` tokens.

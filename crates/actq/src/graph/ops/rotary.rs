@@ -66,7 +66,11 @@ impl Operation for Rotary {
     }
 
     fn elements(&self) -> Elements {
-        Elements::Whole
+        Elements::Heads(self.dim)
+    }
+
+    fn keep_units(&mut self, _: usize, units: &[usize]) {
+        self.heads = units.iter().take_while(|unit| **unit < self.heads * self.dim).count() / self.dim;
     }
 
     fn forward(&self, run: &Forward<'_>, _: &mut NodeState) -> (Array2<f32>, Saved) {

@@ -1,11 +1,29 @@
 //! Removal of units: all their rows and columns at once. The matrices that read them take over what they contributed.
 
 use super::compact::{absorb, add_to_bias};
+use super::heads::{HeadUnits, ranked};
 use super::units::{Units, units};
 use crate::calibrate::moments::Moments;
 use crate::graph::narrow::{Narrowed, narrowed};
 use crate::graph::ties::Ties;
 use crate::graph::{Graph, WeightMatrix};
+
+/// Units that a network can lose.
+#[derive(Clone, Debug)]
+pub(super) struct Removable {
+    /// Units with their errors of removal.
+    pub(super) units: Vec<(Units, Vec<f64>)>,
+    pub(super) heads: Vec<HeadUnits>,
+}
+
+/// Units that a network keeps.
+#[derive(Clone, Debug)]
+pub(super) struct Kept {
+    /// Share of the units.
+    pub(super) share: f64,
+    /// Heads of every attention, and elements of each.
+    pub(super) heads: Vec<[usize; 2]>,
+}
 
 /// Returns the number of units in a share.
 fn kept_units(units: &Units, share: f64) -> usize {
@@ -33,36 +51,34 @@ impl Cut {
         Self { graph: graph.clone(), rows: all(|m| m.rows), columns: all(|m| m.cols), former, error: 0.0 }
     }
 
-    /// Keeps the given share of all units, the first ones: for counting bytes only.
+    /// Keeps the given share of all units, the first ones, and the fewest heads: for counting bytes only.
     pub(super) fn for_size(graph: &Graph, share: f64) -> Self {
         let ties = Ties::of(graph);
         let mut kept = ties.whole();
         units(graph, &ties).iter().for_each(|units| kept[units.group].truncate(kept_units(units, share)));
+        for heads in HeadUnits::of(graph, &ties, None) {
+            let [fewest, least] = [0, 1].map(|which| heads.shares(which, &[share]));
+            heads.keep([fewest[0], least[0]], &mut kept);
+        }
         Self::nothing(graph).keep(&ties, &kept)
     }
 
-    /// Keeps the given share of all units: those with the largest `removals`. The contribution of the others
-    /// is estimated from these by the moments of every matrix's input.
-    pub(super) fn keep_share(
-        graph: &Graph,
-        units: &[Units],
-        removals: &[Vec<f64>],
-        share: f64,
-        moments: &[&Moments],
-    ) -> Self {
+    /// Keeps some of all units: those with the largest errors of removal. The contribution of the others is estimated from
+    /// these by the moments of every matrix's input.
+    pub(super) fn keep_some(graph: &Graph, removable: &Removable, kept: &Kept, moments: &[&Moments]) -> Self {
         let ties = Ties::of(graph);
-        let mut kept = ties.whole();
+        let mut elements = ties.whole();
         let mut cut = Self::nothing(graph);
-        for (units, removals) in units.iter().zip(removals) {
-            let mut ranked: Vec<usize> = (0..units.len).collect();
-            ranked.sort_by(|&a, &b| removals[b].total_cmp(&removals[a]));
-            let gone = ranked.split_off(kept_units(units, share));
-            ranked.sort_unstable();
+        for (units, removals) in &removable.units {
+            let (stay, gone) = ranked(removals, kept_units(units, kept.share));
             cut.error += gone.iter().map(|&unit| removals[unit]).sum::<f64>();
-            kept[units.group] = ranked;
+            elements[units.group] = stay;
+        }
+        for (heads, sizes) in removable.heads.iter().zip(&kept.heads) {
+            cut.error += heads.keep(*sizes, &mut elements);
         }
         for (m, of) in moments.iter().enumerate() {
-            let columns = ties.places(&ties.cols[m], &kept);
+            let columns = ties.places(&ties.cols[m], &elements);
             let gone: Vec<usize> =
                 (0..cut.graph.matrices[m].cols).filter(|c| columns.binary_search(c).is_err()).collect();
             if !gone.is_empty() {
@@ -70,7 +86,7 @@ impl Cut {
                 add_to_bias(&mut cut.graph, m, &contribution);
             }
         }
-        cut.keep(&ties, &kept)
+        cut.keep(&ties, &elements)
     }
 
     /// Removes all elements but these of each group.
@@ -118,7 +134,8 @@ mod tests {
             let removals = set.removals(&graph, &moments, &g);
             let kept = set.len - gone.len();
             let share = kept as f64 / set.len as f64;
-            let cut = Cut::keep_share(&graph, std::slice::from_ref(&set), &[removals], share, &moments);
+            let removable = Removable { units: vec![(set.clone(), removals)], heads: Vec::new() };
+            let cut = Cut::keep_some(&graph, &removable, &Kept { share, heads: Vec::new() }, &moments);
             assert_eq!(cut.graph.state_len() * set.len, graph.state_len() * kept);
             assert!(cut.error < 1e-9, "{}", cut.error);
             for (a, b) in outputs(&graph).iter().flatten().zip(outputs(&cut.graph).iter().flatten()) {

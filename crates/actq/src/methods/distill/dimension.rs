@@ -1,12 +1,15 @@
 //! Hidden vectors whose elements may be permuted, and folded into biases if they are constant. One matrix makes such a
-//! vector, and it reaches only matrices, through elementwise functions.
+//! vector, for every token that it is applied to, and it reaches only matrices, through elementwise functions.
+
+use std::collections::BTreeMap;
 
 use actq_kernels::Width;
 use actq_kernels::math::Function;
 
 use crate::graph::operation::{Operand, Product};
 use crate::graph::ops::Pointwise;
-use crate::graph::{Graph, NodeKind};
+use crate::graph::ties::Ties;
+use crate::graph::{Graph, NodeKind, ValueId};
 
 /// Width of every row per matrix; `None` for rows without bits.
 pub type Widths = Vec<Vec<Option<Width>>>;
@@ -18,8 +21,8 @@ pub struct Dimension {
     pub maker: usize,
     /// Matrices whose columns it feeds.
     pub consumers: Vec<usize>,
-    /// Linear node that makes it.
-    pub node: usize,
+    /// Functions that every element passes.
+    pub functions: Vec<Function>,
 }
 
 impl Dimension {
@@ -31,15 +34,6 @@ impl Dimension {
     /// Returns the dimension that matrix `m` makes.
     pub fn made_by(dimensions: &[Self], m: usize) -> Option<&Self> {
         dimensions.iter().find(|d| d.maker == m)
-    }
-
-    /// Returns the functions that every element passes.
-    pub fn functions(&self, graph: &Graph) -> Vec<Function> {
-        let function = |node: usize| match graph.nodes[node].kind {
-            NodeKind::Pointwise(Pointwise(function)) => Some(function),
-            _ => None,
-        };
-        elementwise(graph, self.node).unwrap_or_default().into_iter().filter_map(function).collect()
     }
 
     /// Returns how many of its elements have bits.
@@ -56,51 +50,63 @@ impl Dimension {
 
 /// Finds the dimensions of a graph.
 pub fn dimensions(graph: &Graph) -> Vec<Dimension> {
-    let linear = |n: usize| match &graph.nodes[n].kind {
-        NodeKind::Linear(linear) if uses(graph, linear.matrix) == 1 => Some(linear.matrix),
-        _ => None,
-    };
-    (0..graph.nodes.len())
-        .filter_map(|node| {
-            let maker = linear(node)?;
-            let value = elementwise(graph, node)?.last().map_or(node, |last| *last) + 1;
-            let readers = graph.readers(value).into_iter();
-            let consumers = readers.map(|reader| consumers(graph, reader)).collect::<Option<Vec<_>>>()?.concat();
-            (!consumers.is_empty()).then_some(Dimension { maker, consumers, node })
-        })
-        .collect()
-}
-
-/// Returns the functions that a node's output passes before anything else reads it; `None` if it becomes the network's
-/// output.
-pub(super) fn elementwise(graph: &Graph, node: usize) -> Option<Vec<usize>> {
-    let mut functions = Vec::new();
-    let mut value = node + 1;
-    while value != graph.output() {
-        match graph.readers(value)[..] {
-            [next] if matches!(graph.nodes[next].kind, NodeKind::Pointwise(_)) => {
-                functions.push(next);
-                value = next + 1;
-            }
-            _ => return Some(functions),
+    let ties = Ties::of(graph);
+    let has = |value: ValueId, group: usize| ties.values[value].contains(&group);
+    let mut nodes: BTreeMap<usize, Vec<usize>> = ties.free.iter().map(|&group| (group, Vec::new())).collect();
+    for (n, node) in graph.nodes.iter().enumerate() {
+        let mut groups: Vec<usize> =
+            node.inputs.iter().chain([&(n + 1)]).flat_map(|v| ties.values[*v].clone()).collect();
+        groups.sort_unstable();
+        groups.dedup();
+        for group in groups {
+            nodes.entry(group).and_modify(|nodes| nodes.push(n));
         }
     }
-    None
+    let of_group = |(&group, nodes): (&usize, &Vec<usize>)| {
+        let mut maker = None;
+        let (mut read, mut functions): (Vec<usize>, Option<Vec<Function>>) = (Vec::new(), None);
+        // Functions that the vector has passed, as each value holds it.
+        let mut passed = BTreeMap::<ValueId, Vec<Function>>::new();
+        for &n in nodes {
+            let node = &graph.nodes[n];
+            let mut before = node.inputs.iter().filter_map(|value| passed.get(value));
+            let first = before.next().cloned();
+            let is_one = before.all(|other| Some(other) == first.as_ref());
+            match (&node.kind, first) {
+                (NodeKind::Pointwise(Pointwise(function)), Some(mut before)) => {
+                    before.push(*function);
+                    passed.insert(n + 1, before);
+                }
+                (NodeKind::Concat(_), Some(before)) if is_one => {
+                    if has(n + 1, group) {
+                        passed.insert(n + 1, before);
+                    }
+                }
+                (NodeKind::Linear(linear), None) if maker.is_none_or(|maker| maker == linear.matrix) => {
+                    maker = Some(linear.matrix);
+                    passed.insert(n + 1, Vec::new());
+                }
+                (_, Some(before)) if !has(n + 1, group) && *functions.get_or_insert(before.clone()) == before => {
+                    read.extend(consumers(graph, n)?);
+                }
+                _ => return None,
+            }
+        }
+        let maker = maker.filter(|&maker| ties.rows[maker] == (1, vec![group]))?;
+        read.sort_unstable();
+        read.dedup();
+        let is_all = read.iter().all(|&m| ties.cols[m] == [group]);
+        functions.filter(|_| is_all).map(|functions| Dimension { maker, consumers: read, functions })
+    };
+    nodes.iter().filter_map(of_group).collect()
 }
 
-/// Returns how many nodes use a matrix.
-pub(super) fn uses(graph: &Graph, matrix: usize) -> usize {
-    graph.nodes.iter().filter(|node| node.kind.products().iter().any(|p| p.matrix == matrix)).count()
-}
-
-/// Returns the matrices through which a node reads its input, if it reads it in no other way and no other node uses
-/// them.
-pub(super) fn consumers(graph: &Graph, node: usize) -> Option<Vec<usize>> {
+/// Returns the matrices through which a node reads its input, if it reads it in no other way.
+fn consumers(graph: &Graph, node: usize) -> Option<Vec<usize>> {
     let of_input = |product: &Product| product.operand == Operand::Input;
     let products = graph.nodes[node].kind.products().into_iter().filter(of_input);
     let matrices: Vec<usize> = products.map(|product| product.matrix).collect();
-    let alone = !matrices.is_empty() && matrices.iter().all(|&m| uses(graph, m) == 1);
-    alone.then_some(matrices)
+    (!matrices.is_empty()).then_some(matrices)
 }
 
 #[cfg(test)]
@@ -134,11 +140,23 @@ pub(super) mod testing {
 mod tests {
     use super::testing::graph;
     use super::*;
+    use crate::testing::transformer;
 
     #[test]
     fn dimensions_feed_only_matrices() {
         // The second matrix's output is also summed, the third's is the network's output.
-        let expected = Dimension { maker: 0, consumers: vec![1], node: 0 };
+        let expected = Dimension { maker: 0, consumers: vec![1], functions: vec![Function::Tanh] };
         assert_eq!(dimensions(&graph()), vec![expected]);
+    }
+
+    #[test]
+    fn layers_of_several_tokens_have_dimensions() {
+        for context in [0, 3] {
+            let graph = transformer(context);
+            let of =
+                |Dimension { maker, consumers, functions }| (graph.matrices[maker].rows, consumers.len(), functions);
+            let found: Vec<_> = dimensions(&graph).into_iter().map(of).collect();
+            assert_eq!(found, vec![(32, 1, vec![Function::Gelu]); 2], "context {context}");
+        }
     }
 }

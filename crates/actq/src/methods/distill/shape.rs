@@ -5,8 +5,9 @@ use rayon::prelude::*;
 
 use super::activations::{allocated, least_bytes as least, packed};
 use super::allocate::{Rows, energies, expected};
-use super::cut::Cut;
+use super::cut::{Cut, Kept};
 use super::dimension::{Dimension, Widths, dimensions};
+use super::heads::HeadUnits;
 use super::size::{Size, cycles_of_elements};
 use super::statistics::RowStatistics;
 
@@ -76,20 +77,40 @@ pub(super) fn shape(Target { statistics, rate, options }: Target<'_>, recipe: Re
     if !loses_units(options, &forced) {
         return of_cut(Cut::nothing(graph));
     }
-    let (units, of_units) = statistics.units(even);
-    if units.is_empty() {
-        return of_cut(Cut::nothing(graph));
-    }
-    let shapes: Vec<Result<Shape>> =
-        SHARES.par_iter().map(|share| of_cut(Cut::keep_share(graph, units, &of_units, *share, &of_inputs))).collect();
-    // The last error names the fewest bytes: those of the fewest units.
+    let removable = statistics.removable(even);
     let most = rate.cycles();
-    let best = shapes.into_iter().reduce(|best, next| match (&best, &next) {
-        (Ok(a), Ok(b)) if b.is_better(a, most) => next,
-        (Err(_), _) => next,
-        _ => best,
-    });
-    best.unwrap_or_else(|| of_cut(Cut::nothing(graph)))
+    // The last error names the fewest bytes: those of the fewest units.
+    let better = |best: &Result<Shape>, next: &Result<Shape>| match (best, next) {
+        (Ok(best), Ok(next)) => next.is_better(best, most),
+        (best, _) => best.is_err(),
+    };
+    let of_kept = |kept: &Kept| of_cut(Cut::keep_some(graph, &removable, kept, &of_inputs));
+    let mut kept = Kept { share: 1.0, heads: removable.heads.iter().map(HeadUnits::sizes).collect() };
+    let mut best = of_cut(Cut::nothing(graph));
+    let mut choose = |kept: &mut Kept, all: Vec<Kept>| {
+        let shapes: Vec<Result<Shape>> = all.par_iter().map(of_kept).collect();
+        for (next, shape) in all.into_iter().zip(shapes) {
+            if better(&best, &shape) {
+                (*kept, best) = (next, shape);
+            }
+        }
+    };
+    if !removable.units.is_empty() {
+        let all = SHARES[1..].iter().map(|&share| Kept { share, ..kept.clone() }).collect();
+        choose(&mut kept, all);
+    }
+    for (i, heads) in removable.heads.iter().enumerate() {
+        for which in [0, 1] {
+            let of_size = |size: usize| {
+                let mut next = kept.clone();
+                next.heads[i][which] = size;
+                next
+            };
+            let all = heads.shares(which, &SHARES[1..]).into_iter().map(of_size).collect();
+            choose(&mut kept, all);
+        }
+    }
+    best
 }
 
 impl Shape {
@@ -151,8 +172,9 @@ pub(super) fn values(graph: &Graph, rate: Rate, options: &Options) -> usize {
 mod tests {
     use super::*;
     use crate::budget::Budget;
+    use crate::graph::NodeKind;
     use crate::methods::{Method, PreparedMethod};
-    use crate::testing::{dataset, lstm};
+    use crate::testing::{dataset, lstm, transformer};
 
     #[test]
     fn one_matrix_may_have_another_width() {
@@ -180,5 +202,26 @@ mod tests {
             let error = bytes(least(steps) - 1).expect_err("one byte less");
             assert_eq!(error.budget().map(|small| small.bytes), Some(least(steps)));
         }
+    }
+
+    #[test]
+    fn an_attention_that_adds_little_loses_heads_and_elements() {
+        let mut graph = transformer(3);
+        let of_attentions = |graph: &Graph| -> Vec<[usize; 2]> {
+            let sizes = graph.nodes.iter().map(|node| match &node.kind {
+                NodeKind::Attention(attention) => Some([attention.heads, attention.dim]),
+                _ => None,
+            });
+            sizes.flatten().collect()
+        };
+        assert_eq!(of_attentions(&graph), [[4, 4]; 2]);
+        // The layer that reads the second one; each block has six layers, after the first one of all.
+        graph.matrices[10].data.iter_mut().for_each(|weight| *weight *= 1e-3);
+        let recording = dataset(&graph, 4, 60);
+        let method = PreparedMethod::new(&graph, Method::Distill, Some(&recording), |_| {}).expect("statistics");
+        let options = Options { steps: Some(1), ..Options::new(Method::Distill, Budget::Width(Width::W2)) };
+        let made = method.quantize(Rate::BitsPerWeight(4.0), &options, |_| {}).expect("a network");
+        let [first, second] = of_attentions(&made.graph)[..] else { panic!("two attentions") };
+        assert!(first[0] > 2 && second == [1, 4], "{first:?} {second:?}");
     }
 }

@@ -113,7 +113,7 @@ impl<'a> Size<'a> {
     pub fn of_functions(&self, dimension: &Dimension, len: usize) -> f64 {
         let rates = self.core.rates();
         let of = |function: &Function| rates.of_elements(OpKind::Function(*function), len).cycles as f64;
-        dimension.functions(self.graph).iter().map(of).sum()
+        dimension.functions.iter().map(of).sum()
     }
 
     /// Returns all counted bytes: the balance, the vectors, and all matrices. Rows without bits and the columns that

@@ -8,7 +8,9 @@ use std::time::Duration;
 use nalgebra::DMatrix;
 
 use super::balance::{MixedUnits, balance, mixed_units};
+use super::cut::Removable;
 use super::dimension::{Dimension, dimensions};
+use super::heads::{HeadUnits, Measured};
 use super::removal::{Effect, Reading, even_layer_errors, in_place};
 use super::schedule::{Bounds, most_steps};
 use super::units::{Units, units};
@@ -42,8 +44,8 @@ pub struct RowStatistics {
     /// energies.
     alone: Vec<Option<Vec<f64>>>,
     together: OnceLock<Vec<Option<Vec<f64>>>>,
-    /// Units, each set with its errors of removal.
-    units: OnceLock<(Vec<Units>, Vec<Vec<f64>>)>,
+    /// Units with their errors of removal.
+    removable: OnceLock<Removable>,
     /// Moments of every matrix's input, and `G`.
     pub(super) moments: Vec<(Moments, DMatrix<f64>)>,
     /// Held-out observations, to report the error on while something is learned.
@@ -88,7 +90,7 @@ impl RowStatistics {
             outputs,
             alone,
             together: OnceLock::new(),
-            units: OnceLock::new(),
+            removable: OnceLock::new(),
             watched: None,
             moments: moments.into_iter().zip(output_moments).collect(),
             outputs_of,
@@ -129,16 +131,27 @@ impl RowStatistics {
         removals.into()
     }
 
-    /// Returns the units with their errors of removal, [`even_layer_errors`] if `even`.
-    pub(super) fn units(&self, even: bool) -> (&[Units], Cow<'_, [Vec<f64>]>) {
-        let (units, removals) = self.units.get_or_init(|| {
-            let of_inputs: Vec<&Moments> = self.moments.iter().map(|(input, _)| input).collect();
-            let units = units(self.graph(), &Ties::of(self.graph()));
-            let removals = units.iter().map(|units| units.removals(self.graph(), &of_inputs, &self.outputs)).collect();
-            (units, removals)
+    /// Returns the units with their errors of removal, [`even_layer_errors`] if `even`. Heads keep theirs: without one,
+    /// what was added to its output remains.
+    pub(super) fn removable(&self, even: bool) -> Cow<'_, Removable> {
+        let measured = self.removable.get_or_init(|| {
+            let (graph, ties, g) = (self.graph(), Ties::of(self.graph()), &self.outputs);
+            let moments: &[&Moments] = &self.moments.iter().map(|(input, _)| input).collect::<Vec<_>>();
+            let with_removals = |units: Units| {
+                let removals = units.removals(graph, moments, g);
+                (units, removals)
+            };
+            let heads = HeadUnits::of(graph, &ties, Some(Measured { moments, g, constant: &self.alone }));
+            Removable { units: units(graph, &ties).into_iter().map(with_removals).collect(), heads }
         });
-        let evened = || removals.iter().map(|of| even_layer_errors(of, self.mean_action_error())).collect();
-        (units, if even { Cow::Owned(evened()) } else { removals.into() })
+        if !even {
+            return Cow::Borrowed(measured);
+        }
+        let mut evened = measured.clone();
+        for (_, removals) in &mut evened.units {
+            *removals = even_layer_errors(removals, self.mean_action_error());
+        }
+        Cow::Owned(evened)
     }
 
     /// Returns the error of a network that always gives the mean action.

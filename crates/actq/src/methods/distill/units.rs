@@ -1,11 +1,11 @@
-//! Units: elements that can only be removed together ([`Ties`]). They are cell units, residual-stream elements, and
-//! concatenated elements. A unit has a row in every matrix that makes such a vector; of a cell, one for each gate. It
-//! has a column in every matrix that reads one. So a network with fewer units is far smaller than one that lacks as
-//! many rows.
+//! Units: elements that can only be removed together ([`Ties`]). They are cell units, residual-stream elements,
+//! concatenated elements, and those of attention ([`super::heads`]). A unit has a row in every matrix that makes such a
+//! vector; of a cell, one for each gate. It has a column in every matrix that reads one. So a network with fewer units is
+//! far smaller than one that lacks as many rows.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::dimension::{Dimension, dimensions, uses};
+use super::dimension::{Dimension, dimensions};
 use super::removal::{Effect, Reading, together};
 use crate::calibrate::moments::Moments;
 use crate::graph::operation::Operand;
@@ -23,6 +23,29 @@ pub(super) struct Units {
 }
 
 impl Units {
+    /// Finds the readers of a group; `None` if nothing makes or reads it.
+    pub(super) fn of(graph: &Graph, ties: &Ties, group: usize) -> Option<Self> {
+        let mut reading = BTreeMap::<ValueId, Vec<usize>>::new();
+        for (n, node) in graph.nodes.iter().enumerate() {
+            for product in node.kind.products() {
+                let value = if product.operand == Operand::State { n + 1 } else { node.inputs[0] };
+                reading.entry(value).or_default().push(product.matrix);
+            }
+        }
+        // The moments of a matrix are those of all tokens that it reads.
+        let mut read = BTreeSet::new();
+        let mut readers = Vec::new();
+        for (value, matrices) in reading {
+            for columns in ties.ranges(&ties.values[value], group) {
+                let mut matrices = matrices.clone();
+                matrices.retain(|m| read.insert((*m, columns.start)));
+                readers.extend((!matrices.is_empty()).then_some(Reading { matrices, columns }));
+            }
+        }
+        let is_made = ties.rows.iter().any(|(_, rows)| rows.contains(&group));
+        (is_made && !readers.is_empty()).then(|| Self { group, len: ties.lens[group], readers })
+    }
+
     /// Returns the errors of removing each unit together with those that matter less.
     pub(super) fn removals(&self, graph: &Graph, moments: &[&Moments], g: &[Vec<f64>]) -> Vec<f64> {
         let effects: Vec<Effect> = self.readers.iter().map(|of| Effect::of(graph, of, moments, g)).collect();
@@ -30,31 +53,14 @@ impl Units {
     }
 }
 
-/// Finds the units of a graph. Vectors of which single rows can be removed ([`Dimension`]) have none. Vectors that a
-/// matrix of several nodes makes or reads have none either: the matrix's moments are those of all nodes together.
+/// Finds the units of a graph. Vectors of which single rows can be removed ([`Dimension`]) have none.
 pub(super) fn units(graph: &Graph, ties: &Ties) -> Vec<Units> {
-    let mut reading = BTreeMap::<ValueId, Vec<usize>>::new();
-    for (n, node) in graph.nodes.iter().enumerate() {
-        for product in node.kind.products() {
-            let value = if product.operand == Operand::State { n + 1 } else { node.inputs[0] };
-            reading.entry(value).or_default().push(product.matrix);
-        }
-    }
     let dimensions = dimensions(graph);
-    let of_group = |&group: &usize| {
-        let makers: Vec<usize> = (0..graph.matrices.len()).filter(|&m| ties.rows[m].1.contains(&group)).collect();
-        let of_value = |(&value, matrices): (&ValueId, &Vec<usize>)| {
-            let ranges = ties.ranges(&ties.values[value], group).into_iter();
-            ranges.map(|columns| Reading { matrices: matrices.clone(), columns }).collect::<Vec<_>>()
-        };
-        let readers: Vec<Reading> = reading.iter().flat_map(of_value).collect();
-        let single = makers.iter().any(|&maker| Dimension::made_by(&dimensions, maker).is_some());
-        let mut touched = makers.iter().chain(readers.iter().flat_map(|of| &of.matrices));
-        let alone = touched.all(|&m| uses(graph, m) == 1);
-        let found = alone && !single && !makers.is_empty() && !readers.is_empty();
-        found.then(|| Units { group, len: ties.lens[group], readers })
+    let is_single = |group: usize| {
+        let mut makers = (0..graph.matrices.len()).filter(|&m| ties.rows[m].1.contains(&group));
+        makers.any(|maker| Dimension::made_by(&dimensions, maker).is_some())
     };
-    ties.free.iter().filter_map(of_group).collect()
+    ties.free.iter().filter(|group| !is_single(**group)).filter_map(|&group| Units::of(graph, ties, group)).collect()
 }
 
 #[cfg(test)]
