@@ -20,6 +20,7 @@ pub mod ops;
 mod run;
 pub mod steps;
 pub mod syntax;
+pub(crate) mod tied;
 pub mod ties;
 pub(crate) mod units;
 mod values;

@@ -2,7 +2,7 @@
 
 use actq::data::Dataset;
 use actq::graph::ops::{Add, Attention, Concat, Gru, LayerNorm, Linear, Lstm, Pointwise, Rotary, Span};
-use actq::graph::{Evaluator, Graph, WeightMatrix};
+use actq::graph::{Evaluator, Graph, NodeKind, WeightMatrix};
 use actq::random::Random;
 use actq_kernels::math::Function;
 use ndarray::Array3;
@@ -151,6 +151,18 @@ pub(crate) fn transformer(context: usize) -> Graph {
         x = added(&mut graph, &x, &y);
     }
     layer(&mut graph, &x[tokens - 1..], 2);
+    graph
+}
+
+/// As [`transformer`] of four tokens, whose layers have the same biases for every token.
+pub(crate) fn transformer_of_modules() -> Graph {
+    let mut graph = transformer(0);
+    let mut biases = vec![None; graph.matrices.len()];
+    for node in &mut graph.nodes {
+        if let NodeKind::Linear(linear) = &mut node.kind {
+            linear.bias.clone_from(biases[linear.matrix].get_or_insert(linear.bias.clone()));
+        }
+    }
     graph
 }
 

@@ -2,6 +2,7 @@
 
 use super::denoising::Denoising;
 use super::ops::NodeKind;
+use super::tied::Tied;
 use super::values::{ValueId, WeightMatrix};
 
 /// A node: operation, inputs, and length of the output.
@@ -106,13 +107,27 @@ impl Graph {
         })
     }
 
-    /// Returns the number of values in [`Self::changed_vectors`].
+    /// Returns the number of values in [`Self::changed_vectors`], of which an image holds those that tokens have in common
+    /// once.
     pub fn changed_values(&self, learns: bool) -> usize {
-        let of_node = |node: &Node| -> usize {
-            let vectors = node.kind.vectors().into_iter().zip(node.changed(learns));
-            vectors.filter(|(_, changed)| *changed).map(|(vector, _)| vector.len()).sum()
-        };
-        self.nodes.iter().map(of_node).sum()
+        let copies = Tied::of(self).copies();
+        let vectors = self.nodes.iter().flat_map(|node| node.kind.vectors().into_iter().zip(node.changed(learns)));
+        let counted = vectors.enumerate().filter(|(place, (_, changed))| *changed && !copies.contains(place));
+        counted.map(|(_, (vector, _))| vector.len()).sum()
+    }
+
+    /// Returns for every matrix the number of vectors after it, as [`Self::changed_values`] counts them.
+    pub fn biases(&self) -> Vec<usize> {
+        let copies = Tied::of(self).copies();
+        let mut biases = vec![0; self.matrices.len()];
+        let mut first = 0;
+        for node in &self.nodes {
+            for product in node.kind.products().iter().filter(|product| !copies.contains(&(first + product.bias))) {
+                biases[product.matrix] += 1;
+            }
+            first += node.kind.vectors().len();
+        }
+        biases
     }
 
     /// Returns how often a matrix is used in a step.

@@ -20,7 +20,6 @@ pub mod schedule;
 mod shape;
 pub mod size;
 mod statistics;
-mod tied;
 pub mod train;
 mod trials;
 mod units;

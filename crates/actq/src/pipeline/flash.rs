@@ -4,6 +4,7 @@ use super::quantizer::{QuantizedPolicy, Quantizer};
 use crate::budget::{Budget, BudgetTooSmall, Rate};
 use crate::emit;
 use crate::error::{Error, Result, ensure};
+use crate::graph::tied::Tied;
 use crate::methods::distill::balance::balance_bytes;
 use crate::methods::{Method, Options, Progress, least_bytes};
 use crate::policy::Policy;
@@ -61,13 +62,37 @@ fn fixed_with_balance(quantizer: &Quantizer<'_>, options: &Options) -> Result<us
 
 /// Returns the bytes of an image beside those that a rate in bytes counts.
 fn fixed_bytes(mut policy: Policy, options: &Options) -> Result<usize> {
-    let mut values = 0;
+    let (graph, mut values) = (&mut policy.graph, 0);
     if options.method == Method::Distill {
+        values = graph.changed_values(options.learns());
+        let tied = Tied::of(graph);
         // Use numbers that occur nowhere else, so that no constant is shared with a changed vector.
-        for value in policy.graph.changed_vectors(options.learns()).flatten() {
-            values += 1;
-            *value = f32::from_bits(values);
-        }
+        graph.changed_vectors(options.learns()).flatten().zip(1..).for_each(|(value, n)| *value = f32::from_bits(n));
+        let mut all: Vec<Vec<f32>> = graph.nodes.iter().flat_map(|node| node.kind.vectors()).cloned().collect();
+        tied.take_first(&mut all);
+        graph.nodes.iter_mut().flat_map(|node| node.kind.vectors_mut()).zip(all).for_each(|(vector, of)| *vector = of);
     }
-    Ok(emit::bytes_beside_blocks(&policy)? - 4 * values as usize - balance_bytes(&policy.graph))
+    Ok(emit::bytes_beside_blocks(&policy)? - 4 * values - balance_bytes(&policy.graph))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Recordings;
+    use crate::testing::{dataset, transformer_of_modules};
+
+    #[test]
+    fn vectors_of_several_tokens_count_once() -> Result<()> {
+        let policy = Policy::of("transformer", transformer_of_modules());
+        let recordings = Recordings { calib: Some(dataset(&policy.graph, 10, 20)), heldout: None };
+        let quantizer = Quantizer::new(&policy, &recordings, Method::Distill, None, |_| {})?;
+        let options = |bytes| Options { steps: Some(5), ..Options::new(Method::Distill, Budget::ImageBytes(bytes)) };
+        let refusal = check_budget(&policy, &options(0)).expect_err("no image has 0 bytes");
+        let least = refusal.budget().expect("a budget").bytes;
+        for bytes in [least, least + 1000, least + 2000] {
+            let len = quantizer.quantize(&options(bytes), ())?.image.len();
+            assert!(len <= bytes && 100 * len >= 97 * bytes, "{len} bytes for a budget of {bytes}");
+        }
+        Ok(())
+    }
 }

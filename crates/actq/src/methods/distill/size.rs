@@ -26,6 +26,8 @@ pub struct Size<'a> {
     pub packings: Vec<Vec<Packing>>,
     /// Counted values of the vectors, with all rows.
     pub values: usize,
+    /// Counted vectors after every matrix.
+    pub biases: Vec<usize>,
     /// Runs of every matrix in a step.
     pub runs: Vec<usize>,
     /// `true` for every matrix that adds to the output of another: that of an LSTM's state.
@@ -61,6 +63,7 @@ impl<'a> Size<'a> {
             dimensions,
             packings: Vec::new(),
             values,
+            biases: graph.biases(),
             runs,
             accumulates,
             core: Core::M4f,
@@ -127,7 +130,8 @@ impl<'a> Size<'a> {
 
     /// Returns the bytes of the balance and the vectors.
     pub fn beside(&self, widths: &Widths) -> usize {
-        let removed: usize = self.dimensions.iter().map(|d| widths[d.maker].len() - d.kept(widths)).sum();
+        let of_dimension = |d: &Dimension| self.biases[d.maker] * (widths[d.maker].len() - d.kept(widths));
+        let removed: usize = self.dimensions.iter().map(of_dimension).sum();
         balance_bytes(self.graph) + 4 * self.values.saturating_sub(removed)
     }
 

@@ -1,14 +1,16 @@
 //! Vectors that nodes have in common: a layer or norm that is applied to several tokens or positions is a node for each.
 //! They stay equal while they learn, so that the image holds them once.
 
-use crate::graph::{Graph, NodeKind, Vectors};
+use std::collections::BTreeSet;
+
+use super::{Graph, NodeKind, Vectors};
 
 /// Groups of equal vectors, by their places among all vectors of a graph.
-pub(super) struct Tied(Vec<Vec<usize>>);
+pub(crate) struct Tied(Vec<Vec<usize>>);
 
 impl Tied {
     /// Finds them: biases of one matrix, and norms whose outputs go to the same matrices.
-    pub(super) fn of(graph: &Graph) -> Self {
+    pub(crate) fn of(graph: &Graph) -> Self {
         let mut modules: Vec<(&NodeKind, Vec<usize>, Vec<usize>)> = Vec::new();
         let mut first = 0;
         for (index, node) in graph.nodes.iter().enumerate() {
@@ -31,8 +33,13 @@ impl Tied {
         Self(modules.into_iter().filter(|(.., places)| places.len() > 1).flat_map(of_vector).collect())
     }
 
+    /// Returns the places of all vectors but the first one of each group.
+    pub(crate) fn copies(&self) -> BTreeSet<usize> {
+        self.0.iter().flat_map(|group| &group[1..]).copied().collect()
+    }
+
     /// Gives every vector of a group the sum of their derivatives.
-    pub(super) fn sum(&self, derivatives: &mut Vectors) {
+    pub(crate) fn sum(&self, derivatives: &mut Vectors) {
         let mut all: Vec<&mut Vec<f32>> = derivatives.iter_mut().flatten().collect();
         for group in &self.0 {
             let mut sum = vec![0.0; all[group[0]].len()];
@@ -44,7 +51,7 @@ impl Tied {
     }
 
     /// Gives every vector of a group what the first one has.
-    pub(super) fn take_first<T: Clone>(&self, of_vectors: &mut [T]) {
+    pub(crate) fn take_first<T: Clone>(&self, of_vectors: &mut [T]) {
         for group in &self.0 {
             group.iter().for_each(|&place| of_vectors[place] = of_vectors[group[0]].clone());
         }
@@ -67,17 +74,11 @@ mod tests {
     use super::*;
     use crate::budget::{Budget, Rate};
     use crate::methods::{Method, Options, PreparedMethod};
-    use crate::testing::{dataset, transformer};
+    use crate::testing::{dataset, transformer_of_modules};
 
     #[test]
     fn what_tokens_have_in_common_stays_equal() {
-        let mut graph = transformer(0);
-        let mut biases = vec![None; graph.matrices.len()];
-        for node in &mut graph.nodes {
-            if let NodeKind::Linear(linear) = &mut node.kind {
-                linear.bias.clone_from(biases[linear.matrix].get_or_insert(linear.bias.clone()));
-            }
-        }
+        let graph = transformer_of_modules();
         let recording = dataset(&graph, 2, 120);
         let method = PreparedMethod::new(&graph, Method::Distill, Some(&recording), |_| {}).expect("statistics");
         let groups = Tied::of(method.graph()).0;
