@@ -1,59 +1,96 @@
 """Drives the task: 100 episodes with the f32 network, or with images.
 
-Usage: python evaluate.py POLICY.onnx|IMAGE.actq ...
+Usage: python evaluate.py [--late PERIODS] POLICY.onnx|IMAGE.actq ...
 """
 
+import argparse
 import json
-import sys
+import subprocess
 
-import actq
 import numpy as np
 import onnxruntime
-from task import DONE, STEPS, Task
+from task import ACTIONS, DONE, STEPS, Task
 
 EPISODES, FIRST_SEED = 100, 1000
 
 
-class Network:
-    """The f32 network, with the steps of sampler.json."""
+class Image:
+    """`actq serve`, whose network takes some control periods."""
 
-    def __init__(self, path):
-        self.session = onnxruntime.InferenceSession(path)
-        with open("sampler.json") as file:
-            sampler = json.load(file)
-        self.steps, self.execute, self.action = sampler["steps"], sampler["execute"], sampler["action"]
-        self.random = np.random.default_rng(0)
+    def __init__(self, path, late):
+        command = ["actq", "serve", path, "--late", str(late)]
+        self.served = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def reset(self):
-        self.left = []
+        self.served.stdin.write(b"R")
 
     def __call__(self, frame):
-        if not self.left:
-            shape = self.session.get_inputs()[0].shape
-            chunk = self.random.normal(size=shape).astype(np.float32)
-            for step in range(self.steps):
-                time = np.full((1, 1), step / self.steps, np.float32)
-                (velocity,) = self.session.run(None, {"chunk": chunk, "time": time, "frame": frame[None]})
-                chunk = chunk + velocity / np.float32(self.steps)
-            actions = chunk[0] * self.action["std"] + self.action["mean"]
-            self.left = list(np.clip(actions, self.action["low"], self.action["high"])[: self.execute])
-        return self.left.pop(0)
+        self.served.stdin.write(b"S" + frame.tobytes())
+        self.served.stdin.flush()
+        return np.frombuffer(self.served.stdout.read(4 * ACTIONS), np.float32)
+
+
+class Network:
+    """The f32 network with the steps of sampler.json, played as an image is."""
+
+    def __init__(self, path, late):
+        self.session, self.late = onnxruntime.InferenceSession(path), late
+        with open("sampler.json") as file:
+            self.sampler = json.load(file)
+        self.random = np.random.default_rng(0)
+        self.reset()
+
+    def reset(self):
+        self.chunk, self.age, self.wait = np.zeros((0, ACTIONS)), 0, None
+
+    def run(self, frame):
+        steps, action = self.sampler["steps"], self.sampler["action"]
+        chunk = self.random.normal(size=self.session.get_inputs()[0].shape).astype(np.float32)
+        for step in range(steps):
+            time = np.full((1, 1), step / steps, np.float32)
+            (velocity,) = self.session.run(None, {"chunk": chunk, "time": time, "frame": frame[None]})
+            chunk = chunk + velocity / np.float32(steps)
+        return np.clip(chunk[0] * action["std"] + action["mean"], action["low"], action["high"])
+
+    def __call__(self, frame):
+        if self.wait is None and self.age >= min(self.sampler["execute"], len(self.chunk)):
+            self.next, self.wait = self.run(frame), self.late
+        if self.wait == 0:
+            old, new = self.chunk[self.age :], self.next[self.late :]
+            fading = min(self.sampler["overlap"], len(old), len(new))
+            for k in range(fading):
+                share = (k + 1) / (fading + 1)
+                new[k] = old[k] * (1 - share) + new[k] * share
+            self.chunk, self.age, self.wait = self.next, self.late, None
+        elif self.wait:
+            self.wait -= 1
+        self.age += 1
+        played = self.chunk[self.age - 1 : self.age]
+        return played[0] if len(played) else np.full(ACTIONS, np.nan)
 
 
 def main():
+    parser = argparse.ArgumentParser(usage=__doc__)
+    parser.add_argument("--late", type=int, default=0)
+    parser.add_argument("policies", nargs="+")
+    args = parser.parse_args()
     task = Task()
-    for name in sys.argv[1:]:
-        policy = actq.Head(actq.Image.load(name)) if name.endswith(".actq") else Network(name)
+    for name in args.policies:
+        policy = (Image if name.endswith(".actq") else Network)(name, args.late)
         successes = 0
         for seed in range(FIRST_SEED, FIRST_SEED + EPISODES):
             frame = task.reset(seed)
             policy.reset()
+            # Before the first chunk the arms stay where they are.
+            action = frame[:ACTIONS]
             for _ in range(STEPS):
-                frame, reward = task.step(np.squeeze(policy(np.float32(frame))))
+                answer = policy(np.float32(frame))
+                action = action if np.isnan(answer).any() else answer
+                frame, reward = task.step(action)
                 if reward == DONE:
                     successes += 1
                     break
-        print(f"{name}: {successes} of {EPISODES} episodes", flush=True)
+        print(f"{name}, {args.late} periods late: {successes} of {EPISODES} episodes", flush=True)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@ import numpy as np
 from gym_aloha.env import AlohaEnv
 from gym_aloha.tasks.sim import TransferCubeTask
 
-# Steps of an episode, 50 a second, and the reward when the left arm has the cube.
-STEPS, DONE = 300, 4
+# Joints of both arms; steps of an episode, 50 a second; and the reward when the left arm has the cube.
+ACTIONS, STEPS, DONE = 14, 300, 4
 
 
 class Task:

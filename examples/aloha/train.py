@@ -113,7 +113,7 @@ def main():
     export(network, out)
     ends = [actions.flatten(0, 1).min(0).values, actions.flatten(0, 1).max(0).values]
     action = {"mean": network.action_mean, "std": network.action_deviation, "low": ends[0], "high": ends[1]}
-    sampler = {"kind": "flow", "steps": 4, "execute": 8, "time": {"from": 0, "to": 1}}
+    sampler = {"kind": "flow", "steps": 4, "execute": 8, "overlap": 8, "time": {"from": 0, "to": 1}}
     with open("sampler.json", "w") as file:
         json.dump({**sampler, "action": {key: values.tolist() for key, values in action.items()}}, file)
 

@@ -1,12 +1,13 @@
 //! The running image: its head in slices, and the scrub of its bytes.
 
+use core::mem;
 use core::task::Poll;
 
 #[cfg(feature = "attention")]
 use actq_controller::prefix::Transfer;
 use actq_controller::scrub::Scrub;
 use actq_controller::{Check, Endpoint, Shared};
-use actq_kernels::Head;
+use actq_kernels::{Head, StepError};
 #[cfg(feature = "attention")]
 use actq_link::code::Refusal;
 
@@ -25,7 +26,15 @@ pub struct Running<'i, 's> {
     head: Head<'i, 's>,
     bytes: &'i [u8],
     scrub: Scrub,
-    step: Option<Started>,
+    phase: Phase,
+    /// Sequence number of the newest observation's frame.
+    of: u32,
+    /// Time of the step's beginning, in µs.
+    begun: u32,
+    /// `true` if the network has taken longer than from one observation to the next: it will again.
+    is_slow: bool,
+    /// `true` if a period has passed without an action, of which the head does not know yet.
+    has_passed: bool,
     /// Longest step so far, in µs.
     longest_step: u32,
     /// The next prefix, and the lifetime of the head's.
@@ -33,12 +42,18 @@ pub struct Running<'i, 's> {
     pub(crate) transfer: Transfer<'s>,
 }
 
-/// A started step.
-#[derive(Clone, Copy)]
-struct Started {
-    /// Sequence number of the observation's frame.
-    of: u32,
-    micros: u32,
+/// Phase of a step.
+#[derive(Clone, Copy, PartialEq)]
+enum Phase {
+    /// There is none.
+    Idle,
+    Begun,
+    /// The network runs.
+    Runs,
+    /// The network runs, and the newest observation's period is over for the head.
+    Late,
+    /// The action is ready, and is for the next period.
+    Ready,
 }
 
 impl<'i, 's> Running<'i, 's> {
@@ -55,7 +70,11 @@ impl<'i, 's> Running<'i, 's> {
             head,
             bytes,
             scrub: Scrub::new(sum),
-            step: None,
+            phase: Phase::Idle,
+            of: 0,
+            begun: 0,
+            is_slow: false,
+            has_passed: false,
             longest_step: 0,
             #[cfg(feature = "attention")]
             transfer,
@@ -66,7 +85,7 @@ impl<'i, 's> Running<'i, 's> {
     /// a step; then, and as long as there is none, the controller does not arm, and latches.
     #[cfg(feature = "attention")]
     pub fn refresh<const AXES: usize>(&mut self, safety: &mut impl Shared<AXES>) {
-        if self.step.is_none()
+        if self.phase == Phase::Idle
             && let Some(prefix) = self.transfer.whole()
         {
             let outcome = self.head.set_prefix(prefix).map_err(|_| Refusal::Range);
@@ -78,7 +97,7 @@ impl<'i, 's> Running<'i, 's> {
             is_fresh
         });
         if !is_fresh && self.head.has_prefix() {
-            self.step = None;
+            self.phase = Phase::Idle;
             self.head.clear_prefix();
         }
     }
@@ -97,6 +116,10 @@ impl<'i, 's> Running<'i, 's> {
 
     /// Starts a step on the newest observation, or runs a slice of the current one; returns the frame to send, in
     /// `out`.
+    ///
+    /// Every observation stands for a control period. While the network computes a chunk, those that arrive are answered
+    /// with what the chunk before predicts for their periods, if the image keeps it (an overlap or an ensemble). A chunk
+    /// that is ready late begins with its action for the next period.
     pub fn slice<'b, const AXES: usize, const OBS: usize, const N: usize>(
         &mut self,
         endpoint: &mut Endpoint<'_, OBS, N>,
@@ -104,26 +127,68 @@ impl<'i, 's> Running<'i, 's> {
         safety: &mut impl Shared<AXES>,
         out: &'b mut [u8],
     ) -> Option<&'b [u8]> {
-        let Some(started) = self.step else {
-            let step = endpoint.step(safety)?;
+        let takes = match self.phase {
+            Phase::Idle | Phase::Ready => true,
+            Phase::Begun => false,
+            // A single action is for no particular period: the next observation waits for it.
+            Phase::Runs | Phase::Late => self.head.image().chunk() > 1,
+        };
+        let mut plays = self.phase == Phase::Runs && self.is_slow;
+        if takes && let Some(step) = endpoint.step(safety) {
+            self.of = step.of;
             if step.reset {
                 self.head.reset();
+                (self.phase, self.is_slow) = (Phase::Idle, false);
             }
-            let of = step.of;
-            match self.head.begin(step.observation) {
-                Ok(()) => self.step = Some(Started { of, micros }),
-                Err(error) => return endpoint.acted(of, Err(error), micros, safety, out),
+            if self.phase == Phase::Idle {
+                (self.phase, self.begun, self.has_passed) = (Phase::Begun, micros, false);
+                if let Err(error) = self.head.begin(step.observation) {
+                    self.phase = Phase::Idle;
+                    return endpoint.acted(self.of, Err(error), micros, safety, out);
+                }
+                return None;
             }
+            if self.phase != Phase::Ready {
+                (plays, self.is_slow) = (true, true);
+                self.has_passed |= self.phase == Phase::Runs;
+            }
+        } else if matches!(self.phase, Phase::Idle | Phase::Ready) {
             return None;
+        }
+        if mem::take(&mut self.has_passed) {
+            self.head.pass(1);
+        }
+        let action = if plays {
+            self.phase = Phase::Late;
+            self.head.play().map(Poll::Ready)
+        } else {
+            let budget = SLICE.max(self.head.least_budget());
+            self.head.poll(budget)
         };
-        let budget = SLICE.max(self.head.least_budget());
-        let action = match self.head.poll(budget) {
-            Ok(Poll::Pending) => return None,
+        let action = match action {
+            Ok(Poll::Pending) => {
+                if self.phase == Phase::Begun {
+                    self.phase = Phase::Runs;
+                }
+                return None;
+            }
+            Err(StepError::Stale) if plays => {
+                self.has_passed = true;
+                return None;
+            }
             Ok(Poll::Ready(action)) => Ok(action),
             Err(error) => Err(error),
         };
-        self.step = None;
-        self.longest_step = self.longest_step.max(micros.wrapping_sub(started.micros));
-        endpoint.acted(started.of, action, micros, safety, out)
+        if !plays || action.is_err() {
+            let was = mem::replace(&mut self.phase, Phase::Idle);
+            if was != Phase::Ready {
+                self.longest_step = self.longest_step.max(micros.wrapping_sub(self.begun));
+                if was == Phase::Late && action.is_ok() {
+                    self.phase = Phase::Ready;
+                    return None;
+                }
+            }
+        }
+        endpoint.acted(self.of, action, micros, safety, out)
     }
 }

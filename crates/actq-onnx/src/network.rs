@@ -335,6 +335,7 @@ fn import_model(model: &Model, name: &str, options: &ImportOptions) -> Result<Im
         kind: is_chunk.then(|| sampler.map_or("chunk", |sampler| &sampler.kind).to_owned()),
         chunk: is_chunk.then_some(chunk),
         execute: sampler.and_then(|sampler| sampler.execute),
+        overlap: sampler.and_then(|sampler| sampler.overlap),
         obs_dim: observation.len,
         act_dim: act_len,
         control_hz: options.rate_hz,

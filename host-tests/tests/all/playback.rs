@@ -9,12 +9,21 @@ use actq::graph::{Graph, NodeKind};
 use actq::methods::Activations;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
+use actq_bench::command::{actq, answered, run};
 use actq_bench::networks::Builder;
-use actq_bench::qemu::{self, Server};
+use actq_bench::qemu::{self, Server, step_request};
 use actq_bench::{Target, bits, firmware};
+use actq_controller::breadcrumb::Record;
+use actq_controller::endpoint::Facts;
+use actq_controller::update::NoUpdate;
+use actq_controller::{Axis, Endpoint, Guard, Safety, Settings};
+use actq_firmware_demo::running::{Running, SLICE};
 use actq_kernels::image::{Kind, checksum};
 use actq_kernels::{Head, SavedError, StepError, Width};
-use anyhow::{Result, ensure};
+use actq_link::code::ResetCause;
+use actq_link::report::BUILT_IN;
+use actq_link::{Floats, Message, NO_ACTION, RESET, Receiver, Sender, frame};
+use anyhow::{Context as _, Result, ensure};
 use proptest::prelude::*;
 
 use crate::ops::wide;
@@ -23,11 +32,18 @@ const ACT: usize = 2;
 
 /// An image that returns its observation as the raw output.
 fn echo(chunk: usize, execute: usize, contract: ActionContract) -> ImageBuffer {
+    echo_of(1, chunk, execute, contract)
+}
+
+/// The same, in a number of operations.
+fn echo_of(operations: usize, chunk: usize, execute: usize, contract: ActionContract) -> ImageBuffer {
     let len = chunk * ACT;
     let mut graph = Graph::new(len);
     let unlimited = f32::INFINITY;
     let same = Normalize { mean: vec![0.0; len], scale: vec![1.0; len], pre_clip: unlimited, clip: unlimited };
-    graph.add(NodeKind::from(same), &[0]).expect("it fits");
+    for value in 0..operations {
+        graph.add(NodeKind::from(same.clone()), &[value]).expect("it fits");
+    }
     let kind = if chunk > 1 { Kind::Chunk } else { Kind::Step };
     let policy = Policy { kind, chunk, execute, act_len: ACT, contract, ..Policy::of("echo", graph) };
     policy.check().expect("the policy fits together");
@@ -506,4 +522,107 @@ fn restarts_between_steps_keep_the_bits() -> Result<()> {
     })?;
     ensure!(different > 300, "too few actions differ");
     target.finish()
+}
+
+/// A network that takes several control periods, in the controller: what it predicts for a period is the period's number,
+/// so that this must be the answer to every observation, however long a chunk takes.
+#[test]
+fn a_slow_chunk_is_answered_by_the_one_before() -> Result<()> {
+    const CHUNK: usize = 16;
+    const OBS: usize = CHUNK * ACT;
+    const FRAME: usize = frame::bytes(4 * OBS);
+    const PERIODS: usize = 100;
+    let ensemble = Some(Ensemble { horizon: CHUNK, m: 0.01 });
+    let playbacks = [
+        (8, Playback { overlap: 8, ..Playback::default() }),
+        (1, Playback { ensemble, ..Playback::default() }),
+        (8, Playback::default()),
+    ];
+    for (execute, playback) in playbacks {
+        let contract = ActionContract { playback, ..ActionContract::default() };
+        let buffer = echo_of(400, CHUNK, execute, contract);
+        let image = buffer.image("memory".as_ref())?;
+        let slices = with_head(&buffer, |head| -> Result<usize> {
+            head.begin(&[0.0; OBS])?;
+            let mut polls = 1;
+            while head.poll(SLICE)?.is_pending() {
+                polls += 1;
+            }
+            Ok(polls)
+        })?;
+        ensure!(slices > 15, "only {slices} slices");
+        for turns in [slices + 3, slices.div_ceil(2), slices.div_ceil(5)] {
+            let mut scratch = vec![0; image.scratch_words()];
+            let head = Head::new(image, &mut scratch)?;
+            let mut running = Running::new((head, &mut []), buffer.bytes(), 0);
+            let breadcrumb = Record::report(ResetCause::Power, None);
+            let facts = Facts { image: 0, slot: BUILT_IN, timing: Default::default(), breadcrumb };
+            let settings = Settings { status_period: 0, flash_while_armed: false, quiet: 1 << 20 };
+            let mut endpoint = Endpoint::<OBS, FRAME>::new(Guard::full(&[], u32::MAX >> 1), facts, settings);
+            let (mut safety, mut out) = (Safety::new([Axis::STILL; ACT], 1..=1 << 20, 0), [0; 256]);
+            endpoint.report(0, &mut safety, &mut out).context("the first status reports the token")?;
+            let (mut host, mut answers) = (Sender::new(0), Receiver::<FRAME>::new());
+            let mut answered = vec![0; PERIODS];
+            for (period, count) in answered.iter_mut().enumerate() {
+                let observation: Vec<f32> = (0..OBS).map(|i| (period + i / ACT) as f32).collect();
+                let mut bytes = [0; 256];
+                let sent = host.frame(&Message::Observation(Floats::Values(&observation)), 0, &mut bytes);
+                for byte in [&[0], sent.context("room for a frame")?].concat() {
+                    endpoint.receive(byte, 0, &mut safety, &mut NoUpdate, &mut out);
+                }
+                for _ in 0..turns {
+                    let Some(frame) = running.slice(&mut endpoint, 0, &mut safety, &mut out) else { continue };
+                    for byte in frame {
+                        let Some(received) = answers.push(*byte) else { continue };
+                        let Message::Action { of, values, .. } = received.message else { continue };
+                        let error = values.iter().map(|value| (value - period as f32).abs()).fold(0.0, f32::max);
+                        ensure!(of as usize == period && error < 1e-4, "{values:?} for {of} in period {period}");
+                        *count += 1;
+                    }
+                }
+            }
+            // Without a rest of the chunk before, nothing answers while the network computes.
+            let is_kept = turns > slices || image.overlap() + image.horizon() > 0;
+            let answered = answered.split_off(20);
+            let whole = answered.iter().all(|answers| *answers == 1);
+            ensure!(
+                whole == is_kept && answered.contains(&1),
+                "{turns} of {slices} slices, {playback:?}: {answered:?}"
+            );
+        }
+    }
+    Ok(())
+}
+
+/// A network of `late` control periods, in `actq serve`: what a chunk predicts for a period is the period's number, and a
+/// single action is the number of its observation's period.
+#[test]
+fn a_served_network_is_late() -> Result<()> {
+    const PERIODS: usize = 40;
+    let overlap = Playback { overlap: 8, ..Playback::default() };
+    let average = Playback { ensemble: Some(Ensemble { horizon: 16, m: 0.01 }), ..Playback::default() };
+    let cases = [
+        (16, 8, overlap, 0),
+        (16, 8, overlap, 1),
+        (16, 8, overlap, 7),
+        (16, 1, average, 7),
+        (1, 1, Playback::default(), 3),
+    ];
+    for (chunk, execute, playback, late) in cases {
+        let buffer = echo(chunk, execute, ActionContract { playback, ..ActionContract::default() });
+        let slot = qemu::slot(buffer.bytes())?;
+        let observation = |period| -> Vec<f32> { (0..chunk * ACT).map(|i| (period + i / ACT) as f32).collect() };
+        let episode: Vec<u8> = (0..PERIODS).flat_map(|period| step_request(&observation(period))).collect();
+        let [path, late_of] = [slot.path().to_string_lossy().into_owned(), late.to_string()];
+        let output = run(actq(&["serve", &path, "--late", &late_of]), &[&episode[..], &[RESET], &episode].concat())?;
+        let answers = answered(&output)?.as_chunks().0.iter().map(|value| f32::from_le_bytes(*value));
+        for (i, answer) in answers.step_by(ACT).enumerate() {
+            let period = i % PERIODS;
+            let expected = if chunk > 1 { Some(period) } else { (period / late).checked_sub(1).map(|n| n * late) };
+            let expected = expected.filter(|_| period >= late).map_or(NO_ACTION, |number| number as f32);
+            let is_close = answer.to_bits() == expected.to_bits() || (answer - expected).abs() < 1e-4;
+            ensure!(is_close, "{late} periods late: {answer} in period {period}, expected {expected}");
+        }
+    }
+    Ok(())
 }

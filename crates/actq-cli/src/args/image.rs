@@ -102,6 +102,10 @@ pub(crate) struct ReportArgs {
 pub(crate) struct ServeArgs {
     /// The image
     pub(crate) image: PathBuf,
+    /// The network takes this many control periods, as on a slow processor: until then, observations are answered with the
+    /// rest of the chunk before (docs/FORMAT.md, Playback), or with the last action again
+    #[arg(long, value_name = "PERIODS", default_value_t = 0, conflicts_with = "record")]
+    pub(crate) late: usize,
     /// Record the observations; if the file exists, the recording is FILE-2.npz, FILE-3.npz and so on
     #[arg(long, value_name = "FILE.npz", value_parser = npz)]
     pub(crate) record: Option<PathBuf>,

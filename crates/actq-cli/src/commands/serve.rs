@@ -24,7 +24,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
         args.policy.as_ref().is_some_and(|policy| env::var_os("ACTQ_POLICY").is_none_or(|of| of != **policy));
     let Some(path) = &args.record else {
         ensure!(!is_option, "--policy labels the recording of --record FILE.npz; add that, or remove --policy");
-        return serve(image, io::stdin().lock(), output, |_| {});
+        return serve(image, args.late, io::stdin().lock(), output, |_| {});
     };
     ensure!(
         !is_option || !image.has_around(),

@@ -1,9 +1,10 @@
 //! The pipe protocol ([`actq_link`]), by which a simulator runs an image as its policy over standard input and output.
 
 use std::io::{ErrorKind, Read, Write};
+use std::task::Poll;
 
 use actq::runtime::{prefix_len, take_prefix, with_head};
-use actq_kernels::Image;
+use actq_kernels::{Head, Image, StepError};
 use actq_link::{NO_ACTION, PREFIX, RESET, STEP};
 use anyhow::{Context, Result, bail, ensure};
 
@@ -18,15 +19,74 @@ pub(crate) enum Seen<'a> {
     NoAction,
 }
 
-/// Serves until the input ends. Calls `seen` for every request, after the reply.
+/// A head whose network takes some control periods.
+struct Late {
+    periods: usize,
+    /// Periods until the step that has begun is ready.
+    left: Option<usize>,
+    /// The last action; before the first one, none.
+    action: Vec<f32>,
+}
+
+impl Late {
+    fn reset(&mut self) {
+        self.left = None;
+        self.action.fill(NO_ACTION);
+    }
+
+    /// Sets the action for an observation as the controller does: the one that is ready, else what the chunk before
+    /// predicts, else the last one again. After an error no step is left.
+    fn step(&mut self, head: &mut Head<'_, '_>, observation: &[f32]) -> Result<(), StepError> {
+        let left = self.left.take();
+        if let Some(left @ 1..) = left {
+            self.left = Some(left - 1);
+        } else {
+            if left.is_some() {
+                self.finish(head)?;
+                if head.image().chunk() > 1 {
+                    return Ok(());
+                }
+                // A single action is for no particular period: the next step begins at once.
+            }
+            head.begin(observation)?;
+            // A step that continues a chunk has no operation left.
+            if head.next_op().is_none() || self.periods == 0 {
+                return self.finish(head);
+            }
+            self.left = Some(self.periods - 1);
+        }
+        match head.play() {
+            Ok(action) => self.action.copy_from_slice(action),
+            Err(StepError::Stale) => head.pass(1),
+            Err(error) => {
+                self.left = None;
+                return Err(error);
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, head: &mut Head<'_, '_>) -> Result<(), StepError> {
+        match head.poll(u32::MAX)? {
+            Poll::Ready(action) => self.action.copy_from_slice(action),
+            Poll::Pending => unreachable!("the budget is no limit"),
+        }
+        Ok(())
+    }
+}
+
+/// Serves until the input ends, with a network that takes `late` control periods. Calls `seen` for every request, after the
+/// reply.
 pub(crate) fn serve(
     image: Image<'_>,
+    late: usize,
     mut input: impl Read,
     mut output: impl Write,
     mut seen: impl FnMut(Seen<'_>),
 ) -> Result<()> {
     let mut observation = vec![0.0; image.obs_len() + prefix_len(&image)];
     let no_action = vec![NO_ACTION; image.act_len()];
+    let mut late = Late { periods: late, left: None, action: no_action.clone() };
     with_head(image, |head| {
         loop {
             let mut command = [0u8];
@@ -37,6 +97,7 @@ pub(crate) fn serve(
             match command[0] {
                 RESET => {
                     head.reset();
+                    late.reset();
                     seen(Seen::Reset);
                 }
                 PREFIX => {
@@ -50,9 +111,9 @@ pub(crate) fn serve(
                     let (own, _) = observation.split_at_mut(image.obs_len());
                     read(&mut input, "an observation", own)?;
                     // After an error the head has reset itself.
-                    let (action, what) = match head.step(own) {
-                        Ok(action) => (action, Seen::Observation(&observation)),
-                        Err(_) => (&no_action[..], Seen::NoAction),
+                    let (action, what) = match late.step(head, own) {
+                        Ok(()) => (&late.action, Seen::Observation(&observation)),
+                        Err(_) => (&no_action, Seen::NoAction),
                     };
                     let action: Vec<u8> = action.iter().flat_map(|a| a.to_le_bytes()).collect();
                     let written = output.write_all(&action).and_then(|()| output.flush());

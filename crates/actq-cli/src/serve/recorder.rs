@@ -68,7 +68,7 @@ pub(crate) fn serve_recorded(
     let (sender, receiver) = sync_channel(QUEUE);
     thread::scope(|scope| {
         let recorder = scope.spawn(|| recorder.run(receiver));
-        let served = serve(image, input, output, |seen| {
+        let served = serve(image, 0, input, output, |seen| {
             let event = match seen {
                 Seen::Reset | Seen::NoAction => Event::Begin,
                 Seen::Observation(observation) => Event::Observation(observation.to_vec()),

@@ -133,6 +133,8 @@ pub struct Sampler {
     pub kind: String,
     /// Actions of a chunk that are executed; `None` for all.
     pub execute: Option<usize>,
+    /// Actions that fade from one chunk to the next.
+    pub overlap: Option<usize>,
     /// Input that is the iterate; `None` for the only one with the output's shape.
     pub iterate: Option<String>,
     /// Input that is the time; `None` for the only one of a single value.
@@ -151,7 +153,7 @@ impl Sampler {
     /// For another kind, an unknown key, one of the wrong type, or without a key in which packages differ.
     pub fn parse(bytes: &[u8]) -> Result<Self> {
         /// Keys beside those of denoising steps. The network itself has the time's features and the normalization.
-        const OWN: [&str; 5] = ["kind", "execute", "iterate_input", "time_input", "action"];
+        const OWN: [&str; 6] = ["kind", "execute", "overlap", "iterate_input", "time_input", "action"];
         /// Keys without a default, by kind.
         const STATED: [(&str, &[&str]); 2] = [
             ("flow", &["steps", "time"]),
@@ -172,7 +174,7 @@ impl Sampler {
             }
         }
         object.retain(|_, value| !value.is_null());
-        let [of_kind, execute, iterate, time, action] = OWN.map(|key| object.remove(key));
+        let [of_kind, execute, overlap, iterate, time, action] = OWN.map(|key| object.remove(key));
         let text = |key: &str, value: Option<Value>| match value {
             None => Ok(None),
             Some(Value::String(text)) => Ok(Some(text)),
@@ -194,8 +196,9 @@ impl Sampler {
         Ok(Self {
             kind: of_kind,
             execute: execute.map(serde_json::from_value).transpose().context("execute")?,
-            iterate: text(OWN[2], iterate)?,
-            time: text(OWN[3], time)?,
+            overlap: overlap.map(serde_json::from_value).transpose().context("overlap")?,
+            iterate: text("iterate_input", iterate)?,
+            time: text("time_input", time)?,
             action: action.map(serde_json::from_value).transpose().context("action")?,
             steps,
         })

@@ -363,12 +363,14 @@ pub(super) fn used(graph: &Graph) -> Vec<&WeightMatrix> {
     products.filter(|product| seen.insert(product.matrix)).map(|product| &graph.matrices[product.matrix]).collect()
 }
 
-/// Returns the control periods that a run of the network may take. Only an overlap or an ensemble keeps the rest of a
-/// chunk while the next one is computed.
+/// Returns the control periods that a run of the network may take so that an action plays in each. Only an overlap or an
+/// ensemble keeps the rest of a chunk while the next one is computed; and a chunk that is `late` periods late begins with
+/// position `late`, in the period before the next run.
 fn periods(image: &Image<'_>) -> usize {
-    let keeps = image.overlap() > 0 || image.horizon() > 0;
-    let rest = if keeps { image.chunk().saturating_sub(image.execute()) } else { 0 };
-    (1 + rest).min(image.deadline().unwrap_or(usize::MAX)).max(1)
+    let kept = if image.horizon() > 0 { image.horizon() } else { image.chunk() };
+    let kept = kept.min(image.deadline().unwrap_or(usize::MAX));
+    let late = kept.saturating_sub(image.execute()).min(kept.saturating_sub(1) / 2);
+    if image.overlap() > 0 || image.horizon() > 0 { late.max(1) } else { 1 }
 }
 
 /// Lists how an image was made: what the image says, and with statistics the options.
