@@ -1,6 +1,9 @@
 """Drives the task: 100 episodes with the f32 network, or with images.
 
-Usage: python evaluate.py [--late PERIODS] POLICY.onnx|IMAGE.actq ...
+Usage: python evaluate.py [--late PERIODS] [--episodes N] [--bits-of IMAGE.actq] POLICY.onnx|IMAGE.actq|PORT ...
+
+PORT is that of a controller that runs an image, as tcp:127.0.0.1:5331; with --bits-of, its actions must have the bits of
+that image on this machine.
 """
 
 import argparse
@@ -11,14 +14,15 @@ import numpy as np
 import onnxruntime
 from task import ACTIONS, DONE, STEPS, Task
 
-EPISODES, FIRST_SEED = 100, 1000
+FIRST_SEED = 1000
 
 
-class Image:
-    """`actq serve`, whose network takes some control periods."""
+class Served:
+    """`actq serve`, whose network takes some control periods, or `actq link serve`."""
 
-    def __init__(self, path, late):
-        command = ["actq", "serve", path, "--late", str(late)]
+    def __init__(self, name, late):
+        is_image = name.endswith(".actq")
+        command = ["actq", "serve", name, "--late", str(late)] if is_image else ["actq", "link", "serve", name]
         self.served = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def reset(self):
@@ -70,27 +74,35 @@ class Network:
 
 
 def main():
-    parser = argparse.ArgumentParser(usage=__doc__)
+    parser = argparse.ArgumentParser(usage=__doc__.partition("Usage: python ")[2])
     parser.add_argument("--late", type=int, default=0)
+    parser.add_argument("--episodes", type=int, default=100)
+    parser.add_argument("--bits-of")
     parser.add_argument("policies", nargs="+")
     args = parser.parse_args()
+    host = Served(args.bits_of, args.late) if args.bits_of else None
     task = Task()
     for name in args.policies:
-        policy = (Image if name.endswith(".actq") else Network)(name, args.late)
-        successes = 0
-        for seed in range(FIRST_SEED, FIRST_SEED + EPISODES):
+        policy = (Network if name.endswith(".onnx") else Served)(name, args.late)
+        successes = actions = 0
+        for seed in range(FIRST_SEED, FIRST_SEED + args.episodes):
             frame = task.reset(seed)
             policy.reset()
+            if host:
+                host.reset()
             # Before the first chunk the arms stay where they are.
             action = frame[:ACTIONS]
             for _ in range(STEPS):
                 answer = policy(np.float32(frame))
+                actions += 1
+                if host and host(np.float32(frame)).tobytes() != answer.tobytes():
+                    raise SystemExit(f"{name}: action {actions} has other bits than {args.bits_of}")
                 action = action if np.isnan(answer).any() else answer
                 frame, reward = task.step(action)
                 if reward == DONE:
                     successes += 1
                     break
-        print(f"{name}, {args.late} periods late: {successes} of {EPISODES} episodes", flush=True)
+        print(f"{name}, {args.late} periods late: {successes} of {args.episodes} episodes, {actions} actions", flush=True)
 
 
 if __name__ == "__main__":
