@@ -65,11 +65,12 @@ fn a_flow_adds_the_networks_outputs() -> Result<()> {
     let alone = alone()?;
     for (solver, steps, from, to) in [("euler", 5, 0.0, 1.0), ("midpoint", 5, 1.0, 0.0), ("euler", 20, 0.0, 1.0)] {
         let sampler = format!(
-            r#"{{"kind": "flow", "steps": {steps}, "solver": "{solver}", "execute": 2, "time": {{"from": {from}, "to": {to}}}}}"#
+            r#"{{"kind": "flow", "steps": {steps}, "solver": "{solver}", "execute": 2, "overlap": 1, "time": {{"from": {from}, "to": {to}}}}}"#
         );
         let (found, policy) = imported(&network(), &with(&sampler)?)?;
         ensure!(found.inputs == [("state".to_owned(), OBS)] && found.cut_inputs.is_empty(), "{found:?}");
-        ensure!((policy.chunk, policy.execute, policy.act_len) == (4, 2, 2), "{policy:?}");
+        let playback = (policy.chunk, policy.execute, policy.contract.playback.overlap);
+        ensure!((playback, policy.act_len) == ((4, 2, 1), 2), "{policy:?}");
         let rows = drawn(&policy);
         let expected = rows.iter().map(|row| {
             let (observation, noise) = row.split_at(OBS);
