@@ -9,7 +9,7 @@ use actq::graph::{Graph, NodeKind};
 use actq::methods::Activations;
 use actq::policy::Policy;
 use actq::runtime::ImageBuffer;
-use actq_bench::command::{actq, answered, run};
+use actq_bench::command::{actq, answered, run, succeeded};
 use actq_bench::networks::Builder;
 use actq_bench::qemu::{self, Server, step_request};
 use actq_bench::{Target, bits, firmware};
@@ -623,6 +623,50 @@ fn a_served_network_is_late() -> Result<()> {
             let is_close = answer.to_bits() == expected.to_bits() || (answer - expected).abs() < 1e-4;
             ensure!(is_close, "{late} periods late: {answer} in period {period}, expected {expected}");
         }
+    }
+    Ok(())
+}
+
+#[test]
+fn inspect_says_what_a_slow_network_means() -> Result<()> {
+    let overlap = Playback { overlap: 8, ..Playback::default() };
+    let average = Playback { ensemble: Some(Ensemble { horizon: 16, m: 0.01 }), ..Playback::default() };
+    let cases = [
+        (16, 8, overlap, 0.9, ""),
+        (16, 8, overlap, 3.5, "in which the rest of the chunk before plays; `actq serve --late 4`"),
+        (
+            16,
+            8,
+            overlap,
+            7.5,
+            "with more than 7 some periods have no action: take a faster processor, fewer bits, a lower rate.",
+        ),
+        (16, 4, overlap, 7.5, "with more than 7 some periods"),
+        (16, 1, average, 6.5, "`actq serve --late 7`"),
+        (
+            16,
+            8,
+            Playback::default(),
+            1.5,
+            "with more than 1 some periods have no action: take a faster processor, fewer bits, a lower rate, or an overlap",
+        ),
+        (
+            1,
+            1,
+            Playback::default(),
+            1.5,
+            "with more than 1 some periods have no action: take a faster processor, fewer bits, a lower rate.",
+        ),
+    ];
+    for (chunk, execute, playback, periods, expected) in cases {
+        let buffer = echo(chunk, execute, ActionContract { playback, ..ActionContract::default() });
+        let image = buffer.image("memory".as_ref())?;
+        let clock = image.step_cost().cycles as f64 * f64::from(image.rate_hz()) / periods;
+        let slot = qemu::slot(buffer.bytes())?;
+        let arguments = ["inspect", &slot.path().to_string_lossy(), "--clock", &clock.to_string()].map(str::to_owned);
+        let text = succeeded(&run(actq(&arguments.each_ref().map(String::as_str)), b"")?)?;
+        let is_said = text.contains(&format!("It takes {periods:.1} control periods of 20.0 ms"));
+        ensure!(is_said != expected.is_empty() && text.contains(expected), "{periods} periods, {playback:?}: {text}");
     }
     Ok(())
 }

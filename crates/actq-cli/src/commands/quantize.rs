@@ -123,8 +123,8 @@ fn report(
         quantizer.method().imagined().filter(|_| found.steps() > 0).map_or(String::new(), quantized::imagined);
     let learned = sampled + &imagined + &found.learning.as_ref().map_or(String::new(), quantized::learning);
     let time = match &found.time {
-        Some(step) => time::sentence(step),
-        None => time::sentence(&time::of_image(&image, args.core, CLOCK)?),
+        Some(step) => time::sentence(&image, step),
+        None => time::sentence(&image, &time::of_image(&image, args.core, CLOCK)?),
     };
     let (parameters, bytes) = (source.parameters, found.image.len());
     let f32_bytes = 4 * parameters;

@@ -18,6 +18,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::parts::RUNTIMES;
 use crate::report::inspect::{CONTRACT, kind, playback, row};
+use crate::report::time;
 use crate::report::widths::Widths;
 
 /// Properties of an image.
@@ -254,7 +255,7 @@ impl Facts {
             features: image.features().collect(),
             playback: playback(image),
             execute: image.execute(),
-            periods: periods(image),
+            periods: time::periods(image),
             self_test: image.self_test_steps(),
             ports: ports.collect(),
             ops,
@@ -361,16 +362,6 @@ pub(super) fn used(graph: &Graph) -> Vec<&WeightMatrix> {
     let mut seen = BTreeSet::new();
     let products = graph.nodes.iter().flat_map(|node| node.kind.products());
     products.filter(|product| seen.insert(product.matrix)).map(|product| &graph.matrices[product.matrix]).collect()
-}
-
-/// Returns the control periods that a run of the network may take so that an action plays in each. Only an overlap or an
-/// ensemble keeps the rest of a chunk while the next one is computed; and a chunk that is `late` periods late begins with
-/// position `late`, in the period before the next run.
-fn periods(image: &Image<'_>) -> usize {
-    let kept = if image.horizon() > 0 { image.horizon() } else { image.chunk() };
-    let kept = kept.min(image.deadline().unwrap_or(usize::MAX));
-    let late = kept.saturating_sub(image.execute()).min(kept.saturating_sub(1) / 2);
-    if image.overlap() > 0 || image.horizon() > 0 { late.max(1) } else { 1 }
 }
 
 /// Lists how an image was made: what the image says, and with statistics the options.
