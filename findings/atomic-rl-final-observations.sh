@@ -1,7 +1,7 @@
 #!/bin/sh
 # atomic-rl 0.2.0 with gymnasium 1.4.0, torch 2.15.0, numpy 2.4.6: VecNormalize, "also transforms Gymnasium final observations in info, which is required for correct value bootstrapping at time limits", and VecTransformObservation leave these
 # observations as they are: they look for the key "final_observation", which Gymnasium has called "final_obs" since its version 1.0, and the package asks for no older one. Of an environment whose observations are around 1000, a step gives -0.5 for the
-# next episode's first observation and 1005.0 for the last one of the episode that a time limit ended. A value network that is asked for the future after that one, as PPO does at each time limit, gets a number 500 times beyond all that it has seen; its
+# next episode's first observation and 1005.0 for the last one of the episode that a time limit ended. A value network that is asked for the future after that one, as PPO does at each time limit, gets a number far beyond all that it has seen (they are clipped to 10); its
 # answer goes into the targets of all steps before. There is no error. It is so for vector environments that
 # reset in the same step (AutoresetMode.SAME_STEP), of which the package's comments speak; Gymnasium's own NormalizeObservation refuses this mode with an error.
 # Seen on 2026-12-01:  observation 0.58, at the time limit: observation -0.51, final_obs 1005.0   VecTransformObservation (o - 1000): 0.00 and 1005.0   Gymnasium's wrapper: ValueError

@@ -117,9 +117,9 @@ impl<'i, 's> Running<'i, 's> {
     /// Starts a step on the newest observation, or runs a slice of the current one; returns the frame to send, in
     /// `out`.
     ///
-    /// Every observation stands for a control period. While the network computes a chunk, those that arrive are answered
-    /// with what the chunk before predicts for their periods, if the image keeps it (an overlap or an ensemble). A chunk
-    /// that is ready late begins with its action for the next period.
+    /// If the image keeps the rest of a chunk while the network computes the next one (an overlap or an ensemble), then every
+    /// observation stands for a control period: those that arrive meanwhile are answered with what the chunk before
+    /// predicts for their periods, and a chunk that is ready late begins with its action for the next period.
     pub fn slice<'b, const AXES: usize, const OBS: usize, const N: usize>(
         &mut self,
         endpoint: &mut Endpoint<'_, OBS, N>,
@@ -130,8 +130,8 @@ impl<'i, 's> Running<'i, 's> {
         let takes = match self.phase {
             Phase::Idle | Phase::Ready => true,
             Phase::Begun => false,
-            // A single action is for no particular period: the next observation waits for it.
-            Phase::Runs | Phase::Late => self.head.image().chunk() > 1,
+            // Without a rest of the chunk before, the next observation waits for the action.
+            Phase::Runs | Phase::Late => self.head.image().overlap() > 0 || self.head.image().horizon() > 0,
         };
         let mut plays = self.phase == Phase::Runs && self.is_slow;
         if takes && let Some(step) = endpoint.step(safety) {

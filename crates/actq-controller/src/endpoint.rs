@@ -5,7 +5,8 @@
 //!
 //! An observation, its step and its action belong to the token ([`Safety::token`]) at the observation's arrival. When
 //! the token changes they are dropped, and the head is reset. A status reports each token before the first action under
-//! it. So a host that reads each token can predict every action.
+//! it. So a host that reads each token can predict every action, but those that a chunk plays while the next one is
+//! computed: they depend on the time that it takes.
 
 use core::mem;
 

@@ -19,6 +19,11 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     let buffer = ImageBuffer::read(&args.image)?;
     let image = buffer.image(&args.image)?;
     let output = io::stdout().lock();
+    ensure!(
+        args.late == 0 || image.chunk() == 1 || image.overlap() > 0 || image.horizon() > 0,
+        "--late: {} keeps no rest of a chunk while the next one is computed; give its policy.json an overlap (docs/POLICY.md)",
+        args.image.display()
+    );
     // The variable is set for every command of a rollout.
     let is_option =
         args.policy.as_ref().is_some_and(|policy| env::var_os("ACTQ_POLICY").is_none_or(|of| of != **policy));
