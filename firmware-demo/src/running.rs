@@ -131,7 +131,7 @@ impl<'i, 's> Running<'i, 's> {
             Phase::Idle | Phase::Ready => true,
             Phase::Begun => false,
             // Without a rest of the chunk before, the next observation waits for the action.
-            Phase::Runs | Phase::Late => self.head.image().overlap() > 0 || self.head.image().horizon() > 0,
+            Phase::Runs | Phase::Late => self.head.image().keeps_rest(),
         };
         let mut plays = self.phase == Phase::Runs && self.is_slow;
         if takes && let Some(step) = endpoint.step(safety) {

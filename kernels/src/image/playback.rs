@@ -22,6 +22,11 @@ impl Image<'_> {
         if cfg!(feature = "chunks") { self.header.overlap() } else { 0 }
     }
 
+    /// Returns `true` if the rest of a chunk plays while the next one is computed: with an overlap or an ensemble.
+    pub fn keeps_rest(&self) -> bool {
+        self.overlap() > 0 || self.horizon() > 0
+    }
+
     /// Returns the age, in control periods since its observation, from which on an action never plays; `None` if
     /// actions play at any age.
     pub fn deadline(&self) -> Option<usize> {

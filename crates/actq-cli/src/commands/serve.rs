@@ -20,7 +20,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     let image = buffer.image(&args.image)?;
     let output = io::stdout().lock();
     ensure!(
-        args.late == 0 || image.chunk() == 1 || image.overlap() > 0 || image.horizon() > 0,
+        args.late == 0 || image.chunk() == 1 || image.keeps_rest(),
         "--late: {} keeps no rest of a chunk while the next one is computed; give its policy.json an overlap (docs/POLICY.md)",
         args.image.display()
     );

@@ -95,7 +95,7 @@ fn lateness(image: &Image<'_>, taken: f64) -> Option<String> {
             "{times}, in which the rest of the chunk before plays; `actq serve --late {late}` drives the image so.\n"
         ));
     }
-    let is_dropped = image.overlap() + image.horizon() == 0 && image.execute() < image.chunk();
+    let is_dropped = !image.keeps_rest() && image.execute() < image.chunk();
     let overlap =
         if is_dropped { ", or an overlap, so that the rest of a chunk plays meanwhile (docs/POLICY.md)" } else { "" };
     Some(format!(
@@ -111,7 +111,7 @@ pub(super) fn periods(image: &Image<'_>) -> usize {
     let kept = if image.horizon() > 0 { image.horizon() } else { image.chunk() };
     let kept = kept.min(image.deadline().unwrap_or(usize::MAX));
     let late = kept.saturating_sub(image.execute()).min(kept.saturating_sub(1) / 2);
-    if image.overlap() > 0 || image.horizon() > 0 { late.max(1) } else { 1 }
+    if image.keeps_rest() { late.max(1) } else { 1 }
 }
 
 /// Formats the conditions of all predicted times.

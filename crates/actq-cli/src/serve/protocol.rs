@@ -1,7 +1,6 @@
 //! The pipe protocol ([`actq_link`]), by which a simulator runs an image as its policy over standard input and output.
 
 use std::io::{ErrorKind, Read, Write};
-use std::task::Poll;
 
 use actq::runtime::{prefix_len, take_prefix, with_head};
 use actq_kernels::{Head, Image, StepError};
@@ -42,16 +41,17 @@ impl Late {
             self.left = Some(left - 1);
         } else {
             if left.is_some() {
-                self.finish(head)?;
+                self.action.copy_from_slice(head.finish_ops()?);
                 if head.image().chunk() > 1 {
                     return Ok(());
                 }
                 // A single action is for no particular period: the next step begins at once.
             }
-            head.begin(observation)?;
+            head.begin_ops(observation)?;
             // A step that continues a chunk has no operation left.
             if head.next_op().is_none() || self.periods == 0 {
-                return self.finish(head);
+                self.action.copy_from_slice(head.finish_ops()?);
+                return Ok(());
             }
             self.left = Some(self.periods - 1);
         }
@@ -62,14 +62,6 @@ impl Late {
                 self.left = None;
                 return Err(error);
             }
-        }
-        Ok(())
-    }
-
-    fn finish(&mut self, head: &mut Head<'_, '_>) -> Result<(), StepError> {
-        match head.poll(u32::MAX)? {
-            Poll::Ready(action) => self.action.copy_from_slice(action),
-            Poll::Pending => unreachable!("the budget is no limit"),
         }
         Ok(())
     }

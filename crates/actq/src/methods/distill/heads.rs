@@ -74,7 +74,7 @@ impl HeadUnits {
         all
     }
 
-    /// Keeps so many heads, and elements of each: those with the largest errors. Returns the error of the others. `kept`
+    /// Keeps these numbers of heads and of elements of each: those with the largest errors. Returns the error of the others. `kept`
     /// has the elements of every group.
     pub(super) fn keep(&self, [heads, elements]: [usize; 2], kept: &mut [Vec<usize>]) -> f64 {
         let of_head: Vec<f64> = self.values.iter().map(|part| part.errors.iter().sum()).collect();
